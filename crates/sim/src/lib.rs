@@ -1,1 +1,13 @@
-//! sim
+//! The dynamics of things that people carry together: a [`scene::Scene`] becomes a [`model::Model`], which a
+//! [`solve::Method`] integrates into samples.
+
+pub mod body;
+pub mod effects;
+pub mod energy;
+pub mod freedoms;
+pub mod lanes;
+pub mod model;
+pub mod random;
+pub mod run;
+pub mod scene;
+pub mod solve;

@@ -1,0 +1,99 @@
+//! Handle contact: a spring and damper that push and, unless bilateral, never pull.
+//!
+//! ```text
+//! N* = k δ + c δ̇        N = max(0, N*)  (unilateral)        N = N*  (bilateral)        [N]
+//! ```
+//! δ compression along the normal z, shoulder minus handle [m]; k stiffness [N/m]; c damping [N·s/m].
+//! Holds for a massless shoulder. The unilateral force is continuous and kinks where N* = 0: that zero is the event,
+//! both ways. With c > 0 it opens before δ = 0, and a fast approach pushes before the surfaces meet: the law's known
+//! price. Energy: the spring stores ½kδ² while in contact; what is left in it at lift-off is lost in the damper, what
+//! it is given at a touch-down with δ ≠ 0 is taken back from it (both are booked, see [`crate::energy`]).
+//! Source: paper, eq. (unilateral); Brogliato, Nonsmooth Mechanics (1999), ch. 2.
+
+use crate::lanes::{f64x2, pack};
+use crate::model::{Account, Model, Power, Stage, Term, Workspace};
+use crate::scene::{Checker, PerCarrier, Problem, Scene, problem};
+use serde::{Deserialize, Serialize};
+
+/// `[effects.contact]`
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct Contact {
+    /// k, N/m. Measured in the paper's logs: about 3000.
+    pub stiffness_n_per_m: PerCarrier,
+    /// c, N·s/m. Measured: 400 to 500.
+    pub damping_n_s_per_m: PerCarrier,
+    /// Whether handles are tied to the shoulders: the force may pull.
+    pub bilateral: bool,
+}
+
+impl Default for Contact {
+    fn default() -> Self {
+        Self { stiffness_n_per_m: 3000.0.into(), damping_n_s_per_m: 450.0.into(), bilateral: false }
+    }
+}
+
+impl Contact {
+    pub(super) fn check(&self, scene: &Scene) -> Result<(), Problem> {
+        let n = scene.carriers.count();
+        let (k, c) = ("effects.contact.stiffness_n_per_m", "effects.contact.damping_n_s_per_m");
+        Checker::per_carrier(k, &self.stiffness_n_per_m, n)?;
+        Checker::per_carrier(c, &self.damping_n_s_per_m, n)?;
+        self.stiffness_n_per_m.values().iter().try_for_each(|&x| Checker::not_negative(k, x))?;
+        self.damping_n_s_per_m.values().iter().try_for_each(|&x| Checker::not_negative(c, x))?;
+        let pushes = (0..n).all(|i| self.stiffness_n_per_m.get(i) > 0.0 || self.damping_n_s_per_m.get(i) > 0.0);
+        if pushes { Ok(()) } else { Err(problem(k, "stiffness and damping are both zero; leave the effect out instead")) }
+    }
+
+    pub(super) fn build(&self, scene: &Scene, model: &mut Model) {
+        let n = scene.carriers.count();
+        let law = SpringDamper {
+            stiffness: pack((0..n).map(|i| self.stiffness_n_per_m.get(i))),
+            damping: pack((0..n).map(|i| self.damping_n_s_per_m.get(i))),
+        };
+        model.add(Stage::Handles, law.clone());
+        model.add_account("contact", law);
+        model.set_contact_springs(self.bilateral, (0..n).map(|i| self.stiffness_n_per_m.get(i)));
+    }
+}
+
+/// The law for all handles. `gain` and `floor` of the workspace select the branch: see [`Workspace`].
+#[derive(Clone, Debug)]
+struct SpringDamper {
+    stiffness: Vec<f64x2>,
+    damping: Vec<f64x2>,
+}
+
+impl Term for SpringDamper {
+    #[inline]
+    fn apply(&self, _t_s: f64, w: &mut Workspace) {
+        for p in 0..w.pairs() {
+            let free = self.stiffness[p] * w.gap[2][p] + self.damping[p] * w.gap_rate[2][p];
+            w.unclamped[p] = free;
+            w.normal[p] = (free * w.contact_gain[p]).fast_max(w.contact_floor[p]);
+        }
+    }
+}
+
+impl Account for SpringDamper {
+    fn power(&self, w: &Workspace) -> Power {
+        let (mut work, mut absorbed) = (f64x2::ZERO, f64x2::ZERO);
+        for p in 0..w.pairs() {
+            // N δ̇ goes into the spring and the damper; the spring's part returns through `stored_j`.
+            let in_contact = w.normal[p].simd_gt(f64x2::ZERO) | w.contact_floor[p].simd_lt(f64x2::ZERO);
+            let spring = in_contact & (self.stiffness[p] * w.gap[2][p]);
+            work += w.normal[p] * w.base_rate[2][p];
+            absorbed += (w.normal[p] - spring) * w.gap_rate[2][p];
+        }
+        Power { work_w: crate::lanes::sum(work), dissipated_w: crate::lanes::sum(absorbed) }
+    }
+
+    fn stored_j(&self, w: &Workspace) -> f64 {
+        let mut stored = f64x2::ZERO;
+        for p in 0..w.pairs() {
+            let in_contact = w.normal[p].simd_gt(f64x2::ZERO) | w.contact_floor[p].simd_lt(f64x2::ZERO);
+            stored += in_contact & (self.stiffness[p] * w.gap[2][p] * w.gap[2][p] * 0.5);
+        }
+        crate::lanes::sum(stored)
+    }
+}

@@ -1,0 +1,128 @@
+//! Coulomb friction at the shoulders, regularised: it limits the hold, or acts alone where there is none.
+//!
+//! ```text
+//! e = T*/(μN) + ḋ/v_s        T = μN · e/√(1 + |e|²)        |T| < μN        [N]
+//! ```
+//! T* the hold's force (zero without `hold`) [N]; μ coefficient [1]; N normal force [N], ≥ 0; ḋ sliding velocity,
+//! shoulder minus handle, in the plane [m/s]; v_s regularising velocity [m/s]. As v_s → 0 with no hold it is Coulomb's
+//! law; |T*| ≪ μN and v_s → ∞ leave the hold as it is. With N → 0 the force vanishes like μN. Smooth everywhere, so
+//! sticking and sliding are no events; it creeps at |T|/(μN)·v_s where true dry friction would stick.
+//! Source: paper, section 3.3 ("regularized friction"); Stewart & Trinkle (1996) for what is regularised.
+
+use crate::lanes::{f64x2, sum};
+use crate::model::{Account, Model, Power, Stage, Term, Workspace};
+use crate::scene::{Checker, Problem, Scene};
+use serde::{Deserialize, Serialize};
+
+/// `[effects.friction]`
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct Friction {
+    /// μ, 1. Wood on cloth: 0.3 to 0.6.
+    pub coefficient: f64,
+    /// v_s, m/s.
+    pub regularising_velocity_m_per_s: f64,
+}
+
+impl Default for Friction {
+    fn default() -> Self {
+        Self { coefficient: 0.5, regularising_velocity_m_per_s: 0.1 }
+    }
+}
+
+impl Friction {
+    pub(super) fn check(&self, _scene: &Scene) -> Result<(), Problem> {
+        Checker::not_negative("effects.friction.coefficient", self.coefficient)?;
+        Checker::positive("effects.friction.regularising_velocity_m_per_s", self.regularising_velocity_m_per_s)
+    }
+
+    pub(super) fn build(&self, scene: &Scene, model: &mut Model) {
+        let law = Coulomb { mu: self.coefficient, per_velocity: 1.0 / self.regularising_velocity_m_per_s };
+        if scene.effects.hold.is_some() {
+            // The hold's account books the limited force.
+            model.add(Stage::Handles, Limit(law));
+        } else {
+            model.add(Stage::Handles, Alone(law.clone()));
+            model.add_account("friction", law);
+        }
+    }
+}
+
+#[derive(Clone, Debug)]
+struct Coulomb {
+    mu: f64,
+    per_velocity: f64,
+}
+
+impl Coulomb {
+    /// μN·e/√(1 + |e|²), written so that μN = 0 needs no case of its own.
+    #[inline(always)]
+    fn limited(&self, normal: f64x2, hold: [f64x2; 2], rate: [f64x2; 2]) -> [f64x2; 2] {
+        let most = (normal * self.mu).fast_max(f64x2::ZERO);
+        let wanted = [0, 1].map(|a| hold[a] + most * (rate[a] * self.per_velocity));
+        let tiny = f64x2::splat(f64::MIN_POSITIVE);
+        let length = (most * most + wanted[0] * wanted[0] + wanted[1] * wanted[1]).fast_max(tiny).sqrt();
+        wanted.map(|e| e * (most / length))
+    }
+}
+
+#[derive(Debug)]
+struct Limit(Coulomb);
+
+impl Term for Limit {
+    fn apply(&self, _t_s: f64, w: &mut Workspace) {
+        for p in 0..w.pairs() {
+            let hold = [w.tangential[0][p], w.tangential[1][p]];
+            let force = self.0.limited(w.normal[p], hold, [w.gap_rate[0][p], w.gap_rate[1][p]]);
+            [w.tangential[0][p], w.tangential[1][p]] = force;
+        }
+    }
+}
+
+#[derive(Debug)]
+struct Alone(Coulomb);
+
+impl Term for Alone {
+    fn apply(&self, _t_s: f64, w: &mut Workspace) {
+        for p in 0..w.pairs() {
+            let force = self.0.limited(w.normal[p], [f64x2::ZERO; 2], [w.gap_rate[0][p], w.gap_rate[1][p]]);
+            [w.tangential[0][p], w.tangential[1][p]] = force;
+        }
+    }
+}
+
+impl Account for Coulomb {
+    fn power(&self, w: &Workspace) -> Power {
+        let (mut work, mut absorbed) = (f64x2::ZERO, f64x2::ZERO);
+        for axis in 0..2 {
+            for p in 0..w.pairs() {
+                work += w.tangential[axis][p] * w.base_rate[axis][p];
+                absorbed += w.tangential[axis][p] * w.gap_rate[axis][p];
+            }
+        }
+        Power { work_w: sum(work), dissipated_w: sum(absorbed) }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_limits_are_coulomb_and_the_hold() {
+        let at = |mu: f64, vs: f64, n: f64, hold: f64, v: f64| {
+            let law = Coulomb { mu, per_velocity: 1.0 / vs };
+            let zero = f64x2::ZERO;
+            law.limited(f64x2::splat(n), [f64x2::splat(hold), zero], [f64x2::splat(v), zero])[0].to_array()[0]
+        };
+        // Sliding fast: μN along the sliding. Against it: the same, other sign.
+        assert!((at(0.5, 1e-6, 100.0, 0.0, 1.0) - 50.0).abs() < 1e-9);
+        assert!((at(0.5, 1e-6, 100.0, 0.0, -1.0) + 50.0).abs() < 1e-9);
+        // A weak hold passes unchanged: relative loss ½(T*/μN)².
+        assert!((at(0.5, 1e9, 1000.0, 1.0, 0.0) - 1.0).abs() < 3e-6);
+        // Never beyond μN, nothing on a slack handle, nothing without friction.
+        assert!(at(0.5, 0.1, 100.0, 1e9, 1e3) <= 50.0);
+        assert_eq!(at(0.5, 0.1, 0.0, 10.0, 1.0), 0.0);
+        assert_eq!(at(0.0, 0.1, 100.0, 10.0, 1.0), 0.0);
+    }
+}

@@ -1,0 +1,155 @@
+//! Gait: the shoulders move with the carriers' phases; ritual shake is a harmonic like any other.
+//!
+//! ```text
+//! b_i = b_i0 + Σ_k A_k sin(k φ_i + α_k)        ḃ_i = Σ_k k φ̇_i A_k cos(k φ_i + α_k)
+//! ```
+//! b_i0 resting shoulder [m]; A_k vector amplitude [m] and α_k phase per axis [rad] of harmonic k = 1 … K; φ_i gait
+//! phase [rad]. Prescribed motion: the load does not push the shoulder back, whatever the force.
+//! Source: paper, eq. (base).
+
+use crate::lanes::{f64x2, pack};
+use crate::model::{Model, Stage, Term, Workspace};
+use crate::scene::{Checker, PerCarrier, Problem, Scene, problem};
+use serde::{Deserialize, Serialize};
+
+/// `[effects.gait]`
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct Gait {
+    /// Vertical amplitude of the first harmonic, m.
+    pub amplitude_m: PerCarrier,
+    /// Sideways (y) amplitude of the first harmonic, m.
+    pub sway_m: PerCarrier,
+    /// Phase of the sway against the lift, rad.
+    pub sway_phase_rad: f64,
+    /// Further harmonics and shakes, added to the first.
+    pub harmonics: Vec<Harmonic>,
+}
+
+/// One more Fourier component of the shoulders' motion.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Harmonic {
+    /// k, a whole number from 1.
+    pub order: u32,
+    /// A_k: x, y, z, m.
+    pub amplitude_m: [f64; 3],
+    /// α_k: x, y, z, rad.
+    #[serde(default)]
+    pub phase_rad: [f64; 3],
+    /// Which carriers make it (numbers from 0); all where absent.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub carriers: Option<Vec<usize>>,
+}
+
+/// Beyond this order a shoulder would move at hundreds of hertz.
+const HIGHEST_ORDER: u32 = 64;
+
+impl Default for Gait {
+    fn default() -> Self {
+        Self { amplitude_m: 0.06.into(), sway_m: 0.0.into(), sway_phase_rad: 0.0, harmonics: Vec::new() }
+    }
+}
+
+impl Gait {
+    pub(super) fn check(&self, scene: &Scene) -> Result<(), Problem> {
+        let n = scene.carriers.count();
+        Checker::per_carrier("effects.gait.amplitude_m", &self.amplitude_m, n)?;
+        Checker::per_carrier("effects.gait.sway_m", &self.sway_m, n)?;
+        Checker::finite("effects.gait.sway_phase_rad", self.sway_phase_rad)?;
+        for h in &self.harmonics {
+            let key = "effects.gait.harmonics";
+            Checker::all_finite(key, &h.amplitude_m)?;
+            Checker::all_finite(key, &h.phase_rad)?;
+            if !(1..=HIGHEST_ORDER).contains(&h.order) {
+                return Err(problem(key, format!("found order {}, expected 1 to {HIGHEST_ORDER}", h.order)));
+            }
+            if let Some(i) = h.carriers.iter().flatten().find(|&&i| i >= n) {
+                return Err(problem(key, format!("found carrier {i}, but there are {n}, numbered from 0")));
+            }
+        }
+        Ok(())
+    }
+
+    pub(super) fn build(&self, scene: &Scene, model: &mut Model) {
+        let n = scene.carriers.count();
+        model.need_phases();
+        let mut waves = Vec::new();
+        let mut add = |axis: usize, order: u32, amplitude: Vec<f64>, phase: f64| {
+            if amplitude.iter().any(|a| *a != 0.0) {
+                let part = |f: f64| pack(amplitude.iter().map(|a| a * f));
+                waves.push(Wave { axis, order, sine: part(phase.cos()), cosine: part(phase.sin()) });
+            }
+        };
+        let each = |x: &PerCarrier| (0..n).map(|i| x.get(i)).collect::<Vec<f64>>();
+        add(2, 1, each(&self.amplitude_m), 0.0);
+        add(1, 1, each(&self.sway_m), self.sway_phase_rad);
+        for h in &self.harmonics {
+            let who = |i: usize| h.carriers.as_ref().is_none_or(|list| list.contains(&i));
+            for axis in 0..3 {
+                let amplitude = (0..n).map(|i| if who(i) { h.amplitude_m[axis] } else { 0.0 }).collect();
+                add(axis, h.order, amplitude, h.phase_rad[axis]);
+            }
+        }
+        let (first, higher): (Vec<Wave>, Vec<Wave>) = waves.into_iter().partition(|w| w.order == 1);
+        for wave in &first {
+            model.shoulders_move(wave.axis);
+        }
+        for wave in &higher {
+            model.shoulders_move(wave.axis);
+        }
+        model.add(Stage::Shoulders, First(first));
+        if !higher.is_empty() {
+            model.add(Stage::Shoulders, Higher(higher));
+        }
+    }
+}
+
+/// A sin(kφ + α) = `sine` sin kφ + `cosine` cos kφ, for all carriers, along one axis.
+#[derive(Debug)]
+struct Wave {
+    axis: usize,
+    order: u32,
+    sine: Vec<f64x2>,
+    cosine: Vec<f64x2>,
+}
+
+impl Wave {
+    #[inline(always)]
+    fn add(&self, p: usize, sin: f64x2, cos: f64x2, rate: f64x2, w: &mut Workspace) {
+        w.base[self.axis][p] += self.sine[p] * sin + self.cosine[p] * cos;
+        w.base_rate[self.axis][p] += rate * (self.sine[p] * cos - self.cosine[p] * sin);
+    }
+}
+
+#[derive(Debug)]
+struct First(Vec<Wave>);
+
+impl Term for First {
+    fn apply(&self, _t_s: f64, w: &mut Workspace) {
+        for wave in &self.0 {
+            for p in 0..w.pairs() {
+                wave.add(p, w.sin[p], w.cos[p], w.rate[p], w);
+            }
+        }
+    }
+}
+
+#[derive(Debug)]
+struct Higher(Vec<Wave>);
+
+impl Term for Higher {
+    fn apply(&self, _t_s: f64, w: &mut Workspace) {
+        for wave in &self.0 {
+            for p in 0..w.pairs() {
+                // sin and cos of kφ by repeated addition of φ: k − 1 complex products, error of the order of kε.
+                let (s1, c1) = (w.sin[p], w.cos[p]);
+                let (mut s, mut c) = (s1, c1);
+                for _ in 1..wave.order {
+                    (s, c) = (s * c1 + c * s1, c * c1 - s * s1);
+                }
+                wave.add(p, s, c, w.rate[p] * f64::from(wave.order), w);
+            }
+        }
+    }
+}

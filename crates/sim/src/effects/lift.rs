@@ -1,0 +1,100 @@
+//! Lift gain: under music people lift harder than their gait alone would.
+//!
+//! ```text
+//! z_i = z_i0 + G(t) (z_i,gait − z_i0)        G(t) = 1 + (g − 1)(1 − e^{−(t − t₀)/τ})  for t ≥ t₀,  1 before
+//! ```
+//! g gain [1]; t₀ onset [s]; τ build-up [s], where 0 means g from t₀ on (then the shoulders jump at t₀ > 0, so a build-up
+//! is asked for there). Source: the archive's music logs, whose summed force is large before the phases lock.
+
+use crate::model::{Model, Stage, Switch, Term, Workspace};
+use crate::scene::{Checker, Problem, Scene, problem};
+use serde::{Deserialize, Serialize};
+
+/// `[effects.lift]`
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct Lift {
+    /// g, 1. Inferred from the paper's music logs: 1.1 to 1.25.
+    pub gain: f64,
+    /// t₀, s.
+    pub onset_s: f64,
+    /// τ, s.
+    pub build_up_s: f64,
+}
+
+impl Default for Lift {
+    fn default() -> Self {
+        Self { gain: 1.2, onset_s: 0.0, build_up_s: 0.0 }
+    }
+}
+
+impl Lift {
+    pub(super) fn check(&self, scene: &Scene) -> Result<(), Problem> {
+        Checker::not_negative("effects.lift.gain", self.gain)?;
+        Checker::not_negative("effects.lift.onset_s", self.onset_s)?;
+        Checker::not_negative("effects.lift.build_up_s", self.build_up_s)?;
+        if scene.effects.gait.is_none() {
+            return Err(problem("effects.lift", "there is no `effects.gait` whose motion it could amplify"));
+        }
+        if self.onset_s > 0.0 && self.build_up_s == 0.0 {
+            return Err(problem("effects.lift.build_up_s", "found 0 with an onset after the start: the shoulders would jump"));
+        }
+        Ok(())
+    }
+
+    pub(super) fn build(&self, _scene: &Scene, model: &mut Model) {
+        let (excess, onset_s) = (self.gain - 1.0, self.onset_s);
+        if self.build_up_s == 0.0 {
+            model.add(Stage::Shoulders, Constant(self.gain));
+        } else {
+            model.add(Stage::Shoulders, Growing { excess, onset_s, per_s: 1.0 / self.build_up_s });
+            if onset_s > 0.0 {
+                model.add_switch(Onset(onset_s));
+            }
+        }
+    }
+}
+
+#[inline(always)]
+fn amplify(w: &mut Workspace, gain: f64, gain_rate: f64) {
+    for p in 0..w.pairs() {
+        let lifted = w.base[2][p] - w.rest[2][p];
+        w.base[2][p] = w.rest[2][p] + lifted * gain;
+        w.base_rate[2][p] = w.base_rate[2][p] * gain + lifted * gain_rate;
+    }
+}
+
+#[derive(Debug)]
+struct Constant(f64);
+
+impl Term for Constant {
+    fn apply(&self, _t_s: f64, w: &mut Workspace) {
+        amplify(w, self.0, 0.0);
+    }
+}
+
+#[derive(Debug)]
+struct Growing {
+    excess: f64,
+    onset_s: f64,
+    per_s: f64,
+}
+
+impl Term for Growing {
+    fn apply(&self, t_s: f64, w: &mut Workspace) {
+        // Stages of a step that ends at the onset see t ≤ t₀; a step never straddles it.
+        let decay = (-(t_s - self.onset_s).max(0.0) * self.per_s).exp();
+        let growing = if t_s >= self.onset_s { self.excess * decay * self.per_s } else { 0.0 };
+        amplify(w, 1.0 + self.excess * (1.0 - decay), growing);
+    }
+}
+
+/// The gain's slope jumps at its onset.
+#[derive(Debug)]
+struct Onset(f64);
+
+impl Switch for Onset {
+    fn next_s(&self, after_s: f64) -> f64 {
+        if after_s < self.0 { self.0 } else { f64::INFINITY }
+    }
+}

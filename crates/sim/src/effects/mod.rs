@@ -1,0 +1,89 @@
+//! The effects a scene can call for: one file each, and one line each in [`TABLE`].
+//!
+//! An effect's `build` adds terms to a [`Model`]: to the phase rates, to the motion of the shoulders, to the forces at
+//! the handles, to the torque on the body; moments at which the right-hand side jumps; states; an account of energy.
+//! An effect that the scene does not name adds nothing, so it has no branch, no state and no cost.
+
+pub mod contact;
+pub mod coupling;
+pub mod frequency_spread;
+pub mod friction;
+pub mod gait;
+pub mod hold;
+pub mod lift;
+pub mod music;
+pub mod noise;
+pub mod pole_friction;
+
+use crate::model::Model;
+use crate::scene::Scene;
+use serde::{Deserialize, Serialize};
+
+/// The `[effects.NAME]` tables of a scene; absent means off.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+#[allow(missing_docs)]
+pub struct Effects {
+    pub contact: Option<contact::Contact>,
+    pub hold: Option<hold::Hold>,
+    pub friction: Option<friction::Friction>,
+    pub pole_friction: Option<pole_friction::PoleFriction>,
+    pub gait: Option<gait::Gait>,
+    pub lift: Option<lift::Lift>,
+    pub frequency_spread: Option<frequency_spread::FrequencySpread>,
+    pub coupling: Option<coupling::Coupling>,
+    pub music: Option<music::Music>,
+    pub noise: Option<noise::Noise>,
+}
+
+/// One line of the table of effects.
+pub struct Entry {
+    /// The name in `[effects.NAME]`.
+    pub name: &'static str,
+    /// One sentence for `sim explain`.
+    pub about: &'static str,
+    /// Whether a scene has it.
+    pub is_on: fn(&Effects) -> bool,
+    /// Takes it out of a scene.
+    pub switch_off: fn(&mut Effects),
+    /// Checks its parameters.
+    pub check: fn(&Scene) -> Result<(), crate::scene::Problem>,
+    /// Adds it to the model.
+    pub build: fn(&Scene, &mut Model),
+}
+
+macro_rules! entry {
+    ($name:ident, $about:literal) => {
+        Entry {
+            name: stringify!($name),
+            about: $about,
+            is_on: |e| e.$name.is_some(),
+            switch_off: |e| e.$name = None,
+            check: |s| s.effects.$name.as_ref().map_or(Ok(()), |p| p.check(s)),
+            build: |s, m| {
+                if let Some(p) = &s.effects.$name {
+                    p.build(s, m);
+                }
+            },
+        }
+    };
+}
+
+/// Every effect, in the order in which terms of the same kind are applied.
+pub const TABLE: &[Entry] = &[
+    entry!(frequency_spread, "natural gait frequencies differ from carrier to carrier"),
+    entry!(coupling, "carriers adjust to each other (Kuramoto)"),
+    entry!(music, "carriers are entrained by a beat (Adler)"),
+    entry!(noise, "gait phases wander (white phase noise)"),
+    entry!(gait, "shoulders move with the gait phase"),
+    entry!(lift, "shoulders lift harder or softer than the gait alone"),
+    entry!(contact, "handles rest on shoulders: spring and damper"),
+    entry!(hold, "hands hold the handles sideways: spring and damper"),
+    entry!(friction, "sideways force at a handle is limited by Coulomb friction"),
+    entry!(pole_friction, "turning about the pole rubs on the shoulders, saturating"),
+];
+
+/// Checks the parameters of every effect that is on.
+pub(crate) fn check(scene: &Scene) -> Result<(), crate::scene::Problem> {
+    TABLE.iter().try_for_each(|e| (e.check)(scene))
+}

@@ -1,0 +1,279 @@
+//! The body's coordinates: how a state places the handles, and what forces do to it.
+
+use crate::body::Body;
+use crate::lanes::{f64x2, pack, sum};
+use crate::model::Workspace;
+use crate::scene::Start;
+use nalgebra::{Matrix3, Quaternion, UnitQuaternion, Vector3};
+
+/// Where the body is and how it moves.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Pose {
+    /// Centre of mass in the world, m.
+    pub position_m: [f64; 3],
+    /// Body → world, (x, y, z, w), unit.
+    pub orientation: [f64; 4],
+    /// Velocity in the world, m/s.
+    pub velocity_m_per_s: [f64; 3],
+    /// Angular velocity in the body, rad/s.
+    pub spin_rad_per_s: [f64; 3],
+}
+
+impl Pose {
+    /// Roll, pitch, yaw of R = R_z(yaw) R_y(pitch) R_x(roll), rad (REP-103). At pitch = ±90° roll and yaw are not unique:
+    /// yaw is then 0 and roll takes the whole turn.
+    pub fn roll_pitch_yaw_rad(&self) -> [f64; 3] {
+        let [x, y, z, w] = self.orientation;
+        let sin_pitch = 2.0 * (w * y - x * z);
+        let level = 1.0 - 2.0 * (y * y + z * z);
+        let across = 2.0 * (x * y + w * z);
+        let cos_pitch = level.hypot(across);
+        let pitch = sin_pitch.atan2(cos_pitch);
+        if cos_pitch < 1e-9 {
+            // ±90°: q = R_z(yaw) R_y(±90°) R_x(roll) depends on roll ∓ yaw only.
+            let turn = 2.0 * x.atan2(w);
+            return [turn - std::f64::consts::TAU * (turn / std::f64::consts::TAU).round(), pitch, 0.0];
+        }
+        let roll = (2.0 * (w * x + y * z)).atan2(1.0 - 2.0 * (x * x + y * y));
+        [roll, pitch, across.atan2(level)]
+    }
+}
+
+/// A choice of coordinates for the body.
+pub trait Freedoms: Send + Sync {
+    /// How many states it needs.
+    fn size(&self) -> usize;
+    /// Their names, with units.
+    fn names(&self) -> &'static [&'static str];
+    /// How many of them, from the front, are positions rather than velocities.
+    fn positions(&self) -> usize;
+    /// Puts the body where a scene starts.
+    fn place(&self, start: &Start, height_m: f64, y: &mut [f64]);
+    /// Fills `arm`, `gap`, `gap_rate` and `spin` of the workspace.
+    fn gaps(&self, y: &[f64], w: &mut Workspace);
+    /// Writes the derivatives of the body's states from the forces in the workspace.
+    fn accelerate(&self, y: &[f64], w: &mut Workspace, dy: &mut [f64]);
+    /// The pose at a state.
+    fn pose(&self, y: &[f64]) -> Pose;
+    /// Puts a state back on its manifold after a step.
+    fn project(&self, y: &mut [f64]);
+    /// Moves the positions by `h_s` with the velocities in `y` held (the drift of a splitting method).
+    fn drift(&self, h_s: f64, y: &mut [f64]);
+    /// Kinetic energy and potential energy in the field of gravity, J.
+    fn energy_j(&self, y: &[f64]) -> [f64; 2];
+    /// What counts as one unit of each state in an error norm.
+    fn scales(&self) -> &'static [f64];
+}
+
+/// All six freedoms: r (world), q = (x, y, z, w) body → world, v (world), ω (body); 13 states.
+///
+/// ```text
+/// ṙ = v      q̇ = ½ q ∘ (ω, 0)      M v̇ = Σ F_i + M g      I ω̇ = Σ p_i × RᵀF_i + τ − ω × I ω
+/// ```
+/// Source: paper, section 3.4; Murray, Li, Sastry (1994), ch. 4. A quaternion off the unit sphere (within a step) is read
+/// as the rotation of q/|q|, which leaves the order of every Runge–Kutta method untouched.
+pub struct Six {
+    handle: [Vec<f64x2>; 3],
+    mass: f64,
+    inverse_mass: f64,
+    gravity: Vector3<f64>,
+    inertia: Matrix3<f64>,
+    inverse_inertia: Matrix3<f64>,
+}
+
+impl Six {
+    /// For a body held at `handles_m` (body coordinates).
+    pub fn new(body: &Body, handles_m: &[[f64; 3]]) -> Self {
+        Self {
+            handle: [0, 1, 2].map(|a| pack(handles_m.iter().map(|h| h[a]))),
+            mass: body.mass_kg,
+            inverse_mass: 1.0 / body.mass_kg,
+            gravity: body.gravity_m_per_s2,
+            inertia: body.inertia_kg_m2,
+            inverse_inertia: body.inverse_inertia,
+        }
+    }
+}
+
+/// Rows of the rotation matrix of q/|q|.
+#[inline(always)]
+fn rotation(q: &[f64]) -> [[f64; 3]; 3] {
+    let (x, y, z, w) = (q[0], q[1], q[2], q[3]);
+    let s = 2.0 / (x * x + y * y + z * z + w * w);
+    let (sx, sy, sz) = (s * x, s * y, s * z);
+    let (xx, xy, xz, yy, yz, zz) = (sx * x, sx * y, sx * z, sy * y, sy * z, sz * z);
+    let (wx, wy, wz) = (sx * w, sy * w, sz * w);
+    [
+        [1.0 - (yy + zz), xy - wz, xz + wy],
+        [xy + wz, 1.0 - (xx + zz), yz - wx],
+        [xz - wy, yz + wx, 1.0 - (xx + yy)],
+    ]
+}
+
+impl Freedoms for Six {
+    fn size(&self) -> usize {
+        13
+    }
+
+    fn names(&self) -> &'static [&'static str] {
+        &[
+            "x_m", "y_m", "z_m", "qx", "qy", "qz", "qw", "vx_m_per_s", "vy_m_per_s", "vz_m_per_s", "wx_rad_per_s",
+            "wy_rad_per_s", "wz_rad_per_s",
+        ]
+    }
+
+    fn positions(&self) -> usize {
+        7
+    }
+
+    fn scales(&self) -> &'static [f64] {
+        &[0.1, 0.1, 0.1, 0.1, 0.1, 0.1, 0.1, 1.0, 1.0, 1.0, 1.0, 1.0, 1.0]
+    }
+
+    fn place(&self, start: &Start, height_m: f64, y: &mut [f64]) {
+        y[..3].copy_from_slice(&[start.position_m[0], start.position_m[1], height_m]);
+        let [roll, pitch, yaw] = start.roll_pitch_yaw_deg.map(f64::to_radians);
+        let q = UnitQuaternion::from_euler_angles(roll, pitch, yaw);
+        y[3..7].copy_from_slice(&[q.i, q.j, q.k, q.w]);
+        y[7..10].copy_from_slice(&start.velocity_m_per_s);
+        y[10..13].copy_from_slice(&start.angular_velocity_rad_per_s);
+    }
+
+    #[inline]
+    fn gaps(&self, y: &[f64], w: &mut Workspace) {
+        let r = rotation(&y[3..7]);
+        let spin = [y[10], y[11], y[12]];
+        // ω in the world: the rates of the arms are ω × arm there.
+        let world: [f64x2; 3] =
+            [0, 1, 2].map(|a| f64x2::splat(r[a][0] * spin[0] + r[a][1] * spin[1] + r[a][2] * spin[2]));
+        let rows = r.map(|row| row.map(f64x2::splat));
+        let position = [0, 1, 2].map(|a| f64x2::splat(y[a]));
+        let velocity = [0, 1, 2].map(|a| f64x2::splat(y[7 + a]));
+        w.spin = spin;
+        for p in 0..w.normal.len() {
+            let (hx, hy, hz) = (self.handle[0][p], self.handle[1][p], self.handle[2][p]);
+            let arm = rows.map(|row| row[0] * hx + row[1] * hy + row[2] * hz);
+            let arm_rate = [
+                world[1] * arm[2] - world[2] * arm[1],
+                world[2] * arm[0] - world[0] * arm[2],
+                world[0] * arm[1] - world[1] * arm[0],
+            ];
+            for a in 0..3 {
+                w.arm[a][p] = arm[a];
+                w.gap[a][p] = w.base[a][p] - position[a] - arm[a];
+                w.gap_rate[a][p] = w.base_rate[a][p] - velocity[a] - arm_rate[a];
+            }
+        }
+    }
+
+    #[inline]
+    fn accelerate(&self, y: &[f64], w: &mut Workspace, dy: &mut [f64]) {
+        let zero = f64x2::ZERO;
+        let (mut force, mut torque) = ([zero; 3], [zero; 3]);
+        for p in 0..w.normal.len() {
+            let (fx, fy, fz) = (w.tangential[0][p], w.tangential[1][p], w.normal[p]);
+            let (ax, ay, az) = (w.arm[0][p], w.arm[1][p], w.arm[2][p]);
+            force[0] += fx;
+            force[1] += fy;
+            force[2] += fz;
+            torque[0] += ay * fz - az * fy;
+            torque[1] += az * fx - ax * fz;
+            torque[2] += ax * fy - ay * fx;
+        }
+        let t = torque.map(sum);
+        let r = rotation(&y[3..7]);
+        let spin = Vector3::new(y[10], y[11], y[12]);
+        let in_body = Vector3::new(
+            r[0][0] * t[0] + r[1][0] * t[1] + r[2][0] * t[2] + w.body_torque[0],
+            r[0][1] * t[0] + r[1][1] * t[1] + r[2][1] * t[2] + w.body_torque[1],
+            r[0][2] * t[0] + r[1][2] * t[1] + r[2][2] * t[2] + w.body_torque[2],
+        );
+        let angular = self.inverse_inertia * (in_body - spin.cross(&(self.inertia * spin)));
+        let (qx, qy, qz, qw) = (0.5 * y[3], 0.5 * y[4], 0.5 * y[5], 0.5 * y[6]);
+        dy[0] = y[7];
+        dy[1] = y[8];
+        dy[2] = y[9];
+        dy[3] = qw * spin.x + qy * spin.z - qz * spin.y;
+        dy[4] = qw * spin.y + qz * spin.x - qx * spin.z;
+        dy[5] = qw * spin.z + qx * spin.y - qy * spin.x;
+        dy[6] = -(qx * spin.x + qy * spin.y + qz * spin.z);
+        for a in 0..3 {
+            dy[7 + a] = sum(force[a]) * self.inverse_mass + self.gravity[a];
+            dy[10 + a] = angular[a];
+        }
+    }
+
+    fn pose(&self, y: &[f64]) -> Pose {
+        let mut q = [y[3], y[4], y[5], y[6]];
+        normalise(&mut q);
+        Pose {
+            position_m: [y[0], y[1], y[2]],
+            orientation: q,
+            velocity_m_per_s: [y[7], y[8], y[9]],
+            spin_rad_per_s: [y[10], y[11], y[12]],
+        }
+    }
+
+    #[inline]
+    fn project(&self, y: &mut [f64]) {
+        normalise(&mut y[3..7]);
+    }
+
+    fn drift(&self, h_s: f64, y: &mut [f64]) {
+        for a in 0..3 {
+            y[a] += h_s * y[7 + a];
+        }
+        let q = UnitQuaternion::new_normalize(Quaternion::new(y[6], y[3], y[4], y[5]));
+        let q = q * UnitQuaternion::from_scaled_axis(Vector3::new(y[10], y[11], y[12]) * h_s);
+        y[3..7].copy_from_slice(&[q.i, q.j, q.k, q.w]);
+        normalise(&mut y[3..7]);
+    }
+
+    fn energy_j(&self, y: &[f64]) -> [f64; 2] {
+        let v = Vector3::new(y[7], y[8], y[9]);
+        let spin = Vector3::new(y[10], y[11], y[12]);
+        let kinetic = 0.5 * (self.mass * v.norm_squared() + spin.dot(&(self.inertia * spin)));
+        [kinetic, -self.mass * self.gravity.dot(&Vector3::new(y[0], y[1], y[2]))]
+    }
+}
+
+/// Scales a quaternion to unit length; |q| is within rounding of 1 afterwards.
+#[inline(always)]
+fn normalise(q: &mut [f64]) {
+    let s = 1.0 / (q[0] * q[0] + q[1] * q[1] + q[2] * q[2] + q[3] * q[3]).sqrt();
+    for x in q {
+        *x *= s;
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn pose(orientation: [f64; 4]) -> Pose {
+        Pose { position_m: [0.0; 3], orientation, velocity_m_per_s: [0.0; 3], spin_rad_per_s: [0.0; 3] }
+    }
+
+    #[test]
+    fn angles_turn_back_into_the_same_rotation() {
+        for (roll, pitch, yaw) in [(0.3, -0.2, 1.0), (3.0, 1.5, -3.0), (-1.0, -1.57, 2.0)] {
+            let q = UnitQuaternion::from_euler_angles(roll, pitch, yaw);
+            let angles = pose([q.i, q.j, q.k, q.w]).roll_pitch_yaw_rad();
+            for (a, b) in angles.into_iter().zip([roll, pitch, yaw]) {
+                assert!((a - b).abs() < 1e-9, "{angles:?}");
+            }
+        }
+    }
+
+    #[test]
+    fn a_vertical_pole_still_has_angles_of_the_same_rotation() {
+        for pitch in [std::f64::consts::FRAC_PI_2, -std::f64::consts::FRAC_PI_2] {
+            for (roll, yaw) in [(0.4, 0.0), (0.4, 1.1), (-2.0, 0.7)] {
+                let q = UnitQuaternion::from_euler_angles(roll, pitch, yaw);
+                let [r, p, y] = pose([q.i, q.j, q.k, q.w]).roll_pitch_yaw_rad();
+                let back = UnitQuaternion::from_euler_angles(r, p, y);
+                assert!(q.angle_to(&back) < 1e-8, "{roll} {pitch} {yaw} -> {r} {p} {y}");
+            }
+        }
+    }
+}

@@ -1,0 +1,460 @@
+//! Scene → [`Model`]: only the effects asked for, the state they need, and their right-hand side.
+//!
+//! A model is constant; what changes is the state `y` and a [`Workspace`]. One evaluation runs through stages, each a list
+//! of the terms that the effects added:
+//!
+//! ```text
+//! phases ─► phase rates ─► shoulders b, ḃ ─► gaps d = b − s, ḋ ─► forces N, T ─► torque on the body ─► accelerations
+//! ```
+//!
+//! Between events the right-hand side is smooth: whether a handle is in contact, which noise cell it is and whether the
+//! music has begun are fixed for a *segment* and change only between two of them.
+
+use crate::body::Body;
+use crate::effects;
+use crate::freedoms::{Freedoms, Six};
+use crate::lanes::{self, f64x2, pack, pairs};
+use crate::random::{Stream, normal};
+use crate::scene::Scene;
+
+/// A part of the right-hand side.
+pub trait Term: Send + Sync {
+    /// Adds its part to the workspace at time `t_s`.
+    fn apply(&self, t_s: f64, w: &mut Workspace);
+}
+
+/// Where a term belongs in an evaluation.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Stage {
+    /// Adds to the phase rates.
+    Phases,
+    /// Moves the shoulders.
+    Shoulders,
+    /// Sets forces at the handles.
+    Handles,
+    /// Adds torque on the body.
+    Body,
+}
+
+/// Moments, known beforehand, at which the right-hand side may jump.
+pub trait Switch: Send + Sync {
+    /// The first such moment after `after_s`, or infinity.
+    fn next_s(&self, after_s: f64) -> f64;
+    /// Prepares the segment that begins at `t_s`.
+    fn begin(&self, _t_s: f64, _w: &mut Workspace) {}
+}
+
+/// What an effect does with energy.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Power {
+    /// Fed in by the carriers, W.
+    pub work_w: f64,
+    /// Taken out for good, W.
+    pub dissipated_w: f64,
+}
+
+/// An effect's page in the energy ledger.
+pub trait Account: Send + Sync {
+    /// Power at the evaluated state.
+    fn power(&self, w: &Workspace) -> Power;
+    /// Energy stored in the effect's springs, J.
+    fn stored_j(&self, _w: &Workspace) -> f64 {
+        0.0
+    }
+}
+
+/// The beat of the music.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Beat {
+    /// When it begins, s.
+    pub onset_s: f64,
+    /// ψ̇, rad/s.
+    pub rate_rad_per_s: f64,
+    /// ψ at t = 0, rad.
+    pub phase_rad: f64,
+}
+
+impl Beat {
+    /// ψ(t), rad.
+    #[inline(always)]
+    pub fn phase_at(&self, t_s: f64) -> f64 {
+        self.phase_rad + self.rate_rad_per_s * t_s
+    }
+}
+
+/// The numbers of one evaluation and of the present segment; pairs of carriers side by side.
+#[derive(Clone, Debug)]
+pub struct Workspace {
+    /// When the present segment began, s.
+    pub segment_s: f64,
+    /// Natural frequency and the segment's noise, rad/s.
+    pub constant_rate: Vec<f64x2>,
+    /// What multiplies N*: 1 where it acts, 0 on a slack handle.
+    pub contact_gain: Vec<f64x2>,
+    /// The least that N can be: 0 (slack, or undecided), −∞ (in contact for the whole segment).
+    pub contact_floor: Vec<f64x2>,
+    /// 1 for a carrier, 0 for padding.
+    pub present: Vec<f64x2>,
+    /// Resting shoulders, m.
+    pub rest: [Vec<f64x2>; 3],
+    /// sin φ
+    pub sin: Vec<f64x2>,
+    /// cos φ
+    pub cos: Vec<f64x2>,
+    /// φ̇, rad/s
+    pub rate: Vec<f64x2>,
+    /// Shoulders b, m.
+    pub base: [Vec<f64x2>; 3],
+    /// ḃ, m/s
+    pub base_rate: [Vec<f64x2>; 3],
+    /// Handles relative to the centre of mass, in the world, m.
+    pub arm: [Vec<f64x2>; 3],
+    /// Shoulder minus handle, m.
+    pub gap: [Vec<f64x2>; 3],
+    /// Its rate, m/s.
+    pub gap_rate: [Vec<f64x2>; 3],
+    /// N* before the clamp, N.
+    pub unclamped: Vec<f64x2>,
+    /// N, N
+    pub normal: Vec<f64x2>,
+    /// T in x and y, N
+    pub tangential: [Vec<f64x2>; 2],
+    /// Angular velocity in the body, rad/s.
+    pub spin: [f64; 3],
+    /// Torque on the body beside that of the handle forces, body axes, N·m.
+    pub body_torque: [f64; 3],
+}
+
+impl Workspace {
+    /// How many pairs hold the carriers.
+    #[inline(always)]
+    pub fn pairs(&self) -> usize {
+        self.normal.len()
+    }
+}
+
+/// Where things are in the state vector.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Layout {
+    /// Coordinates and velocities of the body come first.
+    pub body: usize,
+    /// Then the phases.
+    pub phases: usize,
+    /// Then work and dissipation of each account.
+    pub ledger: usize,
+}
+
+impl Layout {
+    /// Length of the state vector.
+    pub fn size(&self) -> usize {
+        self.body + self.phases + self.ledger
+    }
+
+    /// Where the phases are.
+    pub fn phase_range(&self) -> std::ops::Range<usize> {
+        self.body..self.body + self.phases
+    }
+
+    /// Where the ledger is.
+    pub fn ledger_range(&self) -> std::ops::Range<usize> {
+        self.body + self.phases..self.size()
+    }
+}
+
+/// The equations of one scene.
+pub struct Model {
+    /// The scene it was made from.
+    pub scene: Scene,
+    /// Mass properties.
+    pub body: Body,
+    freedoms: Box<dyn Freedoms>,
+    layout: Layout,
+    natural_rad_per_s: Vec<f64>,
+    initial_phases: Vec<f64>,
+    has_phases: bool,
+    /// Axes along which shoulders move; the others stay at rest and cost nothing.
+    moving_axes: [bool; 3],
+    terms: [Vec<Box<dyn Term>>; 4],
+    switches: Vec<Box<dyn Switch>>,
+    accounts: Vec<(&'static str, Box<dyn Account>)>,
+    beat: Option<Beat>,
+    contact_stiffness: Vec<f64>,
+    watches_contact: bool,
+}
+
+impl Model {
+    /// Builds the equations of a checked scene.
+    ///
+    /// # Panics
+    /// When the scene does not pass [`crate::scene::check`].
+    pub fn new(scene: &Scene) -> Self {
+        let body = Body::new(&scene.body).expect("a checked scene has a possible inertia");
+        let n = scene.carriers.count();
+        let freedoms = Box::new(Six::new(&body, &scene.carriers.handles_m));
+        let mut model = Self {
+            scene: scene.clone(),
+            layout: Layout { body: freedoms.size(), phases: 0, ledger: 0 },
+            freedoms,
+            body,
+            natural_rad_per_s: (0..n).map(|i| std::f64::consts::TAU * scene.carriers.frequency_hz.get(i)).collect(),
+            initial_phases: (0..n)
+                .map(|i| {
+                    let spread = match scene.carriers.initial_phase_sd_rad {
+                        0.0 => 0.0,
+                        sd => sd * normal(scene.seed, Stream::InitialPhase, i, 0),
+                    };
+                    scene.carriers.initial_phase_rad.get(i) + spread
+                })
+                .collect(),
+            has_phases: false,
+            moving_axes: [false; 3],
+            terms: Default::default(),
+            switches: Vec::new(),
+            accounts: Vec::new(),
+            beat: None,
+            contact_stiffness: Vec::new(),
+            watches_contact: false,
+        };
+        for effect in effects::TABLE {
+            (effect.build)(scene, &mut model);
+        }
+        if !scene.solver.energy {
+            model.accounts.clear();
+        }
+        model.layout.phases = if model.has_phases { n } else { 0 };
+        model.layout.ledger = 2 * model.accounts.len();
+        model
+    }
+
+    // What effects call while they are built.
+
+    /// Adds a term to a stage.
+    pub(crate) fn add(&mut self, stage: Stage, term: impl Term + 'static) {
+        self.terms[stage as usize].push(Box::new(term));
+    }
+
+    /// Adds moments at which the right-hand side may jump.
+    pub(crate) fn add_switch(&mut self, switch: impl Switch + 'static) {
+        self.switches.push(Box::new(switch));
+    }
+
+    /// Opens a page in the energy ledger.
+    pub(crate) fn add_account(&mut self, name: &'static str, account: impl Account + 'static) {
+        self.accounts.push((name, Box::new(account)));
+    }
+
+    /// Asks for phases in the state.
+    pub(crate) fn need_phases(&mut self) {
+        self.has_phases = true;
+    }
+
+    /// Says that shoulders move along an axis.
+    pub(crate) fn shoulders_move(&mut self, axis: usize) {
+        self.moving_axes[axis] = true;
+    }
+
+    /// Shifts the natural frequencies, rad/s.
+    pub(crate) fn shift_frequencies(&mut self, shift: impl Fn(usize) -> f64) {
+        for (i, w) in self.natural_rad_per_s.iter_mut().enumerate() {
+            *w += shift(i);
+        }
+    }
+
+    pub(crate) fn set_beat(&mut self, beat: Beat) {
+        self.beat = Some(beat);
+    }
+
+    pub(crate) fn set_contact_springs(&mut self, bilateral: bool, stiffness: impl Iterator<Item = f64>) {
+        self.contact_stiffness = stiffness.collect();
+        self.watches_contact = !bilateral;
+    }
+
+    // What everybody else asks.
+
+    /// How many carriers there are.
+    pub fn carriers(&self) -> usize {
+        self.scene.carriers.count()
+    }
+
+    /// Where things are in the state vector.
+    pub fn layout(&self) -> &Layout {
+        &self.layout
+    }
+
+    /// The body's coordinates.
+    pub fn freedoms(&self) -> &dyn Freedoms {
+        &*self.freedoms
+    }
+
+    /// Natural gait frequencies, rad/s.
+    pub fn natural_rad_per_s(&self) -> &[f64] {
+        &self.natural_rad_per_s
+    }
+
+    /// The music's beat.
+    pub fn beat(&self) -> Option<Beat> {
+        self.beat
+    }
+
+    /// Whether contacts can open and close.
+    pub fn watches_contact(&self) -> bool {
+        self.watches_contact
+    }
+
+    /// Names of the pages of the energy ledger.
+    pub fn accounts(&self) -> impl Iterator<Item = &'static str> {
+        self.accounts.iter().map(|(name, _)| *name)
+    }
+
+    /// Every state by name, in order.
+    pub fn state_names(&self) -> Vec<String> {
+        let mut names: Vec<String> = self.freedoms.names().iter().map(|n| (*n).to_string()).collect();
+        names.extend((1..=self.layout.phases).map(|i| format!("phase_{i}_rad")));
+        for (name, _) in &self.accounts {
+            names.push(format!("{name}_work_j"));
+            names.push(format!("{name}_dissipated_j"));
+        }
+        names
+    }
+
+    /// A workspace for this model; shoulders at rest, contacts undecided.
+    pub fn workspace(&self) -> Workspace {
+        let n = self.carriers();
+        let zero = || vec![f64x2::ZERO; pairs(n)];
+        let handles = &self.scene.carriers.handles_m;
+        let rest = [
+            pack(handles.iter().map(|h| h[0])),
+            pack(handles.iter().map(|h| h[1])),
+            pack((0..n).map(|i| self.scene.carriers.shoulder_height_m.get(i))),
+        ];
+        let present = pack((0..n).map(|_| 1.0));
+        Workspace {
+            segment_s: 0.0,
+            constant_rate: zero(),
+            contact_gain: present.clone(),
+            contact_floor: vec![f64x2::splat(if self.watches_contact { 0.0 } else { f64::NEG_INFINITY }); pairs(n)],
+            present,
+            base: rest.clone(),
+            rest,
+            sin: zero(),
+            cos: zero(),
+            rate: zero(),
+            base_rate: [zero(), zero(), zero()],
+            arm: [zero(), zero(), zero()],
+            gap: [zero(), zero(), zero()],
+            gap_rate: [zero(), zero(), zero()],
+            unclamped: zero(),
+            normal: zero(),
+            tangential: [zero(), zero()],
+            spin: [0.0; 3],
+            body_torque: [0.0; 3],
+        }
+    }
+
+    /// The state at t = 0.
+    pub fn initial_state(&self) -> Vec<f64> {
+        let start = &self.scene.start;
+        let height = start.height_m.unwrap_or_else(|| self.resting_height_m());
+        let mut y = vec![0.0; self.layout.size()];
+        self.freedoms.place(start, height, &mut y);
+        y[self.layout.phase_range()].copy_from_slice(&self.initial_phases[..self.layout.phases]);
+        y
+    }
+
+    /// Height at which the level body's weight rests on the springs, m; with no springs, handles at shoulder height.
+    fn resting_height_m(&self) -> f64 {
+        let carriers = &self.scene.carriers;
+        let n = self.carriers();
+        let stiffness: f64 = self.contact_stiffness.iter().sum();
+        let above = |i: usize| carriers.shoulder_height_m.get(i) - carriers.handles_m[i][2];
+        if stiffness > 0.0 {
+            let level: f64 = (0..n).map(|i| self.contact_stiffness[i] * above(i)).sum::<f64>() / stiffness;
+            level + self.body.mass_kg * self.body.gravity_m_per_s2.z / stiffness
+        } else {
+            (0..n).map(above).sum::<f64>() / n as f64
+        }
+    }
+
+    /// The first moment after `after_s` at which the right-hand side may jump.
+    pub fn next_switch_s(&self, after_s: f64) -> f64 {
+        self.switches.iter().map(|s| s.next_s(after_s)).fold(f64::INFINITY, f64::min)
+    }
+
+    /// Begins a segment at `t_s`: noise, music and contacts take the values they have just after it.
+    pub fn begin_segment(&self, t_s: f64, w: &mut Workspace) {
+        w.segment_s = t_s;
+        for (p, w0) in w.constant_rate.iter_mut().zip(pack(self.natural_rad_per_s.iter().copied())) {
+            *p = w0;
+        }
+        for switch in &self.switches {
+            switch.begin(t_s, w);
+        }
+    }
+
+    /// The right-hand side: dy = f(t, y).
+    #[inline]
+    pub fn rhs(&self, t_s: f64, y: &[f64], dy: &mut [f64], w: &mut Workspace) {
+        self.forces(t_s, y, w);
+        self.freedoms.accelerate(y, w, dy);
+        let phases = self.layout.phase_range();
+        lanes::store(&w.rate, &mut dy[phases]);
+        for ((_, account), out) in self.accounts.iter().zip(dy[self.layout.ledger_range()].chunks_exact_mut(2)) {
+            let power = account.power(w);
+            out.copy_from_slice(&[power.work_w, power.dissipated_w]);
+        }
+    }
+
+    /// Everything up to the forces; what the accelerations need.
+    #[inline]
+    pub fn forces(&self, t_s: f64, y: &[f64], w: &mut Workspace) {
+        if self.has_phases {
+            self.phases(t_s, y, w);
+        }
+        self.freedoms.gaps(y, w);
+        for term in &self.terms[Stage::Handles as usize] {
+            term.apply(t_s, w);
+        }
+        w.body_torque = [0.0; 3];
+        for term in &self.terms[Stage::Body as usize] {
+            term.apply(t_s, w);
+        }
+    }
+
+    #[inline]
+    fn phases(&self, t_s: f64, y: &[f64], w: &mut Workspace) {
+        let Workspace { sin, cos, rate, constant_rate, .. } = w;
+        lanes::load(&y[self.layout.phase_range()], rate);
+        for p in 0..rate.len() {
+            (sin[p], cos[p]) = rate[p].sin_cos();
+        }
+        rate.copy_from_slice(constant_rate);
+        for term in &self.terms[Stage::Phases as usize] {
+            term.apply(t_s, w);
+        }
+        for axis in 0..3 {
+            if self.moving_axes[axis] {
+                let Workspace { base, base_rate, rest, .. } = w;
+                base[axis].copy_from_slice(&rest[axis]);
+                base_rate[axis].fill(f64x2::ZERO);
+            }
+        }
+        for term in &self.terms[Stage::Shoulders as usize] {
+            term.apply(t_s, w);
+        }
+    }
+
+    /// Energy in the springs at the evaluated state, J.
+    pub fn stored_j(&self, w: &Workspace) -> f64 {
+        self.accounts.iter().map(|(_, a)| a.stored_j(w)).sum()
+    }
+}
+
+impl Model {
+    /// Books what the contact spring of a handle loses when it opens, or is given when it closes, at `gap_m` ≠ 0.
+    pub(crate) fn book_contact(&self, handle: usize, opened: bool, gap_m: f64, y: &mut [f64]) {
+        if let Some(page) = self.accounts.iter().position(|(name, _)| *name == "contact") {
+            let spring_j = 0.5 * self.contact_stiffness[handle] * gap_m * gap_m;
+            y[self.layout.ledger_range().start + 2 * page + 1] += if opened { spring_j } else { -spring_j };
+        }
+    }
+}

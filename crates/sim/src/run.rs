@@ -1,0 +1,155 @@
+//! Model + method → samples, in the units and frames of a recording.
+
+use crate::energy::Energy;
+use crate::freedoms::Pose;
+use crate::lanes::lane;
+use crate::model::{Model, Workspace};
+use crate::scene::Scene;
+use crate::solve::{Event, Observer, Settings, Stats, Stopped, method};
+
+/// Everything that is logged at one moment. Carriers and handles in the order of the scene.
+#[derive(Clone, Debug)]
+pub struct Sample {
+    /// s
+    pub t_s: f64,
+    /// Pose in the world, the walk of the party included.
+    pub pose: Pose,
+    /// Roll, pitch, yaw, rad (REP-103).
+    pub roll_pitch_yaw_rad: [f64; 3],
+    /// φ_i, rad, unwrapped; empty when nobody has a gait.
+    pub phase_rad: Vec<f64>,
+    /// ψ, rad, once the music has begun.
+    pub beat_phase_rad: Option<f64>,
+    /// N_i, N
+    pub normal_n: Vec<f64>,
+    /// T_i in x and y, N
+    pub tangential_n: Vec<[f64; 2]>,
+    /// δ_i, shoulder minus handle along z, m
+    pub compression_m: Vec<f64>,
+    /// Shoulders b_i in the world, m
+    pub shoulder_m: Vec<[f64; 3]>,
+    /// Handles s_i in the world, m
+    pub handle_m: Vec<[f64; 3]>,
+    /// The energy account, where it is kept.
+    pub energy: Option<Energy>,
+}
+
+impl Sample {
+    /// Order parameter r = |Σ e^{iφ}|/N, 1; `None` without phases.
+    pub fn order_parameter(&self) -> Option<f64> {
+        if self.phase_rad.is_empty() {
+            return None;
+        }
+        let (s, c) = self.phase_rad.iter().fold((0.0, 0.0), |(s, c), p| (s + p.sin(), c + p.cos()));
+        Some(f64::hypot(s, c) / self.phase_rad.len() as f64)
+    }
+}
+
+/// Who receives samples and events.
+pub trait Listener {
+    /// Called at every log time. Returning `false` stops the run.
+    fn sample(&mut self, sample: &Sample) -> bool;
+    /// Called when a contact changes.
+    fn event(&mut self, _event: &Event) {}
+}
+
+impl<F: FnMut(&Sample) -> bool> Listener for F {
+    fn sample(&mut self, sample: &Sample) -> bool {
+        self(sample)
+    }
+}
+
+/// Most evaluations that a run may take before it is given up.
+const MOST_EVALUATIONS: u64 = 20_000_000_000;
+
+/// The settings that a scene asks for.
+pub fn settings(scene: &Scene) -> Settings {
+    Settings {
+        tolerance: scene.solver.tolerance,
+        step_s: scene.solver.step_s,
+        most_evaluations: MOST_EVALUATIONS,
+    }
+}
+
+/// Runs a checked scene with the method it names.
+///
+/// # Errors
+/// [`Stopped`]; the samples before that moment have been handed over.
+pub fn run(scene: &Scene, listener: &mut dyn Listener) -> Result<Stats, Stopped> {
+    let model = Model::new(scene);
+    let method = method(&scene.solver.method).expect("a checked scene names a method");
+    let (stats, outcome) = run_model(&model, method, &settings(scene), listener);
+    outcome.map(|()| stats)
+}
+
+/// Runs a model with any method and settings; the work done comes back in either case.
+pub fn run_model(
+    model: &Model,
+    method: &crate::solve::Method,
+    settings: &Settings,
+    listener: &mut dyn Listener,
+) -> (Stats, Result<(), Stopped>) {
+    let mut bridge = Bridge { model, listener, sample: blank(model), at_start_j: None };
+    (method.run)(model, settings, &mut bridge)
+}
+
+struct Bridge<'a> {
+    model: &'a Model,
+    listener: &'a mut dyn Listener,
+    sample: Sample,
+    at_start_j: Option<f64>,
+}
+
+fn blank(model: &Model) -> Sample {
+    let n = model.carriers();
+    Sample {
+        t_s: 0.0,
+        pose: Pose {
+            position_m: [0.0; 3],
+            orientation: [0.0, 0.0, 0.0, 1.0],
+            velocity_m_per_s: [0.0; 3],
+            spin_rad_per_s: [0.0; 3],
+        },
+        roll_pitch_yaw_rad: [0.0; 3],
+        phase_rad: vec![0.0; model.layout().phases],
+        beat_phase_rad: None,
+        normal_n: vec![0.0; n],
+        tangential_n: vec![[0.0; 2]; n],
+        compression_m: vec![0.0; n],
+        shoulder_m: vec![[0.0; 3]; n],
+        handle_m: vec![[0.0; 3]; n],
+        energy: None,
+    }
+}
+
+impl Observer for Bridge<'_> {
+    fn sample(&mut self, t_s: f64, y: &[f64], w: &Workspace) -> bool {
+        let (model, s) = (self.model, &mut self.sample);
+        let walk = model.scene.carriers.walk_m_per_s;
+        s.t_s = t_s;
+        s.pose = model.freedoms().pose(y);
+        s.roll_pitch_yaw_rad = s.pose.roll_pitch_yaw_rad();
+        s.phase_rad.copy_from_slice(&y[model.layout().phase_range()]);
+        s.beat_phase_rad = model.beat().filter(|b| t_s >= b.onset_s).map(|b| b.phase_at(t_s));
+        let walked = walk.map(|v| v * t_s);
+        for i in 0..model.carriers() {
+            s.normal_n[i] = lane(&w.normal, i);
+            s.tangential_n[i] = [lane(&w.tangential[0], i), lane(&w.tangential[1], i)];
+            s.compression_m[i] = lane(&w.gap[2], i);
+            for a in 0..3 {
+                s.shoulder_m[i][a] = lane(&w.base[a], i) + walked[a];
+                s.handle_m[i][a] = s.pose.position_m[a] + lane(&w.arm[a], i) + walked[a];
+            }
+        }
+        s.energy = Energy::of(model, y, w, &mut self.at_start_j);
+        for a in 0..3 {
+            s.pose.position_m[a] += walked[a];
+            s.pose.velocity_m_per_s[a] += walk[a];
+        }
+        self.listener.sample(s)
+    }
+
+    fn event(&mut self, event: &Event) {
+        self.listener.event(event);
+    }
+}

@@ -1,0 +1,112 @@
+//! What a scene must satisfy beyond its types.
+
+use super::{PerCarrier, Scene};
+use crate::body::Body;
+
+/// What is wrong with a scene, and at which key.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Problem {
+    /// Dotted key, `body.mass_kg`.
+    pub key: String,
+    /// What was found and what was expected.
+    pub message: String,
+}
+
+/// Collects nothing: stops at the first problem, which is what a reader wants to hear about.
+pub(crate) struct Checker;
+
+impl Checker {
+    pub fn finite(key: &str, x: f64) -> Result<(), Problem> {
+        if x.is_finite() { Ok(()) } else { Err(problem(key, format!("found {x}, expected a finite number"))) }
+    }
+
+    pub fn positive(key: &str, x: f64) -> Result<(), Problem> {
+        if x > 0.0 && x.is_finite() { Ok(()) } else { Err(problem(key, format!("found {x}, expected a number above zero"))) }
+    }
+
+    pub fn not_negative(key: &str, x: f64) -> Result<(), Problem> {
+        if x >= 0.0 && x.is_finite() { Ok(()) } else { Err(problem(key, format!("found {x}, expected zero or more"))) }
+    }
+
+    pub fn all_finite(key: &str, xs: &[f64]) -> Result<(), Problem> {
+        xs.iter().try_for_each(|&x| Self::finite(key, x))
+    }
+
+    pub fn per_carrier(key: &str, x: &PerCarrier, n: usize) -> Result<(), Problem> {
+        Self::all_finite(key, x.values())?;
+        match x {
+            PerCarrier::Each(list) if list.len() != n => {
+                Err(problem(key, format!("found {} values for {n} carriers; give one number, or one for each", list.len())))
+            }
+            _ => Ok(()),
+        }
+    }
+}
+
+pub(crate) fn problem(key: &str, message: impl Into<String>) -> Problem {
+    Problem { key: key.into(), message: message.into() }
+}
+
+/// Most samples that a run may log; beyond it a slip of the keyboard is likelier than a wish.
+const MOST_SAMPLES: f64 = 1e9;
+
+/// Checks everything that the types do not.
+///
+/// # Errors
+/// The first [`Problem`] found.
+pub fn check(scene: &Scene) -> Result<(), Problem> {
+    Checker::positive("duration_s", scene.duration_s)?;
+    Checker::positive("log_rate_hz", scene.log_rate_hz)?;
+    if scene.duration_s * scene.log_rate_hz > MOST_SAMPLES {
+        return Err(problem(
+            "log_rate_hz",
+            format!("{} s at {} Hz are more than {MOST_SAMPLES:e} samples; log less often", scene.duration_s, scene.log_rate_hz),
+        ));
+    }
+    Checker::not_negative("analysis_start_s", scene.analysis_start_s)?;
+    Checker::not_negative("epoch_s", scene.epoch_s)?;
+    if scene.epoch_s + scene.duration_s > 9.2e9 {
+        return Err(problem("epoch_s", "the stamps would pass the year 2262, the last that nanoseconds in 64 bits can name"));
+    }
+    if scene.seed >> 56 != 0 {
+        return Err(problem("seed", format!("found {}, expected a number below 2^56", scene.seed)));
+    }
+
+    Checker::positive("body.mass_kg", scene.body.mass_kg)?;
+    Checker::all_finite("body.gravity_m_per_s2", &scene.body.gravity_m_per_s2)?;
+    Body::new(&scene.body).map_err(|message| problem("body.inertia_kg_m2", message))?;
+
+    let n = scene.carriers.count();
+    if n == 0 {
+        return Err(problem("carriers.handles_m", "the list is empty; a carried body needs at least one handle"));
+    }
+    for handle in &scene.carriers.handles_m {
+        Checker::all_finite("carriers.handles_m", handle)?;
+    }
+    Checker::per_carrier("carriers.shoulder_height_m", &scene.carriers.shoulder_height_m, n)?;
+    Checker::per_carrier("carriers.frequency_hz", &scene.carriers.frequency_hz, n)?;
+    Checker::per_carrier("carriers.initial_phase_rad", &scene.carriers.initial_phase_rad, n)?;
+    Checker::not_negative("carriers.initial_phase_sd_rad", scene.carriers.initial_phase_sd_rad)?;
+    Checker::all_finite("carriers.walk_m_per_s", &scene.carriers.walk_m_per_s)?;
+
+    let start = &scene.start;
+    if let Some(z) = start.height_m {
+        Checker::finite("start.height_m", z)?;
+    }
+    Checker::all_finite("start.position_m", &start.position_m)?;
+    Checker::all_finite("start.roll_pitch_yaw_deg", &start.roll_pitch_yaw_deg)?;
+    Checker::all_finite("start.velocity_m_per_s", &start.velocity_m_per_s)?;
+    Checker::all_finite("start.angular_velocity_rad_per_s", &start.angular_velocity_rad_per_s)?;
+
+    Checker::positive("solver.tolerance", scene.solver.tolerance)?;
+    if !(1e-13..=1e-1).contains(&scene.solver.tolerance) {
+        return Err(problem(
+            "solver.tolerance",
+            format!("found {:e}, expected 1e-13 to 1e-1: double precision ends below, sense above", scene.solver.tolerance),
+        ));
+    }
+    Checker::positive("solver.step_s", scene.solver.step_s)?;
+    crate::solve::method(&scene.solver.method).map_err(|message| problem("solver.method", message))?;
+
+    crate::effects::check(scene)
+}

@@ -1,0 +1,187 @@
+//! Text → [`Scene`], with errors that point at the line.
+
+use super::{BUILTIN, Scene, builtin, check};
+use std::path::Path;
+
+/// Why a scene cannot be used: one sentence that says where, what was found and what to do.
+#[derive(Debug, thiserror::Error, PartialEq)]
+pub enum SceneError {
+    /// Neither a built-in scene nor a readable file.
+    #[error("{0}")]
+    NotFound(String),
+    /// The text is not what a scene looks like.
+    #[error("{origin}:{line}:{column}: {message}")]
+    At {
+        /// File or built-in name.
+        origin: String,
+        /// Line, from 1.
+        line: usize,
+        /// Column, from 1.
+        column: usize,
+        /// What is wrong there.
+        message: String,
+    },
+    /// A `--set` or a value that no single line can be blamed for.
+    #[error("{origin}: {message}")]
+    Value {
+        /// File, built-in name or `--set`.
+        origin: String,
+        /// What is wrong.
+        message: String,
+    },
+}
+
+/// Reads a built-in scene or a file, changes it by `key=value` settings, and checks it.
+///
+/// # Errors
+/// [`SceneError`]: unknown scene (with the nearest name), unknown key, wrong type or sign (with line and column).
+pub fn load(name_or_path: &str, settings: &[String]) -> Result<Scene, SceneError> {
+    if let Some(text) = builtin(name_or_path) {
+        return parse(name_or_path, text, settings);
+    }
+    let path = Path::new(name_or_path);
+    let looks_like_a_path = path.extension().is_some() || name_or_path.contains(std::path::MAIN_SEPARATOR);
+    match std::fs::read_to_string(path) {
+        Ok(text) => parse(name_or_path, &text, settings),
+        Err(e) if looks_like_a_path => Err(SceneError::NotFound(format!("cannot read the scene {name_or_path}: {e}"))),
+        Err(_) => {
+            let names: Vec<&str> = BUILTIN.iter().map(|(n, _)| *n).collect();
+            let hint = nearest(name_or_path, names.iter().copied()).map(|n| format!(" Did you mean `{n}`?")).unwrap_or_default();
+            Err(SceneError::NotFound(format!(
+                "there is no scene `{name_or_path}`.{hint} Built in: {}; or give the path of a .toml file",
+                names.join(", ")
+            )))
+        }
+    }
+}
+
+/// Parses and checks `text`; `origin` names it in errors.
+///
+/// # Errors
+/// As [`load`].
+pub fn parse(origin: &str, text: &str, settings: &[String]) -> Result<Scene, SceneError> {
+    let scene: Scene = toml::from_str(text).map_err(|e| located(origin, text, e.span(), &readable(e.message())))?;
+    let scene = if settings.is_empty() { scene } else { apply(scene, settings)? };
+    check(&scene).map_err(|problem| {
+        let was_set = settings.iter().any(|s| s.split('=').next().is_some_and(|k| problem.key.starts_with(k.trim())));
+        let message = format!("{}: {}", problem.key, problem.message);
+        match find(text, &problem.key) {
+            Some(span) if !was_set => located(origin, text, Some(span), &message),
+            _ => SceneError::Value { origin: if was_set { "--set".into() } else { origin.into() }, message },
+        }
+    })?;
+    Ok(scene)
+}
+
+/// The scene as TOML, complete with every default.
+pub fn to_toml(scene: &Scene) -> String {
+    // OK because every field of a scene is a TOML value and keys are strings.
+    toml::to_string(scene).expect("a scene is always expressible in TOML")
+}
+
+/// The name nearest to `word` when it is near enough to be a slip.
+pub fn nearest<'a>(word: &str, names: impl Iterator<Item = &'a str>) -> Option<&'a str> {
+    names
+        .map(|n| (strsim::damerau_levenshtein(word, n), n))
+        .min()
+        .filter(|(d, n)| *d <= 1 + n.len().max(word.len()) / 3)
+        .map(|(_, n)| n)
+}
+
+/// Applies `a.b.c=value` settings; the value is TOML, or a string where it is not.
+fn apply(scene: Scene, settings: &[String]) -> Result<Scene, SceneError> {
+    let fail = |message: String| SceneError::Value { origin: "--set".into(), message };
+    let mut table: toml::Table = toml::from_str(&to_toml(&scene)).map_err(|e| fail(e.message().into()))?;
+    for setting in settings {
+        let Some((key, value)) = setting.split_once('=') else {
+            return Err(fail(format!("`{setting}` is not KEY=VALUE, for example effects.gait.amplitude_m=0.07")));
+        };
+        let (key, value) = (key.trim(), value.trim());
+        let parsed = toml::from_str::<toml::Table>(&format!("x = {value}"))
+            .ok()
+            .and_then(|mut t| t.remove("x"))
+            .unwrap_or_else(|| toml::Value::String(value.into()));
+        let path: Vec<&str> = key.split('.').collect();
+        set_key(&mut table, &path, parsed).map_err(|m| fail(format!("{key}: {m}")))?;
+        // One setting at a time, so that the message names the setting at fault.
+        let _: Scene = toml::Table::try_into(table.clone()).map_err(|e: toml::de::Error| fail(format!("{setting}: {}", readable(e.message()))))?;
+    }
+    table.try_into().map_err(|e: toml::de::Error| fail(readable(e.message())))
+}
+
+fn set_key(table: &mut toml::Table, path: &[&str], value: toml::Value) -> Result<(), String> {
+    let (first, rest) = (path[0], &path[1..]);
+    if first.is_empty() {
+        return Err("an empty name in the key".into());
+    }
+    if rest.is_empty() {
+        // `effects.music=false` takes an effect away; whole numbers stand for reals where a real was.
+        if value == toml::Value::Boolean(false) && !matches!(table.get(first), Some(toml::Value::Boolean(_)) | None) {
+            table.remove(first);
+            return Ok(());
+        }
+        let value = match (table.get(first), value) {
+            (Some(toml::Value::Float(_)), toml::Value::Integer(i)) => toml::Value::Float(i as f64),
+            (_, v) => v,
+        };
+        table.insert(first.into(), value);
+        return Ok(());
+    }
+    match table.entry(first).or_insert_with(|| toml::Value::Table(toml::Table::new())) {
+        toml::Value::Table(inner) => set_key(inner, rest, value),
+        toml::Value::Array(items) => {
+            let index: usize = rest[0].parse().map_err(|_| format!("`{first}` is a list; name an item by its number"))?;
+            let length = items.len();
+            let item = items.get_mut(index).ok_or_else(|| format!("`{first}` has {length} items, there is no item {index}"))?;
+            match (item, &rest[1..]) {
+                (slot, []) => *slot = value,
+                (toml::Value::Table(inner), deeper) => set_key(inner, deeper, value)?,
+                (toml::Value::Array(inner), [last]) => {
+                    let i: usize = last.parse().map_err(|_| format!("`{last}` is not the number of an item"))?;
+                    *inner.get_mut(i).ok_or_else(|| format!("there is no item {i}"))? = value;
+                }
+                _ => return Err(format!("`{}` holds no further keys", rest[0])),
+            }
+            Ok(())
+        }
+        _ => Err(format!("`{first}` is a single value and holds no further keys")),
+    }
+}
+
+/// Adds the nearest key to serde's `unknown field` message.
+fn readable(message: &str) -> String {
+    let message = message.trim().replace('\n', " ");
+    let mut ticks = message.split('`').skip(1).step_by(2);
+    if message.starts_with("unknown field") || message.starts_with("unknown variant") {
+        if let Some(word) = ticks.next() {
+            if let Some(name) = nearest(word, ticks) {
+                return format!("{message}. Did you mean `{name}`?");
+            }
+        }
+    }
+    message
+}
+
+fn located(origin: &str, text: &str, span: Option<std::ops::Range<usize>>, message: &str) -> SceneError {
+    let Some(span) = span else { return SceneError::Value { origin: origin.into(), message: message.into() } };
+    let before = &text[..span.start.min(text.len())];
+    let line = before.matches('\n').count() + 1;
+    let column = before.chars().rev().take_while(|&c| c != '\n').count() + 1;
+    SceneError::At { origin: origin.into(), line, column, message: message.into() }
+}
+
+/// Where in `text` the value of a dotted key stands; the deepest part of the key that the text has.
+fn find(text: &str, key: &str) -> Option<std::ops::Range<usize>> {
+    let document = toml::de::DeTable::parse(text).ok()?;
+    let mut table = document.get_ref();
+    let mut found = None;
+    for part in key.split('.') {
+        let (_, value) = table.iter().find(|(k, _)| k.get_ref() == part)?;
+        found = Some(value.span());
+        match value.get_ref() {
+            toml::de::DeValue::Table(inner) => table = inner,
+            _ => break,
+        }
+    }
+    found
+}

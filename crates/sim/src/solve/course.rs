@@ -1,0 +1,283 @@
+//! What every method shares: segments between events, contacts, log times, the count of work.
+
+use super::{Observer, Settings, Stats, Stopped};
+use crate::lanes::{lane, set_lane};
+use crate::model::{Model, Workspace};
+
+/// Times closer than this are the same moment, s.
+pub const SAME_MOMENT_S: f64 = 1e-12;
+
+/// Something that happened at a moment, between two states.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Event {
+    /// When, s.
+    pub t_s: f64,
+    /// Which handle, from 0.
+    pub handle: usize,
+    /// What.
+    pub kind: EventKind,
+}
+
+/// What can happen at a handle.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum EventKind {
+    /// The handle came down on the shoulder.
+    ContactClosed,
+    /// The handle lifted off.
+    ContactOpened,
+}
+
+/// How a handle's contact stands within a segment.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Contact {
+    /// N = N* until an event says otherwise.
+    Closed,
+    /// N = 0 until an event says otherwise.
+    Open,
+    /// N = max(0, N*) at every evaluation: methods that locate nothing, and handles that sit exactly on the edge.
+    Clamped,
+}
+
+/// One run under way.
+pub struct Course<'m> {
+    pub model: &'m Model,
+    pub w: Workspace,
+    pub t_s: f64,
+    pub y: Vec<f64>,
+    pub stats: Stats,
+    method: &'static str,
+    end_s: f64,
+    next_sample: u64,
+    last_sample: u64,
+    switch_s: f64,
+    /// `Some` where contacts open and close.
+    contacts: Vec<Contact>,
+    /// Whether N > 0 at the end of the last step, per handle; for methods that locate nothing.
+    touching: Vec<bool>,
+    locate: bool,
+    /// Last event of each handle and how many came at nearly the same moment.
+    recent: Vec<(f64, u32)>,
+    most_evaluations: u64,
+}
+
+/// So many changes of one handle at the same moment, and it is treated as sitting on the edge.
+const CHATTER: u32 = 6;
+
+impl<'m> Course<'m> {
+    pub fn new(model: &'m Model, method: &'static str, settings: &Settings, locate: bool) -> Self {
+        let scene = &model.scene;
+        let n = if model.watches_contact() { model.carriers() } else { 0 };
+        let mut course = Self {
+            model,
+            w: model.workspace(),
+            t_s: 0.0,
+            y: model.initial_state(),
+            stats: Stats::default(),
+            method,
+            end_s: scene.duration_s,
+            next_sample: 0,
+            // A last sample that the duration misses by rounding alone is still taken.
+            last_sample: (scene.duration_s * scene.log_rate_hz * (1.0 + 1e-12)).floor() as u64,
+            switch_s: f64::INFINITY,
+            contacts: vec![Contact::Clamped; n],
+            touching: vec![false; n],
+            locate,
+            recent: vec![(f64::NEG_INFINITY, 0); n],
+            most_evaluations: settings.most_evaluations,
+        };
+        course.begin_segment();
+        for i in 0..n {
+            course.touching[i] = lane(&course.w.normal, i) > 0.0;
+        }
+        course
+    }
+
+    /// The next moment that a step must not cross.
+    pub fn stop_s(&self) -> f64 {
+        self.switch_s.min(self.end_s)
+    }
+
+    /// Whether the run has reached its end.
+    pub fn finished(&self) -> bool {
+        self.t_s >= self.end_s
+    }
+
+    fn log_time_s(&self, index: u64) -> f64 {
+        index as f64 / self.model.scene.log_rate_hz
+    }
+
+    /// The next log time up to and including `t_s`.
+    pub fn sample_due(&self, t_s: f64) -> Option<f64> {
+        let due = self.log_time_s(self.next_sample);
+        (self.next_sample <= self.last_sample && due <= t_s + SAME_MOMENT_S).then_some(due)
+    }
+
+    /// Hands a sample to the observer. `y` is the state at that time.
+    pub fn sample(&mut self, y: &[f64], observer: &mut dyn Observer) -> Result<(), Stopped> {
+        let t_s = self.log_time_s(self.next_sample);
+        self.model.forces(t_s, y, &mut self.w);
+        self.stats.evaluations += 1;
+        self.next_sample += 1;
+        // Within a rounding of an opening, N = N* can be a hair below zero.
+        if self.model.watches_contact() {
+            for n in &mut self.w.normal {
+                *n = n.fast_max(crate::lanes::f64x2::ZERO);
+            }
+        }
+        if observer.sample(t_s, y, &self.w) { Ok(()) } else { Err(Stopped::ByObserver { t_s }) }
+    }
+
+    /// The right-hand side at (t, y).
+    #[inline]
+    pub fn rhs(&mut self, t_s: f64, y: &[f64], dy: &mut [f64]) {
+        self.stats.evaluations += 1;
+        self.model.rhs(t_s, y, dy, &mut self.w);
+    }
+
+    /// How far the contacts are from an event at the last evaluation: negative when one has happened, N.
+    #[inline]
+    pub fn margin_n(&self) -> f64 {
+        let mut least = f64::INFINITY;
+        for (i, contact) in self.contacts.iter().enumerate() {
+            let free = lane(&self.w.unclamped, i);
+            least = least.min(match contact {
+                Contact::Closed => free,
+                Contact::Open => -free,
+                Contact::Clamped => f64::INFINITY,
+            });
+        }
+        least
+    }
+
+    /// The margin at a state between steps, N.
+    pub fn margin_at_n(&mut self, t_s: f64, y: &[f64]) -> f64 {
+        self.stats.evaluations += 1;
+        self.model.forces(t_s, y, &mut self.w);
+        self.margin_n()
+    }
+
+    /// Moves to the end of an accepted step.
+    pub fn arrive(&mut self, t_s: f64, observer: &mut dyn Observer) -> Result<(), Stopped> {
+        self.t_s = t_s;
+        self.stats.steps += 1;
+        self.model.freedoms().project(&mut self.y);
+        if let Some(bad) = self.y.iter().position(|x| !x.is_finite()) {
+            return Err(Stopped::NotFinite { method: self.method, t_s, state: self.model.state_names().swap_remove(bad) });
+        }
+        if self.stats.evaluations > self.most_evaluations {
+            return Err(Stopped::TooMuchWork { method: self.method, t_s, evaluations: self.stats.evaluations });
+        }
+        if !self.locate {
+            self.note_unlocated(observer);
+        } else if self.contacts.contains(&Contact::Clamped) {
+            self.settle();
+        }
+        if self.t_s >= self.switch_s - SAME_MOMENT_S {
+            self.t_s = self.t_s.max(self.switch_s.min(self.end_s));
+            let before = self.contacts.clone();
+            self.begin_segment();
+            for (i, old) in before.into_iter().enumerate() {
+                match (old, self.contacts[i]) {
+                    (Contact::Closed, Contact::Open) => self.changed(i, EventKind::ContactOpened, observer),
+                    (Contact::Open, Contact::Closed) => self.changed(i, EventKind::ContactClosed, observer),
+                    _ => {}
+                }
+            }
+        }
+        Ok(())
+    }
+
+    /// Changes the contacts that have passed their zero at the present state, whose margin is not positive.
+    ///
+    /// The two laws agree at the zero, so the state and its rate are continuous there. A handle that changes again and
+    /// again at one moment sits on its edge: it is clamped, which is exact for it, until it has left the edge.
+    pub fn fire(&mut self, observer: &mut dyn Observer) {
+        self.model.forces(self.t_s, &self.y, &mut self.w);
+        self.stats.evaluations += 1;
+        for i in 0..self.contacts.len() {
+            let free = lane(&self.w.unclamped, i);
+            let (kind, next) = match self.contacts[i] {
+                Contact::Closed if free <= 0.0 => (EventKind::ContactOpened, Contact::Open),
+                Contact::Open if free >= 0.0 => (EventKind::ContactClosed, Contact::Closed),
+                _ => continue,
+            };
+            let (last_s, count) = self.recent[i];
+            let count = if self.t_s - last_s < 1e-9 { count + 1 } else { 0 };
+            self.recent[i] = (self.t_s, count);
+            self.set_contact(i, if count >= CHATTER { Contact::Clamped } else { next });
+            self.changed(i, kind, observer);
+        }
+    }
+
+    fn changed(&mut self, handle: usize, kind: EventKind, observer: &mut dyn Observer) {
+        self.stats.events += 1;
+        let gap_m = lane(&self.w.gap[2], handle);
+        self.model.book_contact(handle, kind == EventKind::ContactOpened, gap_m, &mut self.y);
+        observer.event(&Event { t_s: self.t_s, handle, kind });
+    }
+
+    fn begin_segment(&mut self) {
+        self.model.begin_segment(self.t_s, &mut self.w);
+        self.switch_s = self.model.next_switch_s(self.t_s);
+        self.model.forces(self.t_s, &self.y, &mut self.w);
+        self.stats.evaluations += 1;
+        if self.locate {
+            for i in 0..self.contacts.len() {
+                let contact = Self::standing(lane(&self.w.unclamped, i));
+                self.set_contact(i, contact);
+            }
+            self.model.forces(self.t_s, &self.y, &mut self.w);
+        }
+    }
+
+    /// Takes handles off the edge once they have left it.
+    fn settle(&mut self) {
+        self.model.forces(self.t_s, &self.y, &mut self.w);
+        self.stats.evaluations += 1;
+        for i in 0..self.contacts.len() {
+            if self.contacts[i] == Contact::Clamped && self.t_s - self.recent[i].0 > 1e-9 {
+                let contact = Self::standing(lane(&self.w.unclamped, i));
+                self.set_contact(i, contact);
+            }
+        }
+    }
+
+    fn standing(unclamped_n: f64) -> Contact {
+        if unclamped_n > 0.0 {
+            Contact::Closed
+        } else if unclamped_n < 0.0 {
+            Contact::Open
+        } else {
+            Contact::Clamped
+        }
+    }
+
+    fn set_contact(&mut self, i: usize, contact: Contact) {
+        self.contacts[i] = contact;
+        let (gain, floor) = match contact {
+            Contact::Closed => (1.0, f64::NEG_INFINITY),
+            Contact::Open => (0.0, 0.0),
+            Contact::Clamped => (1.0, 0.0),
+        };
+        set_lane(&mut self.w.contact_gain, i, gain);
+        set_lane(&mut self.w.contact_floor, i, floor);
+    }
+
+    fn note_unlocated(&mut self, observer: &mut dyn Observer) {
+        if self.touching.is_empty() {
+            return;
+        }
+        self.model.forces(self.t_s, &self.y, &mut self.w);
+        for i in 0..self.touching.len() {
+            let now = lane(&self.w.normal, i) > 0.0;
+            if now != self.touching[i] {
+                self.touching[i] = now;
+                self.changed(i, if now { EventKind::ContactClosed } else { EventKind::ContactOpened }, observer);
+            }
+        }
+    }
+
+    pub fn method(&self) -> &'static str {
+        self.method
+    }
+}

@@ -1,0 +1,169 @@
+//! Integration methods: one file each, and one line each in [`METHODS`].
+
+mod course;
+mod dop853;
+mod dopri5;
+mod fixed;
+mod pair;
+mod rk4;
+mod semi_implicit_euler;
+
+pub use course::{Event, EventKind};
+
+use crate::model::{Model, Workspace};
+
+/// What a method is told.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Settings {
+    /// Tolerance of an adaptive method; 1 means one unit of [`crate::freedoms::Freedoms::scales`].
+    pub tolerance: f64,
+    /// Step of a fixed-step method, s.
+    pub step_s: f64,
+    /// Most evaluations of the right-hand side before the run is given up.
+    pub most_evaluations: u64,
+}
+
+/// Who watches a run.
+pub trait Observer {
+    /// A sample at a log time; `w` holds the forces there. Returning `false` stops the run.
+    fn sample(&mut self, t_s: f64, y: &[f64], w: &Workspace) -> bool;
+    /// Something happened between samples.
+    fn event(&mut self, _event: &Event) {}
+}
+
+/// Work done by a run.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Stats {
+    /// Accepted steps.
+    pub steps: u64,
+    /// Rejected steps.
+    pub rejected: u64,
+    /// Evaluations of the right-hand side, those for dense output and event location included.
+    pub evaluations: u64,
+    /// Contacts opened or closed.
+    pub events: u64,
+}
+
+/// Why a run ended before its time.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+pub enum Stopped {
+    /// The error cannot be kept within the tolerance.
+    #[error("{method} gave up at t = {t_s} s: the step fell to {step_s:.1e} s without reaching the tolerance {tolerance:e}; loosen --tolerance or soften the scene")]
+    StepTooSmall {
+        /// Method name.
+        method: &'static str,
+        /// When, s.
+        t_s: f64,
+        /// Last step tried, s.
+        step_s: f64,
+        /// Tolerance asked for.
+        tolerance: f64,
+    },
+    /// A state left the range of numbers.
+    #[error("{method} gave up at t = {t_s} s: {state} is no longer a finite number; a smaller --set solver.step_s or an adaptive --method may help")]
+    NotFinite {
+        /// Method name.
+        method: &'static str,
+        /// When, s.
+        t_s: f64,
+        /// Name of the state.
+        state: String,
+    },
+    /// More work than allowed.
+    #[error("{method} gave up at t = {t_s} s: {evaluations} evaluations were not enough for the whole run")]
+    TooMuchWork {
+        /// Method name.
+        method: &'static str,
+        /// When, s.
+        t_s: f64,
+        /// Evaluations spent.
+        evaluations: u64,
+    },
+    /// The observer asked to stop.
+    #[error("stopped at t = {t_s} s")]
+    ByObserver {
+        /// When, s.
+        t_s: f64,
+    },
+}
+
+type Run = fn(&Model, &Settings, &mut dyn Observer) -> (Stats, Result<(), Stopped>);
+
+/// One line of the table of methods.
+pub struct Method {
+    /// Name for `--method`.
+    pub name: &'static str,
+    /// One sentence.
+    pub about: &'static str,
+    /// Order of accuracy between events.
+    pub order: u32,
+    /// Whether it chooses its steps by the tolerance.
+    pub adaptive: bool,
+    /// Integrates a model from its initial state.
+    pub run: Run,
+}
+
+/// Every method. The first is the default.
+pub const METHODS: &[Method] = &[
+    Method {
+        name: "auto",
+        about: "the best method for the scene: dop853",
+        order: 8,
+        adaptive: true,
+        run: pair::run::<dop853::Dop853, true>,
+    },
+    Method {
+        name: "dop853",
+        about: "Dormand-Prince 8(5,3), adaptive, contact events located",
+        order: 8,
+        adaptive: true,
+        run: pair::run::<dop853::Dop853, true>,
+    },
+    Method {
+        name: "dop853-blind",
+        about: "the same without locating contact events",
+        order: 8,
+        adaptive: true,
+        run: pair::run::<dop853::Dop853, false>,
+    },
+    Method {
+        name: "dopri5",
+        about: "Dormand-Prince 5(4), adaptive, contact events located",
+        order: 5,
+        adaptive: true,
+        run: pair::run::<dopri5::Dopri5, true>,
+    },
+    Method {
+        name: "dopri5-blind",
+        about: "the same without locating contact events",
+        order: 5,
+        adaptive: true,
+        run: pair::run::<dopri5::Dopri5, false>,
+    },
+    Method {
+        name: "rk4",
+        about: "the classical fourth-order method, fixed step",
+        order: 4,
+        adaptive: false,
+        run: fixed::run::<rk4::Rk4>,
+    },
+    Method {
+        name: "semi-implicit-euler",
+        about: "velocities first, then positions, fixed step: the paper archive's method",
+        order: 1,
+        adaptive: false,
+        run: fixed::run::<semi_implicit_euler::SemiImplicitEuler>,
+    },
+];
+
+/// Finds a method by name.
+///
+/// # Errors
+/// A sentence with the nearest name and the names there are.
+pub fn method(name: &str) -> Result<&'static Method, String> {
+    METHODS.iter().find(|m| m.name == name).ok_or_else(|| {
+        let names = || METHODS.iter().map(|m| m.name);
+        let hint = crate::scene::nearest(name, names()).map(|n| format!(" Did you mean `{n}`?")).unwrap_or_default();
+        format!("there is no method `{name}`.{hint} There are: {}", names().collect::<Vec<_>>().join(", "))
+    })
+}
