@@ -1,0 +1,226 @@
+//! What the metrics are computed from: plain columns, from a recording or from a run in memory.
+
+use std::borrow::Cow;
+
+/// A stretch of time [s], both ends included.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Window {
+    /// First moment.
+    pub start_s: f64,
+    /// Last moment.
+    pub end_s: f64,
+}
+
+impl Window {
+    /// All of time.
+    pub const ALL: Window = Window {
+        start_s: f64::NEG_INFINITY,
+        end_s: f64::INFINITY,
+    };
+
+    /// From `start_s` on.
+    pub fn from(start_s: f64) -> Self {
+        Window {
+            start_s,
+            ..Window::ALL
+        }
+    }
+
+    /// The indices of an ascending time axis that lie in the window.
+    pub fn range(&self, t_s: &[f64]) -> std::ops::Range<usize> {
+        let start = t_s.partition_point(|t| *t < self.start_s);
+        let end = t_s.partition_point(|t| *t <= self.end_s);
+        start..end.max(start)
+    }
+}
+
+/// Where each group of columns comes from; the word that stands as `source` beside every metric.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Sources {
+    /// Roll, pitch and yaw.
+    pub attitude: Cow<'static, str>,
+    /// Height.
+    pub height: Cow<'static, str>,
+    /// Normal forces or the support ratio.
+    pub forces: Cow<'static, str>,
+    /// Carriers' phases.
+    pub phases: Cow<'static, str>,
+    /// The beat.
+    pub beat: Cow<'static, str>,
+}
+
+impl Default for Sources {
+    fn default() -> Self {
+        Sources {
+            attitude: "state".into(),
+            height: "state".into(),
+            forces: "forces".into(),
+            phases: "phases".into(),
+            beat: "phases".into(),
+        }
+    }
+}
+
+/// What a run gives. Every column may be empty, which means "not known"; columns of one time axis are equally long.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Inputs {
+    /// Time of the height and the angles, ascending [s].
+    pub t_s: Vec<f64>,
+    /// Height of the centre of mass [m].
+    pub height_m: Vec<f64>,
+    /// Rotation about the pole [rad].
+    pub roll_rad: Vec<f64>,
+    /// Tilt of the pole [rad].
+    pub pitch_rad: Vec<f64>,
+    /// Heading [rad].
+    pub yaw_rad: Vec<f64>,
+    /// Time of the forces [s]; empty means `t_s`.
+    pub force_t_s: Vec<f64>,
+    /// Normal force of each handle [N].
+    pub normal_n: Vec<Vec<f64>>,
+    /// N_tot / (M g) where it is measured as such (the vertical specific force of the centre of mass over g), on `t_s`.
+    /// Used where `normal_n` is empty.
+    pub support_ratio: Vec<f64>,
+    /// Time of the phases [s]; empty means `t_s`.
+    pub phase_t_s: Vec<f64>,
+    /// Gait phase of each carrier [rad], wrapped or not.
+    pub phase_rad: Vec<Vec<f64>>,
+    /// Phase of the beat on the phases' time [rad]; NaN where no beat sounds.
+    pub beat_phase_rad: Vec<f64>,
+    /// Mass of what is carried [kg].
+    pub mass_kg: Option<f64>,
+    /// Gravity [m/s²].
+    pub gravity_m_per_s2: f64,
+    /// The phases are estimates from measurements, with their own chance level: it is found by surrogates.
+    pub phases_are_measured: bool,
+    /// Where the columns come from.
+    pub sources: Sources,
+}
+
+impl Default for Inputs {
+    /// Nothing known; standard gravity.
+    fn default() -> Self {
+        Inputs {
+            t_s: Vec::new(),
+            height_m: Vec::new(),
+            roll_rad: Vec::new(),
+            pitch_rad: Vec::new(),
+            yaw_rad: Vec::new(),
+            force_t_s: Vec::new(),
+            normal_n: Vec::new(),
+            support_ratio: Vec::new(),
+            phase_t_s: Vec::new(),
+            phase_rad: Vec::new(),
+            beat_phase_rad: Vec::new(),
+            mass_kg: None,
+            gravity_m_per_s2: 9.80665,
+            phases_are_measured: false,
+            sources: Sources::default(),
+        }
+    }
+}
+
+impl Inputs {
+    /// The time axis of the forces.
+    pub fn force_times(&self) -> &[f64] {
+        if self.force_t_s.is_empty() {
+            &self.t_s
+        } else {
+            &self.force_t_s
+        }
+    }
+
+    /// The time axis of the phases.
+    pub fn phase_times(&self) -> &[f64] {
+        if self.phase_t_s.is_empty() {
+            &self.t_s
+        } else {
+            &self.phase_t_s
+        }
+    }
+
+    /// Sum of the handles' normal forces at each force sample [N]; empty without forces.
+    pub fn total_force_n(&self) -> Vec<f64> {
+        let Some(first) = self.normal_n.first() else {
+            return Vec::new();
+        };
+        let mut total = first.clone();
+        for handle in &self.normal_n[1..] {
+            total.iter_mut().zip(handle).for_each(|(t, n)| *t += n);
+        }
+        total
+    }
+}
+
+/// Mean step of an ascending time axis [s]; `None` below two samples or for a step that is not positive.
+pub fn mean_step_s(t_s: &[f64]) -> Option<f64> {
+    let (first, last) = (t_s.first()?, t_s.last()?);
+    let step = (last - first) / (t_s.len().checked_sub(1)? as f64);
+    (step > 0.0 && step.is_finite()).then_some(step)
+}
+
+/// `x(t)` at the times `at_s` by straight lines between samples; held beyond the ends. Both time axes ascend.
+pub fn interpolate(t_s: &[f64], x: &[f64], at_s: &[f64]) -> Vec<f64> {
+    let last = t_s.len().min(x.len());
+    if last == 0 {
+        return Vec::new();
+    }
+    let mut k = 0;
+    at_s.iter()
+        .map(|&at| {
+            while k + 1 < last && t_s[k + 1] <= at {
+                k += 1;
+            }
+            if at <= t_s[k] || k + 1 == last {
+                return x[k];
+            }
+            let share = (at - t_s[k]) / (t_s[k + 1] - t_s[k]);
+            x[k] + share * (x[k + 1] - x[k])
+        })
+        .collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_window_holds_its_ends() {
+        let t = [0.0, 0.5, 1.0, 1.5];
+        assert_eq!(
+            Window {
+                start_s: 0.5,
+                end_s: 1.0
+            }
+            .range(&t),
+            1..3
+        );
+        assert_eq!(Window::ALL.range(&t), 0..4);
+        assert_eq!(
+            Window {
+                start_s: 9.0,
+                end_s: 1.0
+            }
+            .range(&t),
+            4..4
+        );
+        assert_eq!(Window::from(0.6).range(&[]), 0..0);
+    }
+
+    #[test]
+    fn interpolation_is_linear_and_held() {
+        let y = interpolate(
+            &[0.0, 1.0, 3.0],
+            &[0.0, 2.0, 0.0],
+            &[-1.0, 0.5, 1.0, 2.0, 3.0, 9.0],
+        );
+        assert_eq!(y, [0.0, 1.0, 2.0, 1.0, 0.0, 0.0]);
+    }
+
+    #[test]
+    fn the_archive_s_step_is_exact() {
+        let t: Vec<f64> = (455..1819).map(|i| f64::from(33 * i) / 1e3).collect();
+        assert!((mean_step_s(&t).unwrap() / 0.033 - 1.0).abs() < 1e-15);
+        assert_eq!(mean_step_s(&[1.0]), None);
+    }
+}

@@ -1,0 +1,393 @@
+//! What drives the roll: the support that modulates the pendulum's gravity, or a force at the roll's own frequency.
+
+use std::fmt;
+
+/// RMS roll below which there is nothing to explain [deg].
+pub const QUIET_DEG: f64 = 1.0;
+/// The share of roll power that a line has to hold to be called the roll's line.
+pub const LINE_SHARE: f64 = 0.5;
+/// The R² from which a fit is called an explanation.
+pub const EXPLAINS: f64 = 0.8;
+
+/// A verdict on a window.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Verdict {
+    /// RMS roll below 1°.
+    Quiet,
+    /// Roll at f/2, as a pendulum whose gravity the summed support modulates.
+    Parametric,
+    /// Roll at f: driven at its own frequency.
+    Direct,
+    /// Neither alone.
+    Mixed,
+}
+
+impl Verdict {
+    /// The word in every output.
+    pub fn word(self) -> &'static str {
+        match self {
+            Verdict::Quiet => "quiet",
+            Verdict::Parametric => "parametric",
+            Verdict::Direct => "direct",
+            Verdict::Mixed => "mixed",
+        }
+    }
+}
+
+/// The roll as a damped pendulum under the summed support, fitted by least squares.
+///
+/// ```text
+/// θ̈ = −a·N_tot·sin θ − b·θ̇  (+ Σ c_i (N_i − N̄))
+/// ```
+/// θ roll [rad], N_tot summed normal force [N], a [1/(kg·m)], b [1/s], N̄ the handles' mean force, c_i [1/(kg·m²)·m]. R² is that of the
+/// part without brackets; `delta_n_gain` is by how much the bracket raises it: the strength of a drive by force differences (ΔN).
+/// θ̇ and θ̈ are those of the natural cubic interpolant with not-a-knot ends, four samples left out at each end: on the
+/// archive's music logs that gives a = 0.0479, b = 0.391, R² = 0.992. A line at ω is seen too large by (ωΔt)²/12 in θ̈ (0.4 % there).
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct RollFit {
+    /// a [1/(kg·m)].
+    pub a: f64,
+    /// b [1/s].
+    pub b_per_s: f64,
+    /// R² of the pendulum alone.
+    pub r2: f64,
+    /// R² gained by the force differences; `None` with one handle.
+    pub delta_n_gain: Option<f64>,
+}
+
+/// The evidence behind a verdict.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Evidence {
+    /// RMS roll about zero [rad].
+    pub rms_roll_rad: f64,
+    /// The height's strongest line f [Hz].
+    pub f_hz: Option<f64>,
+    /// Share of roll power near f/2.
+    pub share_at_half: Option<f64>,
+    /// Share of roll power near f.
+    pub share_at_f: Option<f64>,
+    /// The fit, where there are forces.
+    pub fit: Option<RollFit>,
+}
+
+impl Evidence {
+    /// The word for the evidence.
+    ///
+    /// ```text
+    /// quiet        RMS roll < 1°
+    /// parametric   share near f/2 ≥ 0.5, and, where there are forces, a > 0 and R² ≥ 0.8
+    /// direct       share near f ≥ 0.5
+    /// mixed        everything else
+    /// ```
+    ///
+    /// # Errors
+    /// Without a line in the height there is no f to compare with: the reason is returned.
+    pub fn verdict(&self) -> Result<Verdict, String> {
+        if self.rms_roll_rad.to_degrees() < QUIET_DEG {
+            return Ok(Verdict::Quiet);
+        }
+        let (Some(half), Some(at_f)) = (self.share_at_half, self.share_at_f) else {
+            return Err("the height has no line in the window, so there is no drive frequency to compare the roll with".into());
+        };
+        let pendulum = self.fit.is_none_or(|fit| fit.a > 0.0 && fit.r2 >= EXPLAINS);
+        Ok(match () {
+            () if half >= LINE_SHARE && pendulum => Verdict::Parametric,
+            () if at_f >= LINE_SHARE => Verdict::Direct,
+            () => Verdict::Mixed,
+        })
+    }
+}
+
+impl fmt::Display for Evidence {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "RMS roll {:.3}°", self.rms_roll_rad.to_degrees())?;
+        if let (Some(hz), Some(half), Some(at_f)) = (self.f_hz, self.share_at_half, self.share_at_f)
+        {
+            let percent = |x: f64| 100.0 * x;
+            write!(
+                f,
+                "; {:.1} % of roll power at f/2 = {:.3} Hz, {:.1} % at f = {hz:.3} Hz",
+                percent(half),
+                hz / 2.0,
+                percent(at_f)
+            )?;
+        }
+        if let Some(fit) = &self.fit {
+            write!(
+                f,
+                "; θ̈ = −a·N_tot·sin θ − b·θ̇ with a = {:.5} /(kg·m), b = {:.3} 1/s, R² = {:.3}",
+                fit.a, fit.b_per_s, fit.r2
+            )?;
+            if let Some(gain) = fit.delta_n_gain {
+                write!(f, "; force differences (ΔN) add {gain:.4} to R²")?;
+            }
+        }
+        Ok(())
+    }
+}
+
+/// Samples left out of the fit at each end, where the interpolant's derivatives are poor.
+const EDGE: usize = 4;
+
+/// Fits [`RollFit`] to evenly sampled roll and handle forces. `None` without forces, below 20 samples, or where the roll does not move.
+pub fn fit_roll(roll_rad: &[f64], normal_n: &[Vec<f64>], step_s: f64) -> Option<RollFit> {
+    let n = roll_rad.len();
+    if n < 20 || normal_n.is_empty() || normal_n.iter().any(|h| h.len() != n) {
+        return None;
+    }
+    let (rate, acceleration) = spline_derivatives(roll_rad, step_s)?;
+    let handles = normal_n.len();
+    // Columns: −N_tot sin θ, −θ̇, then N_i − N̄ for all handles but the last (they sum to zero).
+    let row = |k: usize, out: &mut [f64]| {
+        let total: f64 = normal_n.iter().map(|h| h[k]).sum();
+        out[0] = -total * roll_rad[k].sin();
+        out[1] = -rate[k];
+        for (o, h) in out[2..].iter_mut().zip(normal_n) {
+            *o = h[k] - total / handles as f64;
+        }
+    };
+    let range = EDGE..n - EDGE;
+    let plain = least_squares(range.clone(), 2, &acceleration, |k, out| row(k, out))?;
+    let delta_n_gain = (handles > 1)
+        .then(|| least_squares(range, handles + 1, &acceleration, |k, out| row(k, out)))
+        .flatten()
+        .map(|full| (full.r2 - plain.r2).max(0.0));
+    Some(RollFit {
+        a: plain.x[0],
+        b_per_s: plain.x[1],
+        r2: plain.r2,
+        delta_n_gain,
+    })
+}
+
+struct Solution {
+    x: Vec<f64>,
+    r2: f64,
+}
+
+/// Least squares by the normal equations of scaled columns; `None` where they are singular or nothing is to be explained.
+fn least_squares(
+    range: std::ops::Range<usize>,
+    columns: usize,
+    y: &[f64],
+    row: impl Fn(usize, &mut [f64]),
+) -> Option<Solution> {
+    let mut gram = vec![vec![0.0; columns + 1]; columns];
+    let mut values = vec![0.0; columns];
+    let (mut sum, mut squares) = (0.0, 0.0);
+    for k in range.clone() {
+        row(k, &mut values[..]);
+        for i in 0..columns {
+            for j in i..columns {
+                gram[i][j] += values[i] * values[j];
+            }
+            gram[i][columns] += values[i] * y[k];
+        }
+        sum += y[k];
+        squares += y[k] * y[k];
+    }
+    let scale: Vec<f64> = (0..columns).map(|i| gram[i][i].sqrt()).collect();
+    if scale.iter().any(|s| !(s.is_finite() && *s > 0.0)) {
+        return None;
+    }
+    for i in 0..columns {
+        for j in i..columns {
+            gram[i][j] /= scale[i] * scale[j];
+            gram[j][i] = gram[i][j];
+        }
+        gram[i][columns] /= scale[i];
+    }
+    let mut x = eliminate(gram)?;
+    x.iter_mut().zip(&scale).for_each(|(x, s)| *x /= s);
+    let mut residual = 0.0;
+    for k in range.clone() {
+        row(k, &mut values[..]);
+        let fitted: f64 = values.iter().zip(&x).map(|(v, x)| v * x).sum();
+        residual += (y[k] - fitted).powi(2);
+    }
+    let total = squares - sum * sum / range.len() as f64;
+    (total > 0.0).then(|| Solution {
+        x,
+        r2: 1.0 - residual / total,
+    })
+}
+
+/// Gaussian elimination with partial pivoting of an augmented matrix; `None` where it is singular.
+fn eliminate(mut m: Vec<Vec<f64>>) -> Option<Vec<f64>> {
+    let n = m.len();
+    for i in 0..n {
+        let pivot = (i..n).max_by(|a, b| m[*a][i].abs().total_cmp(&m[*b][i].abs()))?;
+        if m[pivot][i].abs() < 1e-12 {
+            return None;
+        }
+        m.swap(i, pivot);
+        for r in 0..n {
+            if r != i {
+                let factor = m[r][i] / m[i][i];
+                let source = m[i].clone();
+                m[r][i..]
+                    .iter_mut()
+                    .zip(&source[i..])
+                    .for_each(|(a, b)| *a -= factor * b);
+            }
+        }
+    }
+    Some((0..n).map(|i| m[i][n] / m[i][i]).collect())
+}
+
+/// First and second derivatives at the knots of the cubic spline through evenly spaced values, with not-a-knot ends
+/// (`scipy.interpolate.CubicSpline`). `None` below four values.
+///
+/// ```text
+/// M_{k−1} + 4 M_k + M_{k+1} = 6 (y_{k−1} − 2y_k + y_{k+1}) / h²,   M₀ = 2M₁ − M₂,   M_{n−1} = 2M_{n−2} − M_{n−3}
+/// y'_k = (y_{k+1} − y_k)/h − h (2M_k + M_{k+1}) / 6
+/// ```
+/// y [unit], h the step [s], M the second derivatives [unit/s²]. Source: de Boor, A Practical Guide to Splines (1978), ch. IV.
+pub fn spline_derivatives(y: &[f64], step_s: f64) -> Option<(Vec<f64>, Vec<f64>)> {
+    let n = y.len();
+    if n < 4 {
+        return None;
+    }
+    let h2 = step_s * step_s;
+    let bend = |k: usize| 6.0 * (y[k - 1] - 2.0 * y[k] + y[k + 1]) / h2;
+    let mut m = vec![0.0; n];
+    // Not-a-knot turns the first and last equation into 6 M = bend.
+    m[1] = bend(1) / 6.0;
+    m[n - 2] = bend(n - 2) / 6.0;
+    // Thomas' algorithm on 2 … n − 3.
+    let inner = 2..n - 2;
+    let mut diagonal = vec![0.0; n];
+    for k in inner.clone() {
+        let mut right = bend(k);
+        if k == 2 {
+            right -= m[1];
+            diagonal[k] = 4.0;
+        } else {
+            diagonal[k] = 4.0 - 1.0 / diagonal[k - 1];
+            right -= m[k - 1] / diagonal[k - 1];
+        }
+        if k == n - 3 {
+            right -= m[n - 2];
+        }
+        m[k] = right;
+    }
+    for k in inner.rev() {
+        let next = if k + 1 <= n - 3 { m[k + 1] } else { 0.0 };
+        m[k] = (m[k] - next) / diagonal[k];
+    }
+    m[0] = 2.0 * m[1] - m[2];
+    m[n - 1] = 2.0 * m[n - 2] - m[n - 3];
+    let mut slope: Vec<f64> = (0..n - 1)
+        .map(|k| (y[k + 1] - y[k]) / step_s - step_s * (2.0 * m[k] + m[k + 1]) / 6.0)
+        .collect();
+    slope.push((y[n - 1] - y[n - 2]) / step_s + step_s * (m[n - 2] + 2.0 * m[n - 1]) / 6.0);
+    Some((slope, m))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_cubic_is_its_own_spline() {
+        let h = 0.1;
+        let y: Vec<f64> = (0..30)
+            .map(|k| (k as f64 * h).powi(3) - 2.0 * (k as f64 * h))
+            .collect();
+        let (d1, d2) = spline_derivatives(&y, h).unwrap();
+        for k in 0..30 {
+            let t = k as f64 * h;
+            assert!(
+                (d1[k] - (3.0 * t * t - 2.0)).abs() < 1e-10 && (d2[k] - 6.0 * t).abs() < 1e-9,
+                "{k}"
+            );
+        }
+        for n in 4..8 {
+            let (d1, _) = spline_derivatives(&y[..n], h).unwrap();
+            assert!((d1[0] + 2.0).abs() < 1e-10 && d1.len() == n);
+        }
+    }
+
+    /// A pendulum under a modulated support, integrated finely: the fit has to find its two constants.
+    #[test]
+    fn the_fit_finds_the_pendulum_it_was_given() {
+        let (a, b, dt, fine) = (0.048, 0.4, 1.0 / 30.0, 200);
+        let support = |t: f64| 590.0 * (1.0 + 0.4 * (std::f64::consts::TAU * 2.15 * t).sin());
+        let (mut theta, mut omega, mut t) = (0.3, 0.0, 0.0);
+        let (mut roll, mut force) = (Vec::new(), Vec::new());
+        for _ in 0..1350 {
+            roll.push(theta);
+            force.push(support(t) / 2.0);
+            for _ in 0..fine {
+                let h = dt / fine as f64;
+                // Midpoint rule: error of 1e-7 here.
+                let rate = |t: f64, th: f64, om: f64| -a * support(t) * th.sin() - b * om;
+                let (mt, mo) = (
+                    theta + 0.5 * h * omega,
+                    omega + 0.5 * h * rate(t, theta, omega),
+                );
+                theta += h * mo;
+                omega += h * rate(t + 0.5 * h, mt, mo);
+                t += h;
+            }
+        }
+        let fit = fit_roll(&roll, &[force.clone(), force], dt).unwrap();
+        // The interpolant's bias at the roll's own frequency, known in advance: + (ωΔt)²/12.
+        let bias = (std::f64::consts::PI * 2.15 * dt).powi(2) / 12.0;
+        assert!((fit.a / a - 1.0 - bias).abs() < 1e-3, "{fit:?}");
+        assert!((fit.b_per_s / b - 1.0).abs() < 0.01 && fit.r2 > 0.9999, "{fit:?}");
+    }
+
+    #[test]
+    fn words_follow_the_evidence() {
+        let fit = RollFit {
+            a: 0.05,
+            b_per_s: 0.4,
+            r2: 0.99,
+            delta_n_gain: Some(0.0),
+        };
+        let e = Evidence {
+            rms_roll_rad: 0.3,
+            f_hz: Some(2.0),
+            share_at_half: Some(0.9),
+            share_at_f: Some(0.01),
+            fit: Some(fit),
+        };
+        assert_eq!(e.verdict(), Ok(Verdict::Parametric));
+        assert_eq!(
+            Evidence {
+                rms_roll_rad: 0.01,
+                ..e.clone()
+            }
+            .verdict(),
+            Ok(Verdict::Quiet)
+        );
+        assert_eq!(
+            Evidence {
+                fit: Some(RollFit { r2: 0.3, ..fit }),
+                ..e.clone()
+            }
+            .verdict(),
+            Ok(Verdict::Mixed)
+        );
+        assert_eq!(
+            Evidence {
+                share_at_half: Some(0.1),
+                share_at_f: Some(0.8),
+                ..e.clone()
+            }
+            .verdict(),
+            Ok(Verdict::Direct)
+        );
+        assert!(
+            Evidence {
+                f_hz: None,
+                share_at_half: None,
+                share_at_f: None,
+                ..e
+            }
+            .verdict()
+            .is_err()
+        );
+    }
+}

@@ -1,0 +1,104 @@
+//! Who holds it and when nobody does: contact, unloading, force statistics.
+
+use super::{Context, Value};
+
+/// The share ε of the weight below which the support counts as gone (paper: 0.05).
+pub const FLOAT_SHARE: f64 = 0.05;
+
+fn share(count: usize, of: usize) -> f64 {
+    count as f64 / of as f64
+}
+
+pub fn contact_loss(c: &Context) -> Value {
+    let forces = c.forces();
+    let slack = (0..forces.len())
+        .filter(|k| forces.columns.iter().any(|n| n[*k] <= 0.0))
+        .count();
+    Value::number(share(slack, forces.len()))
+}
+
+pub fn contact_loss_mean(c: &Context) -> Value {
+    let forces = c.forces();
+    let per: Vec<f64> = forces
+        .columns
+        .iter()
+        .map(|n| share(n.iter().filter(|n| **n <= 0.0).count(), n.len()))
+        .collect();
+    Value::number(mean(&per)).per(per)
+}
+
+pub fn t_float(c: &Context) -> Value {
+    if c.inputs.normal_n.is_empty() {
+        let ratio = c.support_ratio();
+        return Value::number(share(
+            ratio.x.iter().filter(|r| **r <= FLOAT_SHARE).count(),
+            ratio.x.len(),
+        ));
+    }
+    let forces = c.forces();
+    let total: Vec<f64> = (0..forces.len())
+        .map(|k| forces.columns.iter().map(|n| n[k]).sum())
+        .collect();
+    let (weight_n, source) = match c.inputs.mass_kg {
+        Some(mass_kg) => (mass_kg * c.inputs.gravity_m_per_s2, String::new()),
+        // Over many strides what is carried neither rises nor falls: its weight is the mean support.
+        None => (
+            mean(&total),
+            "forces; M·g taken as the mean support".to_owned(),
+        ),
+    };
+    Value::number(share(
+        total
+            .iter()
+            .filter(|n| **n <= FLOAT_SHARE * weight_n)
+            .count(),
+        total.len(),
+    ))
+    .source(source)
+}
+
+pub fn force_mean_n(c: &Context) -> Value {
+    let per: Vec<f64> = c.forces().columns.iter().map(|n| mean(n)).collect();
+    Value::number(mean(&per)).per(per)
+}
+
+pub fn force_sd_n(c: &Context) -> Value {
+    let per: Vec<f64> = c
+        .forces()
+        .columns
+        .iter()
+        .map(|n| variance(n).sqrt())
+        .collect();
+    Value::number(mean(&per)).per(per)
+}
+
+pub fn force_correlation(c: &Context) -> Value {
+    let columns = &c.forces().columns;
+    if columns.len() < 2 {
+        return Value::missing("a correlation needs two handles");
+    }
+    let mut per = Vec::new();
+    for (i, a) in columns.iter().enumerate() {
+        for b in &columns[i + 1..] {
+            let (ma, mb) = (mean(a), mean(b));
+            let shared = a
+                .iter()
+                .zip(b.iter())
+                .map(|(a, b)| (a - ma) * (b - mb))
+                .sum::<f64>()
+                / a.len() as f64;
+            per.push(shared / (variance(a) * variance(b)).sqrt());
+        }
+    }
+    Value::number(mean(&per)).per(per)
+}
+
+pub fn mean(x: &[f64]) -> f64 {
+    x.iter().sum::<f64>() / x.len() as f64
+}
+
+/// Population variance.
+pub fn variance(x: &[f64]) -> f64 {
+    let m = mean(x);
+    x.iter().map(|x| (x - m) * (x - m)).sum::<f64>() / x.len() as f64
+}

@@ -1,0 +1,252 @@
+//! What the metrics of one window share: the columns cut to the window and freed of non-finite samples, and what is dear to compute.
+
+use std::borrow::Cow;
+use std::cell::OnceCell;
+
+use super::lines::Line;
+use crate::inputs::{Inputs, Window, mean_step_s};
+
+/// A column that a metric cannot do without.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Need {
+    /// Rotation about the pole.
+    Roll,
+    /// Tilt of the pole.
+    Pitch,
+    /// Heading.
+    Yaw,
+    /// Height of the centre of mass.
+    Height,
+    /// Normal forces of the handles.
+    Forces,
+    /// Normal forces, or the support ratio measured as such.
+    Support,
+    /// Phases of the carriers.
+    Phases,
+    /// Phase of the beat.
+    Beat,
+}
+
+/// One column in the window, finite.
+pub struct Series<'a> {
+    /// Times [s].
+    pub t_s: Cow<'a, [f64]>,
+    /// Values.
+    pub x: Cow<'a, [f64]>,
+}
+
+/// Several columns on one time axis in the window; samples at which any is not finite are left out of all.
+pub struct Table<'a> {
+    /// Times [s].
+    pub t_s: Cow<'a, [f64]>,
+    /// Columns.
+    pub columns: Vec<Cow<'a, [f64]>>,
+}
+
+impl<'a> Table<'a> {
+    /// The window's part of `columns`; an empty table where there are none or their lengths differ.
+    fn cut(t_s: &'a [f64], columns: &[&'a [f64]], window: Window) -> Self {
+        if columns.is_empty() || columns.iter().any(|c| c.len() != t_s.len()) {
+            return Table {
+                t_s: Cow::Borrowed(&[]),
+                columns: Vec::new(),
+            };
+        }
+        let range = window.range(t_s);
+        let (t_s, columns): (&[f64], Vec<&[f64]>) = (
+            &t_s[range.clone()],
+            columns.iter().map(|c| &c[range.clone()]).collect(),
+        );
+        if columns.iter().all(|c| c.iter().all(|x| x.is_finite())) {
+            return Table {
+                t_s: Cow::Borrowed(t_s),
+                columns: columns.into_iter().map(Cow::Borrowed).collect(),
+            };
+        }
+        let whole: Vec<usize> = (0..t_s.len())
+            .filter(|k| columns.iter().all(|c| c[*k].is_finite()))
+            .collect();
+        let pick = |c: &[f64]| Cow::Owned(whole.iter().map(|k| c[*k]).collect());
+        Table {
+            t_s: pick(t_s),
+            columns: columns.into_iter().map(pick).collect(),
+        }
+    }
+
+    /// Number of samples.
+    pub fn len(&self) -> usize {
+        self.t_s.len()
+    }
+
+    /// Whether there is no sample.
+    pub fn is_empty(&self) -> bool {
+        self.t_s.is_empty()
+    }
+
+    /// The columns as slices.
+    pub fn slices(&self) -> Vec<&[f64]> {
+        self.columns.iter().map(|c| &c[..]).collect()
+    }
+}
+
+/// What the metrics of one window are computed from.
+pub struct Context<'a> {
+    /// The columns as they were given.
+    pub inputs: &'a Inputs,
+    /// The window.
+    pub window: Window,
+    roll: OnceCell<Series<'a>>,
+    height: OnceCell<Series<'a>>,
+    forces: OnceCell<Table<'a>>,
+    phases: OnceCell<Table<'a>>,
+    height_line: OnceCell<Option<Line>>,
+    onset: OnceCell<Option<f64>>,
+}
+
+impl<'a> Context<'a> {
+    /// Nothing is computed yet.
+    pub fn new(inputs: &'a Inputs, window: Window) -> Self {
+        Context {
+            inputs,
+            window,
+            roll: OnceCell::new(),
+            height: OnceCell::new(),
+            forces: OnceCell::new(),
+            phases: OnceCell::new(),
+            height_line: OnceCell::new(),
+            onset: OnceCell::new(),
+        }
+    }
+
+    fn series(&self, x: &'a [f64]) -> Series<'a> {
+        let mut table = Table::cut(&self.inputs.t_s, &[x], self.window);
+        Series {
+            t_s: table.t_s,
+            x: table.columns.pop().unwrap_or(Cow::Borrowed(&[])),
+        }
+    }
+
+    /// The roll [rad].
+    pub fn roll(&self) -> &Series<'a> {
+        self.roll.get_or_init(|| self.series(&self.inputs.roll_rad))
+    }
+
+    /// The pitch [rad].
+    pub fn pitch(&self) -> Series<'a> {
+        self.series(&self.inputs.pitch_rad)
+    }
+
+    /// The yaw [rad].
+    pub fn yaw(&self) -> Series<'a> {
+        self.series(&self.inputs.yaw_rad)
+    }
+
+    /// The height [m].
+    pub fn height(&self) -> &Series<'a> {
+        self.height
+            .get_or_init(|| self.series(&self.inputs.height_m))
+    }
+
+    /// The ratio N_tot / (M g) where it was measured as such.
+    pub fn support_ratio(&self) -> Series<'a> {
+        self.series(&self.inputs.support_ratio)
+    }
+
+    /// The handles' normal forces [N].
+    pub fn forces(&self) -> &Table<'a> {
+        self.forces.get_or_init(|| {
+            let columns: Vec<&[f64]> = self.inputs.normal_n.iter().map(|c| &c[..]).collect();
+            Table::cut(self.inputs.force_times(), &columns, self.window)
+        })
+    }
+
+    /// The carriers' phases [rad].
+    pub fn phases(&self) -> &Table<'a> {
+        self.phases.get_or_init(|| {
+            let columns: Vec<&[f64]> = self.inputs.phase_rad.iter().map(|c| &c[..]).collect();
+            Table::cut(self.inputs.phase_times(), &columns, self.window)
+        })
+    }
+
+    /// The beat's phase [rad], first column, then the carriers' phases: the samples at which a beat sounds.
+    pub fn beat(&self) -> Table<'a> {
+        let mut columns: Vec<&[f64]> = vec![&self.inputs.beat_phase_rad];
+        columns.extend(self.inputs.phase_rad.iter().map(|c| &c[..]));
+        Table::cut(self.inputs.phase_times(), &columns, self.window)
+    }
+
+    /// The strongest line of the height.
+    pub fn height_line(&self) -> Option<&Line> {
+        self.height_line
+            .get_or_init(|| Line::strongest(self.height()))
+            .as_ref()
+    }
+
+    /// The end of the first unstable stretch [s].
+    pub fn onset(&self) -> Option<f64> {
+        *self
+            .onset
+            .get_or_init(|| super::onset_s(&self.roll().t_s, &self.roll().x))
+    }
+
+    /// Why a column is missing, or `None` when it is there.
+    pub fn missing(&self, need: Need) -> Option<String> {
+        let empty = |given: bool, kept: bool, what: &str| match (given, kept) {
+            (false, _) => Some(format!("no {what} in the recording")),
+            (true, false) => Some(format!("no finite sample of {what} in the window")),
+            (true, true) => None,
+        };
+        let i = self.inputs;
+        match need {
+            Need::Roll => empty(!i.roll_rad.is_empty(), !self.roll().x.is_empty(), "roll"),
+            Need::Pitch => empty(!i.pitch_rad.is_empty(), !self.pitch().x.is_empty(), "pitch"),
+            Need::Yaw => empty(!i.yaw_rad.is_empty(), !self.yaw().x.is_empty(), "yaw"),
+            Need::Height => empty(
+                !i.height_m.is_empty(),
+                !self.height().x.is_empty(),
+                "height",
+            ),
+            Need::Forces => empty(
+                !i.normal_n.is_empty(),
+                !self.forces().is_empty(),
+                "handle forces",
+            ),
+            Need::Support if i.normal_n.is_empty() => empty(
+                !i.support_ratio.is_empty(),
+                !self.support_ratio().x.is_empty(),
+                "handle forces or support",
+            ),
+            Need::Support => empty(true, !self.forces().is_empty(), "handle forces"),
+            Need::Phases => empty(
+                !i.phase_rad.is_empty(),
+                !self.phases().is_empty(),
+                "carriers' phases",
+            ),
+            Need::Beat => empty(
+                i.beat_phase_rad.iter().any(|p| p.is_finite()),
+                !self.beat().is_empty(),
+                "beat",
+            ),
+        }
+    }
+
+    /// The word for where a column comes from.
+    pub fn source(&self, need: Need) -> String {
+        let s = &self.inputs.sources;
+        match need {
+            Need::Roll | Need::Pitch | Need::Yaw => &s.attitude,
+            Need::Height => &s.height,
+            Need::Forces | Need::Support => &s.forces,
+            Need::Phases => &s.phases,
+            Need::Beat => &s.beat,
+        }
+        .to_string()
+    }
+}
+
+impl Series<'_> {
+    /// Mean sampling step [s].
+    pub fn step_s(&self) -> Option<f64> {
+        mean_step_s(&self.t_s)
+    }
+}

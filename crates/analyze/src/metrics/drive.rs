@@ -1,0 +1,62 @@
+//! What drives the roll, as one word with its evidence.
+
+use super::lines::Shares;
+use super::{Context, Value};
+use crate::inputs::interpolate;
+use crate::mechanism::{self, Evidence};
+
+/// The evidence for this window. `None` where the roll does not move or has no step.
+pub fn evidence(c: &Context) -> Option<Evidence> {
+    let roll = c.roll();
+    let step_s = roll.step_s()?;
+    let rms_roll_rad = (roll.x.iter().map(|x| x * x).sum::<f64>() / roll.x.len() as f64).sqrt();
+    let f_hz = c.height_line().map(|l| l.hz);
+    let shares = f_hz.and_then(|f| Shares::of(roll, f));
+    let forces = c.forces();
+    let on_roll: Vec<Vec<f64>> = if forces.is_empty() {
+        Vec::new()
+    } else if forces.t_s == roll.t_s {
+        forces.columns.iter().map(|n| n.to_vec()).collect()
+    } else {
+        forces
+            .columns
+            .iter()
+            .map(|n| interpolate(&forces.t_s, n, &roll.t_s))
+            .collect()
+    };
+    let support = c.support_ratio();
+    let (handles, scale) = match on_roll.is_empty() {
+        false => (on_roll, 1.0),
+        // N_tot / (M g) times the weight of one kilogram: a is then per unit mass.
+        true if !support.x.is_empty() && support.t_s == roll.t_s => {
+            (vec![support.x.to_vec()], c.inputs.gravity_m_per_s2)
+        }
+        true => (Vec::new(), 1.0),
+    };
+    let handles: Vec<Vec<f64>> = if scale == 1.0 {
+        handles
+    } else {
+        handles
+            .into_iter()
+            .map(|h| h.into_iter().map(|x| x * scale).collect())
+            .collect()
+    };
+    let fit = mechanism::fit_roll(&roll.x, &handles, step_s);
+    Some(Evidence {
+        rms_roll_rad,
+        f_hz,
+        share_at_half: shares.map(|s| s.at_half),
+        share_at_f: shares.map(|s| s.at_f),
+        fit,
+    })
+}
+
+pub fn mechanism(c: &Context) -> Value {
+    match evidence(c) {
+        Some(evidence) => match evidence.verdict() {
+            Ok(verdict) => Value::word(verdict.word(), evidence.to_string()),
+            Err(reason) => Value::missing(reason),
+        },
+        None => Value::missing("fewer than two samples of roll in the window"),
+    }
+}

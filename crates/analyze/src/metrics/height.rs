@@ -1,0 +1,39 @@
+//! How high it is thrown.
+
+use super::contact::{mean, variance};
+use super::{Context, Value};
+
+pub fn dz_pp_m(c: &Context) -> Value {
+    let z = &c.height().x;
+    let (low, high) = z
+        .iter()
+        .fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), z| {
+            (l.min(*z), h.max(*z))
+        });
+    Value::number(high - low)
+}
+
+pub fn rms_z_m(c: &Context) -> Value {
+    Value::number(variance(&c.height().x).sqrt())
+}
+
+pub fn z_mean_m(c: &Context) -> Value {
+    Value::number(mean(&c.height().x))
+}
+
+pub fn growth_ratio(c: &Context) -> Value {
+    let z = &c.height().x;
+    let third = z.len() / 3;
+    if third == 0 {
+        return Value::missing("fewer than three samples in the window");
+    }
+    let middle = mean(z);
+    let rms = |z: &[f64]| {
+        (z.iter().map(|z| (z - middle) * (z - middle)).sum::<f64>() / third as f64).sqrt()
+    };
+    let (first, last) = (rms(&z[..third]), rms(&z[z.len() - third..]));
+    if first == 0.0 {
+        return Value::missing("the height does not move in the first third of the window");
+    }
+    Value::number(last / first)
+}

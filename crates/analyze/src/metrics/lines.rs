@@ -1,0 +1,170 @@
+//! Lines: the strongest frequency of the height and of the roll, the second harmonic, the half-frequency line.
+
+use super::context::Series;
+use super::{Context, Value};
+use crate::spectrum::{rfft, rfft_hz, rfft_magnitude};
+
+/// How far from twice the peak the second harmonic is looked for [Hz].
+const H2_HALF_WIDTH_HZ: f64 = 0.45;
+
+/// Half-width of "near a line", as a share of f.
+pub const NEAR: f64 = 0.1;
+
+/// The strongest line of a signal and the transform it was found in.
+pub struct Line {
+    /// Its frequency, on the grid of the transform [Hz].
+    pub hz: f64,
+    bin: usize,
+    hz_grid: Vec<f64>,
+    magnitude: Vec<f64>,
+}
+
+impl Line {
+    /// argmax of |rfft(x − mean)|; `None` below four samples or for a constant.
+    pub fn strongest(series: &Series) -> Option<Self> {
+        let x = &series.x;
+        let step_s = series.step_s()?;
+        if x.len() < 4 {
+            return None;
+        }
+        let mean = super::contact::mean(x);
+        let magnitude = rfft_magnitude(&x.iter().map(|x| x - mean).collect::<Vec<_>>());
+        let hz_grid = rfft_hz(x.len(), step_s);
+        // Ties go to the lowest frequency, as NumPy's argmax does.
+        let bin = (0..magnitude.len()).reduce(|best, k| {
+            if magnitude[k] > magnitude[best] {
+                k
+            } else {
+                best
+            }
+        })?;
+        let rounding = 1e-12 * x.iter().fold(0.0f64, |m, x| m.max(x.abs())) * x.len() as f64;
+        (bin > 0 && magnitude[bin] > rounding).then(|| Line {
+            hz: hz_grid[bin],
+            bin,
+            hz_grid,
+            magnitude,
+        })
+    }
+
+    /// The largest magnitude within `half_width_hz` of `hz`, over the magnitude of the line itself.
+    fn ratio_near(&self, hz: f64, half_width_hz: f64) -> Option<f64> {
+        let near = self
+            .hz_grid
+            .iter()
+            .zip(&self.magnitude)
+            .filter(|(f, _)| (*f - hz).abs() <= half_width_hz);
+        near.map(|(_, m)| m / self.magnitude[self.bin])
+            .reduce(f64::max)
+    }
+}
+
+const NO_LINE: &str = "the signal does not move in the window, or has fewer than four samples";
+
+pub fn peak_hz(c: &Context) -> Value {
+    c.height_line()
+        .map_or_else(|| Value::missing(NO_LINE), |line| Value::number(line.hz))
+}
+
+pub fn h2_ratio(c: &Context) -> Value {
+    let Some(line) = c.height_line() else {
+        return Value::missing(NO_LINE);
+    };
+    match line.ratio_near(2.0 * line.hz, H2_HALF_WIDTH_HZ) {
+        Some(ratio) => Value::number(ratio),
+        None => Value::missing(format!(
+            "twice the strongest line, {:.2} Hz, lies beyond half the sampling rate",
+            2.0 * line.hz
+        )),
+    }
+}
+
+pub fn roll_peak_hz(c: &Context) -> Value {
+    Line::strongest(c.roll()).map_or_else(|| Value::missing(NO_LINE), |line| Value::number(line.hz))
+}
+
+pub fn subharmonic_ratio(c: &Context) -> Value {
+    let Some(line) = c.height_line() else {
+        return Value::missing("the height has no line to compare with");
+    };
+    let Some(shares) = Shares::of(c.roll(), line.hz) else {
+        return Value::missing(NO_LINE);
+    };
+    if shares.at_f <= 0.0 {
+        return Value::missing("no roll power near the strongest line of the height");
+    }
+    Value::number(shares.at_half / shares.at_f)
+}
+
+/// What shares of a signal's power lie near f/2 and near f.
+///
+/// ```text
+/// share(f₀) = Σ_{|f_k − f₀| ≤ 0.1 f} |X_k|² / Σ_{k ≥ 1} |X_k|²,   X = rfft(hann · (x − mean))
+/// ```
+/// The taper keeps a strong line from leaking into the other's band. Dimensionless, 0 … 1.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Shares {
+    /// Near f/2.
+    pub at_half: f64,
+    /// Near f.
+    pub at_f: f64,
+}
+
+impl Shares {
+    /// For a signal on an even time axis; `None` where it does not move.
+    pub fn of(series: &Series, f_hz: f64) -> Option<Self> {
+        let (x, step_s) = (&series.x, series.step_s()?);
+        let mean = super::contact::mean(x);
+        let taper = crate::spectrum::Taper::Hann.values(x.len());
+        let tapered: Vec<f64> = x.iter().zip(&taper).map(|(x, w)| (x - mean) * w).collect();
+        let power: Vec<f64> = rfft(&tapered).iter().map(|z| z.norm_sqr()).collect();
+        let hz = rfft_hz(x.len(), step_s);
+        let total: f64 = power[1..].iter().sum();
+        let near = |f0: f64| {
+            hz.iter()
+                .zip(&power)
+                .skip(1)
+                .filter(|(f, _)| (*f - f0).abs() <= NEAR * f_hz)
+                .map(|(_, p)| p)
+                .sum::<f64>()
+        };
+        (total > 0.0).then(|| Shares {
+            at_half: near(f_hz / 2.0) / total,
+            at_f: near(f_hz) / total,
+        })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use std::borrow::Cow;
+    use std::f64::consts::TAU;
+
+    fn series(f: impl Fn(f64) -> f64) -> Series<'static> {
+        let t: Vec<f64> = (0..1350).map(|k| k as f64 / 30.0).collect();
+        let x: Vec<f64> = t.iter().map(|t| f(*t)).collect();
+        Series {
+            t_s: Cow::Owned(t),
+            x: Cow::Owned(x),
+        }
+    }
+
+    #[test]
+    fn two_sines_show_their_places_and_shares() {
+        let s = series(|t| (TAU * 1.0 * t).sin() + 0.5 * (TAU * 2.0 * t).cos() + 7.0);
+        let line = Line::strongest(&s).unwrap();
+        assert_eq!(line.hz, 1.0);
+        assert!((line.ratio_near(2.0, 0.45).unwrap() - 0.5).abs() < 1e-12);
+        let shares = Shares::of(&s, 2.0).unwrap();
+        assert!(
+            (shares.at_half - 0.8).abs() < 1e-6 && (shares.at_f - 0.2).abs() < 1e-6,
+            "{shares:?}"
+        );
+    }
+
+    #[test]
+    fn a_constant_has_no_line() {
+        assert!(Line::strongest(&series(|_| 0.807)).is_none());
+    }
+}

@@ -1,0 +1,75 @@
+//! When it starts to roll.
+
+use super::{Context, Value};
+use crate::inputs::mean_step_s;
+
+/// Length of the stretch whose RMS roll is judged [s].
+pub const ONSET_STRETCH_S: f64 = 2.0;
+/// RMS roll above which a stretch counts as unstable [deg].
+pub const ONSET_ROLL_DEG: f64 = 10.0;
+
+/// The end of the first stretch of 2 s whose RMS roll exceeds 10° [s]; `None` if there is none.
+///
+/// ```text
+/// t[k] of the smallest k ≥ m − 1 with Σ_{j=k−m+1}^{k} θ[j]² > m·(10°)²,   m = ⌊2 s / Δt⌋
+/// ```
+/// θ roll [rad], Δt the mean step [s]; m = 60 both at 30 Hz and at the archive's 30.303 Hz. Stretches lie wholly inside
+/// the given samples, so the answer is never below t\[m − 1\]. Source: archive, stats.json (`uncontrolled_onset_time`).
+pub fn onset_s(t_s: &[f64], roll_rad: &[f64]) -> Option<f64> {
+    let step_s = mean_step_s(t_s)?;
+    // A thousandth of a sample of slack: times are rounded to nanoseconds.
+    let m = ((ONSET_STRETCH_S / step_s + 1e-3).floor() as usize).max(1);
+    let limit = m as f64 * ONSET_ROLL_DEG.to_radians().powi(2);
+    let mut sum = 0.0;
+    for (k, roll) in roll_rad.iter().enumerate() {
+        sum += roll * roll;
+        if k >= m {
+            sum -= roll_rad[k - m] * roll_rad[k - m];
+        }
+        if k + 1 >= m && sum > limit {
+            return Some(t_s[k]);
+        }
+    }
+    None
+}
+
+pub fn onset_time_s(c: &Context) -> Value {
+    c.onset()
+        .map_or_else(|| Value::missing("no onset"), Value::number)
+}
+
+pub fn unstable(c: &Context) -> Value {
+    Value::bool(c.onset().is_some())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn onset_is_the_end_of_the_first_full_stretch() {
+        let t: Vec<f64> = (455..1819).map(|i| f64::from(33 * i) / 1e3).collect();
+        let roll = vec![11f64.to_radians(); t.len()];
+        // The archive's smallest possible value.
+        assert_eq!(onset_s(&t, &roll), Some(16.962));
+        assert_eq!(onset_s(&t, &vec![0.1; t.len()]), None);
+        let late: Vec<f64> = t
+            .iter()
+            .map(|t| if *t > 30.0 { 0.5 } else { 0.0 })
+            .collect();
+        // 0.5² m' > 60 (10°)² needs m' = 8 samples.
+        let first = t.iter().position(|t| *t > 30.0).unwrap();
+        assert_eq!(onset_s(&t, &late), Some(t[first + 7]));
+    }
+
+    #[test]
+    fn two_seconds_are_sixty_samples_at_thirty_hertz() {
+        // Times as a recording rounds them: to nanoseconds.
+        let t: Vec<f64> = (0..1801i64)
+            .map(|k| (k * 1_000_000_000 / 30) as f64 / 1e9)
+            .collect();
+        assert_eq!(onset_s(&t, &vec![1.0; t.len()]), Some(t[59]));
+        let t: Vec<f64> = (0..1801).map(|k| k as f64 / 100.0).collect();
+        assert_eq!(onset_s(&t, &vec![1.0; t.len()]), Some(1.99));
+    }
+}
