@@ -1,0 +1,184 @@
+//! Every topic that the project writes, in one table: name, message, units, frame.
+
+use crate::{cdr, schema};
+
+/// The messages that a channel of ours may carry.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub enum MessageKind {
+    /// `rath.State`.
+    RathState,
+    /// `rath.Phases`.
+    Phases,
+    /// `rath.HandleForces`.
+    HandleForces,
+    /// `rath.Energy`.
+    Energy,
+    /// `rath.Beat`.
+    Beat,
+    /// `foxglove.SceneUpdate`.
+    SceneUpdate,
+    /// `sensor_msgs/msg/Imu`.
+    Imu,
+    /// `sensor_msgs/msg/MagneticField`.
+    MagneticField,
+    /// `tf2_msgs/msg/TFMessage`.
+    Tf,
+    /// `std_msgs/msg/String` with a URDF.
+    RobotDescription,
+    /// `geometry_msgs/msg/PoseStamped`.
+    PoseStamped,
+    /// `std_msgs/msg/Header`: an instant with a name.
+    Header,
+    /// `std_msgs/msg/Float64`.
+    Float64,
+    /// `rcl_interfaces/msg/Log`: a line of text that Rerun and Foxglove show.
+    Log,
+}
+
+impl MessageKind {
+    /// The schema's name in the file.
+    pub fn schema(self) -> &'static str {
+        match self {
+            MessageKind::RathState => "rath.State",
+            MessageKind::Phases => "rath.Phases",
+            MessageKind::HandleForces => "rath.HandleForces",
+            MessageKind::Energy => "rath.Energy",
+            MessageKind::Beat => "rath.Beat",
+            MessageKind::SceneUpdate => "foxglove.SceneUpdate",
+            MessageKind::Imu => "sensor_msgs/msg/Imu",
+            MessageKind::MagneticField => "sensor_msgs/msg/MagneticField",
+            MessageKind::Tf => "tf2_msgs/msg/TFMessage",
+            MessageKind::RobotDescription => "std_msgs/msg/String",
+            MessageKind::PoseStamped => "geometry_msgs/msg/PoseStamped",
+            MessageKind::Header => "std_msgs/msg/Header",
+            MessageKind::Float64 => "std_msgs/msg/Float64",
+            MessageKind::Log => "rcl_interfaces/msg/Log",
+        }
+    }
+
+    /// The encoding of its messages: `protobuf` or `cdr`.
+    pub fn encoding(self) -> &'static str {
+        if schema::descriptor_set(self.schema()).is_some() {
+            "protobuf"
+        } else {
+            "cdr"
+        }
+    }
+
+    /// The encoding of its schema: `protobuf` or `ros2msg`.
+    pub fn schema_encoding(self) -> &'static str {
+        match self.encoding() {
+            "protobuf" => "protobuf",
+            _ => "ros2msg",
+        }
+    }
+
+    /// The schema's bytes: a descriptor set, or the complete message definition with all that it names.
+    pub fn schema_data(self) -> Vec<u8> {
+        match schema::descriptor_set(self.schema()) {
+            Some(bytes) => bytes.to_vec(),
+            None => cdr::definition::complete(self.schema()).into_bytes(),
+        }
+    }
+}
+
+/// One line of the table of topics.
+#[derive(Clone, Copy, Debug)]
+pub struct Topic {
+    /// Name; `*` stands for a number that counts from 1.
+    pub name: &'static str,
+    /// What its messages are.
+    pub kind: MessageKind,
+    /// What it holds, with units.
+    pub content: &'static str,
+    /// The frame of its vectors.
+    pub frame: &'static str,
+}
+
+/// Motion of the carried body.
+pub const STATE: &str = "/rath/state";
+/// Gait phases and beat phase.
+pub const PHASES: &str = "/carriers/phases";
+/// Handle forces.
+pub const FORCES: &str = "/handles/forces";
+/// The energy ledger.
+pub const ENERGY: &str = "/energy";
+/// Poses of body and carriers.
+pub const TF: &str = "/tf";
+/// URDF of body, pole and carriers.
+pub const ROBOT_DESCRIPTION: &str = "/robot_description";
+/// Force arrows and contact marks.
+pub const SCENE: &str = "/scene";
+/// The body's IMU.
+pub const IMU_RATH: &str = "/imu/rath";
+/// One message on every beat.
+pub const BEAT: &str = "/beat";
+
+/// The carrier's IMU topic; carriers count from 1.
+pub fn imu_carrier(number: usize) -> String {
+    format!("/imu/carrier_{number}")
+}
+
+/// All topics.
+pub const TOPICS: &[Topic] = &[
+    Topic {
+        name: STATE,
+        kind: MessageKind::RathState,
+        content: "position m, orientation, velocity m/s, angular velocity rad/s (body), roll/pitch/yaw rad",
+        frame: "world",
+    },
+    Topic {
+        name: PHASES,
+        kind: MessageKind::Phases,
+        content: "phases rad unwrapped, natural frequencies rad/s, beat phase rad, order parameter 1",
+        frame: "",
+    },
+    Topic {
+        name: FORCES,
+        kind: MessageKind::HandleForces,
+        content: "normal and tangential forces N, compression m, contact",
+        frame: "world",
+    },
+    Topic {
+        name: ENERGY,
+        kind: MessageKind::Energy,
+        content: "kinetic, potential, elastic, work in, dissipated, unexplained J",
+        frame: "",
+    },
+    Topic {
+        name: TF,
+        kind: MessageKind::Tf,
+        content: "translations m and rotations: world to rath, world to carrier_i",
+        frame: "world",
+    },
+    Topic {
+        name: ROBOT_DESCRIPTION,
+        kind: MessageKind::RobotDescription,
+        content: "URDF of body, pole and carriers, once",
+        frame: "",
+    },
+    Topic {
+        name: SCENE,
+        kind: MessageKind::SceneUpdate,
+        content: "force arrows and contact marks",
+        frame: "world",
+    },
+    Topic {
+        name: IMU_RATH,
+        kind: MessageKind::Imu,
+        content: "specific force m/s^2, angular velocity rad/s (REP-145)",
+        frame: "rath",
+    },
+    Topic {
+        name: "/imu/carrier_*",
+        kind: MessageKind::Imu,
+        content: "specific force m/s^2, angular velocity rad/s (REP-145)",
+        frame: "carrier_*",
+    },
+    Topic {
+        name: BEAT,
+        kind: MessageKind::Beat,
+        content: "beat number, time s, tempo Hz",
+        frame: "",
+    },
+];

@@ -1,0 +1,468 @@
+//! Writing a recording: chunked, compressed, checked, whole or not at all.
+//!
+//! To a file, the bytes go to a temporary file beside it, which [`RecordingWriter::finish`] renames; until then the final name does
+//! not exist. A program that is killed leaves at most the temporary file, whose closed chunks can be read. To a stream, nothing
+//! is ever sought.
+//!
+//! The bytes depend on what is written alone: chunks close by size and by the recording's own clock, not by the wall's.
+
+use std::{
+    collections::BTreeMap,
+    fs,
+    io::{self, BufWriter, Write},
+    path::{Path, PathBuf},
+    sync::Mutex,
+};
+
+use mcap::{Compression, WriteOptions, records::MessageHeader, write::NoSeek};
+
+use crate::{cdr, topics::MessageKind};
+
+/// A message larger than this is refused.
+const MAX_MESSAGE_BYTES: usize = 256 << 20;
+
+/// How a recording is written.
+#[derive(Clone, Debug)]
+pub struct WriterOptions {
+    /// A chunk is closed when it holds this many bytes before compression.
+    pub chunk_bytes: u64,
+    /// A chunk is closed when it spans this much log time, ns, so that a program that is killed loses little.
+    pub chunk_ns: i64,
+    /// zstd level, 1 (fast) to 22 (small).
+    pub zstd_level: u32,
+}
+
+impl Default for WriterOptions {
+    fn default() -> Self {
+        WriterOptions {
+            chunk_bytes: 512 << 10,
+            chunk_ns: 10_000_000_000,
+            zstd_level: 1,
+        }
+    }
+}
+
+/// Why a recording could not be written. Nothing is left under the final name.
+#[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
+pub enum WriteError {
+    /// The file or stream took no more bytes, or could not be made.
+    #[error("{target}: cannot be written: {source}; no file of that name was made or changed")]
+    Io {
+        /// The path, or `standard output`.
+        target: String,
+        /// What the system said.
+        source: io::Error,
+    },
+    /// The container format cannot hold what was asked for.
+    #[error("{target}: cannot be written: {source}")]
+    Format {
+        /// The path, or `standard output`.
+        target: String,
+        /// What the format's library said.
+        source: mcap::McapError,
+    },
+    /// A message's time cannot be stored.
+    #[error("{target}: a message on {topic} has the time {t_ns} ns; times must not be negative")]
+    NegativeTime {
+        /// The path, or `standard output`.
+        target: String,
+        /// The message's topic.
+        topic: String,
+        /// The time.
+        t_ns: i64,
+    },
+    /// A message is too large.
+    #[error(
+        "{target}: a message on {topic} has {bytes} bytes; at most {MAX_MESSAGE_BYTES} can be written"
+    )]
+    TooLarge {
+        /// The path, or `standard output`.
+        target: String,
+        /// The message's topic.
+        topic: String,
+        /// Its size.
+        bytes: usize,
+    },
+}
+
+/// Anything that can be the content of a message.
+pub trait Encode {
+    /// Appends the message's bytes.
+    fn encode_into(&self, out: &mut Vec<u8>);
+}
+
+impl<M: prost::Message> Encode for M {
+    fn encode_into(&self, out: &mut Vec<u8>) {
+        out.reserve(self.encoded_len());
+        self.encode_raw(out);
+    }
+}
+
+macro_rules! encode_cdr {
+    ($($name:ident),*) => {$(
+        impl Encode for cdr::$name {
+            fn encode_into(&self, out: &mut Vec<u8>) {
+                cdr::Cdr::cdr(self, &mut cdr::Encoder::new(out));
+            }
+        }
+    )*};
+}
+encode_cdr!(
+    Imu,
+    MagneticField,
+    TfMessage,
+    StringMessage,
+    PoseStamped,
+    Header,
+    Float64,
+    Log
+);
+
+/// Bytes that are a message already.
+impl Encode for [u8] {
+    fn encode_into(&self, out: &mut Vec<u8>) {
+        out.extend_from_slice(self);
+    }
+}
+
+/// A channel of a recording that is being written.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct ChannelId(usize);
+
+/// A channel that is defined by its parts: for copying recordings and for encodings of others.
+#[derive(Clone, Copy, Debug)]
+pub struct RawChannel<'a> {
+    /// Name of the topic.
+    pub topic: &'a str,
+    /// Encoding of the messages.
+    pub message_encoding: &'a str,
+    /// Name of the schema; with an empty `schema_encoding` and no data the channel has no schema.
+    pub schema_name: &'a str,
+    /// Encoding of the schema.
+    pub schema_encoding: &'a str,
+    /// The schema.
+    pub schema_data: &'a [u8],
+    /// Further properties.
+    pub metadata: &'a BTreeMap<String, String>,
+}
+
+struct Channel {
+    id: u16,
+    topic: String,
+    sequence: u32,
+}
+
+/// A recording that is being written.
+pub struct RecordingWriter {
+    writer: mcap::Writer<NoSeek<Sink>>,
+    target: String,
+    channels: Vec<Channel>,
+    buffer: Vec<u8>,
+    chunk_start_ns: Option<i64>,
+    chunk_ns: i64,
+}
+
+impl RecordingWriter {
+    /// Begins a recording that will be `path` once [`finish`](Self::finish) is called, and not before.
+    ///
+    /// Something at `path` that is no regular file (a pipe, a device) is written to directly.
+    pub fn create(path: &Path, options: &WriterOptions) -> Result<Self, WriteError> {
+        let target = path.display().to_string();
+        match Sink::beside(path) {
+            Ok(sink) => Self::begin(sink, target, options),
+            Err(source) => Err(WriteError::Io { target, source }),
+        }
+    }
+
+    /// Begins a recording on a stream such as standard output; nothing is sought.
+    pub fn to_stream(
+        stream: impl Write + Send + 'static,
+        options: &WriterOptions,
+    ) -> Result<Self, WriteError> {
+        Self::begin(
+            Sink::Stream(BufWriter::with_capacity(1 << 16, Box::new(stream))),
+            "standard output".to_owned(),
+            options,
+        )
+    }
+
+    fn begin(sink: Sink, target: String, options: &WriterOptions) -> Result<Self, WriteError> {
+        let writer = WriteOptions::new()
+            .compression(Some(Compression::Zstd))
+            .compression_level(options.zstd_level)
+            .compression_threads(0)
+            .chunk_size(Some(options.chunk_bytes))
+            .disable_seeking(true)
+            .profile("")
+            .library(concat!("rath ", env!("CARGO_PKG_VERSION")))
+            .create(NoSeek::new(sink))
+            .map_err(|error| failed(&target, error))?;
+        Ok(RecordingWriter {
+            writer,
+            target,
+            channels: Vec::new(),
+            buffer: Vec::new(),
+            chunk_start_ns: None,
+            chunk_ns: options.chunk_ns,
+        })
+    }
+
+    /// Adds a metadata record.
+    pub fn metadata(
+        &mut self,
+        name: &str,
+        values: &BTreeMap<String, String>,
+    ) -> Result<(), WriteError> {
+        let record = mcap::records::Metadata {
+            name: name.to_owned(),
+            metadata: values.clone(),
+        };
+        self.chunk_start_ns = None;
+        self.writer
+            .write_metadata(&record)
+            .map_err(|error| failed(&self.target, error))
+    }
+
+    /// Attaches a file.
+    pub fn attachment(
+        &mut self,
+        name: &str,
+        media_type: &str,
+        bytes: &[u8],
+    ) -> Result<(), WriteError> {
+        let record = mcap::Attachment {
+            log_time: 0,
+            create_time: 0,
+            name: name.to_owned(),
+            media_type: media_type.to_owned(),
+            data: bytes.into(),
+        };
+        self.chunk_start_ns = None;
+        // The library wants the chunk closed before an attachment.
+        self.writer
+            .flush()
+            .and_then(|()| self.writer.attach(&record))
+            .map_err(|error| failed(&self.target, error))
+    }
+
+    /// Opens a channel for messages of a known kind.
+    pub fn channel(&mut self, topic: &str, kind: MessageKind) -> Result<ChannelId, WriteError> {
+        self.raw_channel(&RawChannel {
+            topic,
+            message_encoding: kind.encoding(),
+            schema_name: kind.schema(),
+            schema_encoding: kind.schema_encoding(),
+            schema_data: &kind.schema_data(),
+            metadata: &BTreeMap::new(),
+        })
+    }
+
+    /// Opens a channel that is given by its parts.
+    pub fn raw_channel(&mut self, channel: &RawChannel<'_>) -> Result<ChannelId, WriteError> {
+        let schema = if channel.schema_encoding.is_empty() && channel.schema_data.is_empty() {
+            Ok(0)
+        } else {
+            self.writer.add_schema(
+                channel.schema_name,
+                channel.schema_encoding,
+                channel.schema_data,
+            )
+        };
+        let id = schema
+            .and_then(|schema| {
+                self.writer.add_channel(
+                    schema,
+                    channel.topic,
+                    channel.message_encoding,
+                    channel.metadata,
+                )
+            })
+            .map_err(|error| failed(&self.target, error))?;
+        self.channels.push(Channel {
+            id,
+            topic: channel.topic.to_owned(),
+            sequence: 0,
+        });
+        Ok(ChannelId(self.channels.len() - 1))
+    }
+
+    /// Writes a message: log time and publish time are `t_ns`, the sequence number counts per channel from 0.
+    pub fn message<M: Encode + ?Sized>(
+        &mut self,
+        channel: ChannelId,
+        t_ns: i64,
+        message: &M,
+    ) -> Result<(), WriteError> {
+        let channel = &mut self.channels[channel.0];
+        self.buffer.clear();
+        message.encode_into(&mut self.buffer);
+        let Ok(time) = u64::try_from(t_ns) else {
+            return Err(WriteError::NegativeTime {
+                target: self.target.clone(),
+                topic: channel.topic.clone(),
+                t_ns,
+            });
+        };
+        if self.buffer.len() > MAX_MESSAGE_BYTES {
+            let (target, topic) = (self.target.clone(), channel.topic.clone());
+            return Err(WriteError::TooLarge {
+                target,
+                topic,
+                bytes: self.buffer.len(),
+            });
+        }
+        let header = MessageHeader {
+            channel_id: channel.id,
+            sequence: channel.sequence,
+            log_time: time,
+            publish_time: time,
+        };
+        channel.sequence = channel.sequence.wrapping_add(1);
+        let start_ns = *self.chunk_start_ns.get_or_insert(t_ns);
+        let mut result = self.writer.write_to_known_channel(&header, &self.buffer);
+        if result.is_ok() && t_ns.saturating_sub(start_ns) >= self.chunk_ns {
+            self.chunk_start_ns = None;
+            result = self.writer.flush();
+        }
+        result.map_err(|error| failed(&self.target, error))
+    }
+
+    /// Writes indexes and summary and gives the file its name.
+    pub fn finish(mut self) -> Result<(), WriteError> {
+        self.writer
+            .finish()
+            .map_err(|error| failed(&self.target, error))?;
+        let target = self.target;
+        let sink = self.writer.into_inner().into_inner();
+        sink.commit()
+            .map_err(|source| WriteError::Io { target, source })
+    }
+}
+
+fn failed(target: &str, error: mcap::McapError) -> WriteError {
+    let target = target.to_owned();
+    match error {
+        mcap::McapError::Io(source) => WriteError::Io { target, source },
+        source => WriteError::Format { target, source },
+    }
+}
+
+/// Temporary files that are being written, for [`remove_unfinished_files`].
+static UNFINISHED: Mutex<Vec<PathBuf>> = Mutex::new(Vec::new());
+
+/// Removes the temporary files of all recordings that are being written: what a program does when it is interrupted, before it exits.
+pub fn remove_unfinished_files() {
+    let mut paths = match UNFINISHED.lock() {
+        Ok(paths) => paths,
+        Err(poisoned) => poisoned.into_inner(),
+    };
+    for path in paths.drain(..) {
+        // Best effort: there is nobody left to tell.
+        let _ = fs::remove_file(path);
+    }
+}
+
+fn forget(path: &Path) {
+    if let Ok(mut paths) = UNFINISHED.lock() {
+        paths.retain(|known| known != path);
+    }
+}
+
+/// Where the bytes go.
+enum Sink {
+    /// A temporary file and the name that it gets.
+    File {
+        file: BufWriter<tempfile::NamedTempFile>,
+        path: PathBuf,
+    },
+    /// Anything else.
+    Stream(BufWriter<Box<dyn Write + Send>>),
+}
+
+impl Sink {
+    fn beside(path: &Path) -> io::Result<Self> {
+        match fs::metadata(path) {
+            Ok(found) if found.is_dir() => {
+                return Err(io::Error::new(
+                    io::ErrorKind::IsADirectory,
+                    "it is a folder",
+                ));
+            }
+            Ok(found) if !found.is_file() => {
+                let device = fs::OpenOptions::new().write(true).open(path)?;
+                return Ok(Sink::Stream(BufWriter::with_capacity(
+                    1 << 16,
+                    Box::new(device),
+                )));
+            }
+            Ok(found) if found.permissions().readonly() => {
+                return Err(io::Error::new(
+                    io::ErrorKind::PermissionDenied,
+                    "the file that is there is read-only",
+                ));
+            }
+            _ => {}
+        }
+        // A link keeps pointing at the file that is replaced.
+        let path = fs::canonicalize(path).unwrap_or_else(|_| path.to_owned());
+        let folder = match path.parent() {
+            Some(parent) if !parent.as_os_str().is_empty() => parent,
+            _ => Path::new("."),
+        };
+        let mut prefix = std::ffi::OsString::from(".");
+        prefix.push(path.file_name().ok_or(io::ErrorKind::InvalidInput)?);
+        prefix.push(".");
+        let mut builder = tempfile::Builder::new();
+        builder.prefix(&prefix).suffix(".part");
+        #[cfg(unix)]
+        {
+            use std::os::unix::fs::PermissionsExt as _;
+            // As any new file: the system takes away what the umask forbids.
+            builder.permissions(fs::Permissions::from_mode(0o666));
+        }
+        let file = builder.tempfile_in(folder)?;
+        if let Ok(mut paths) = UNFINISHED.lock() {
+            paths.push(file.path().to_owned());
+        }
+        Ok(Sink::File {
+            file: BufWriter::with_capacity(1 << 18, file),
+            path,
+        })
+    }
+
+    fn commit(mut self) -> io::Result<()> {
+        self.flush()?;
+        if let Sink::File { file, path } = &mut self {
+            let temporary = file.get_ref().path().to_owned();
+            fs::rename(&temporary, path)?;
+            forget(&temporary);
+        }
+        Ok(())
+    }
+}
+
+impl Drop for Sink {
+    fn drop(&mut self) {
+        if let Sink::File { file, .. } = self {
+            // The temporary file removes itself after this; what was renamed is no longer under that name.
+            forget(file.get_ref().path());
+        }
+    }
+}
+
+impl Write for Sink {
+    fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
+        match self {
+            Sink::File { file, .. } => file.write(bytes),
+            Sink::Stream(stream) => stream.write(bytes),
+        }
+    }
+
+    fn flush(&mut self) -> io::Result<()> {
+        match self {
+            Sink::File { file, .. } => file.flush(),
+            Sink::Stream(stream) => stream.flush(),
+        }
+    }
+}
