@@ -335,7 +335,10 @@ mod tests {
         // The interpolant's bias at the roll's own frequency, known in advance: + (ωΔt)²/12.
         let bias = (std::f64::consts::PI * 2.15 * dt).powi(2) / 12.0;
         assert!((fit.a / a - 1.0 - bias).abs() < 1e-3, "{fit:?}");
-        assert!((fit.b_per_s / b - 1.0).abs() < 0.01 && fit.r2 > 0.9999, "{fit:?}");
+        assert!(
+            (fit.b_per_s / b - 1.0).abs() < 0.01 && fit.r2 > 0.9999,
+            "{fit:?}"
+        );
     }
 
     #[test]

@@ -11,6 +11,7 @@ mod onset;
 mod together;
 
 pub use context::{Context, Need};
+pub use drive::evidence as mechanism_evidence;
 pub use onset::{ONSET_ROLL_DEG, ONSET_STRETCH_S, onset_s};
 
 use serde::ser::{Serialize, SerializeMap, Serializer};
