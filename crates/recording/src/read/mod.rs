@@ -1,1 +1,433 @@
-//! Reading any MCAP.
+//! Reading any MCAP: what is in it, its numbers, and every oddity.
+//!
+//! [`Recording::open`] walks over the file; [`Recording::stream`] decodes it chunk by chunk in bounded memory, in the order of the
+//! file whatever the number of threads; [`Recording::signals`] collects what is wanted. Damage costs the chunk or message that it
+//! hits and is said in a [`Finding`]; what is whole is used.
+
+mod block;
+mod cdr;
+mod chunk;
+mod clock;
+mod collect;
+mod container;
+mod decode;
+mod idl;
+mod json;
+mod layout;
+mod protobuf;
+mod ros1;
+mod ros2msg;
+mod rows;
+mod stream;
+mod types;
+
+use std::{
+    collections::BTreeMap,
+    fs::File,
+    io::Read,
+    path::Path,
+    sync::atomic::{AtomicU64, Ordering},
+};
+
+use container::{Container, Damage, Definitions};
+
+pub use decode::supported;
+pub use stream::{Batch, Column, RawMessage};
+
+use crate::{Finding, Kind, Signal};
+
+/// Limits and habits of the reader.
+#[derive(Clone, Debug)]
+pub struct ReadOptions {
+    /// A chunk that claims more bytes than this, unpacked, is left out. Chunks are read in pieces, so this bounds time, not memory.
+    pub max_chunk_bytes: u64,
+    /// A message longer than this in a large chunk is left out.
+    pub max_message_bytes: u64,
+    /// A sequence becomes signals only where it has at most so many items.
+    pub max_items: usize,
+    /// Threads that unpack and decode, the caller's included; 0 asks the machine.
+    pub threads: usize,
+}
+
+impl Default for ReadOptions {
+    fn default() -> Self {
+        ReadOptions {
+            max_chunk_bytes: 4 << 30,
+            max_message_bytes: 256 << 20,
+            max_items: 64,
+            threads: 0,
+        }
+    }
+}
+
+/// Why a file could not be read at all. Damage inside an MCAP is no such reason.
+#[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
+pub enum ReadError {
+    /// The system does not let us.
+    #[error("{name}: cannot be read: {source}")]
+    Io {
+        /// The file.
+        name: String,
+        /// What the system said.
+        source: std::io::Error,
+    },
+    /// There is nothing in it.
+    #[error("{name}: is empty; expected an MCAP recording")]
+    Empty {
+        /// The file.
+        name: String,
+    },
+    /// It is something else.
+    #[error(
+        "{name}: is not an MCAP recording (it begins with {found}); logs of other formats can be ingested"
+    )]
+    NotMcap {
+        /// The file.
+        name: String,
+        /// Its first bytes.
+        found: String,
+    },
+}
+
+/// What is in a recording.
+#[derive(Clone, Debug, Default)]
+pub struct Info {
+    /// The profile that the header names.
+    pub profile: String,
+    /// The software that wrote it.
+    pub library: String,
+    /// The channels, by id.
+    pub channels: Vec<ChannelInfo>,
+    /// Metadata records by name.
+    pub metadata: BTreeMap<String, BTreeMap<String, String>>,
+    /// Names and media types of the attachments, with their sizes in bytes.
+    pub attachments: Vec<AttachmentInfo>,
+    /// Log time of the earliest message, ns.
+    pub start_ns: i64,
+    /// Log time of the latest message, ns.
+    pub end_ns: i64,
+    /// How many messages there are.
+    pub messages: u64,
+    /// Whether the summary was missing or could not be used, so that the whole file was looked through.
+    pub salvaged: bool,
+    /// Messages that are known to be lost; [`Recording::skipped_messages`] knows more after reading.
+    pub skipped_messages: u64,
+    /// Damage of the container, one line each.
+    pub warnings: Vec<String>,
+}
+
+/// One channel.
+#[derive(Clone, Debug, Default)]
+pub struct ChannelInfo {
+    /// Its id in the file.
+    pub id: u16,
+    /// Topic.
+    pub topic: String,
+    /// Name of the schema, empty without one.
+    pub schema: String,
+    /// Encoding of the messages.
+    pub encoding: String,
+    /// Encoding of the schema, empty without one.
+    pub schema_encoding: String,
+    /// The schema itself.
+    pub schema_data: Vec<u8>,
+    /// Further properties.
+    pub metadata: BTreeMap<String, String>,
+    /// How many messages it has.
+    pub messages: u64,
+}
+
+/// One attachment.
+#[derive(Clone, Debug, Default)]
+pub struct AttachmentInfo {
+    /// Name.
+    pub name: String,
+    /// Media type.
+    pub media_type: String,
+    /// Size in bytes.
+    pub bytes: u64,
+}
+
+/// The file's bytes.
+enum Data {
+    Mapped(memmap2::Mmap),
+    Held(Vec<u8>),
+}
+
+impl std::ops::Deref for Data {
+    type Target = [u8];
+
+    fn deref(&self) -> &[u8] {
+        match self {
+            Data::Mapped(map) => map,
+            Data::Held(bytes) => bytes,
+        }
+    }
+}
+
+/// An open recording.
+pub struct Recording {
+    data: Data,
+    options: ReadOptions,
+    container: Container,
+    info: Info,
+    /// Index into the channels of [`Info`] by channel id.
+    by_id: Vec<Option<usize>>,
+    /// Messages that the summary promises, if it was used.
+    promised: Option<u64>,
+    skipped: AtomicU64,
+}
+
+impl std::fmt::Debug for Recording {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.debug_struct("Recording")
+            .field("info", &self.info)
+            .finish_non_exhaustive()
+    }
+}
+
+impl Recording {
+    /// Opens a file. It is mapped, not read, so it may be larger than the memory.
+    pub fn open(path: &Path, options: &ReadOptions) -> Result<Self, ReadError> {
+        let name = path.display().to_string();
+        let io = |source| ReadError::Io {
+            name: name.clone(),
+            source,
+        };
+        let mut file = File::open(path).map_err(io)?;
+        let kind = file.metadata().map_err(io)?;
+        if kind.is_dir() {
+            return Err(io(std::io::Error::new(
+                std::io::ErrorKind::IsADirectory,
+                "it is a folder",
+            )));
+        }
+        let data = if kind.is_file() && kind.len() > 0 {
+            // SAFETY: the map is only read. Another program that shortens the file meanwhile would end this one by a signal, one
+            // that writes into it could change bytes under us; both are checked values to this crate, never lengths to trust.
+            #[allow(unsafe_code)]
+            let map = unsafe { memmap2::Mmap::map(&file) }.map_err(io)?;
+            Data::Mapped(map)
+        } else {
+            let mut bytes = Vec::new();
+            file.read_to_end(&mut bytes).map_err(io)?;
+            Data::Held(bytes)
+        };
+        Self::begin(data, &name, options)
+    }
+
+    /// Opens bytes in memory, such as what came through standard input.
+    pub fn from_bytes(bytes: Vec<u8>, options: &ReadOptions) -> Result<Self, ReadError> {
+        Self::begin(Data::Held(bytes), "standard input", options)
+    }
+
+    fn begin(data: Data, name: &str, options: &ReadOptions) -> Result<Self, ReadError> {
+        if data.is_empty() {
+            return Err(ReadError::Empty {
+                name: name.to_owned(),
+            });
+        }
+        let Some(mut container) = container::walk(&data) else {
+            let found = data
+                .iter()
+                .take(8)
+                .map(|&byte| std::ascii::escape_default(byte).to_string())
+                .collect::<String>();
+            return Err(ReadError::NotMcap {
+                name: name.to_owned(),
+                found: format!("\"{found}\""),
+            });
+        };
+        let promised = container
+            .summary
+            .as_ref()
+            .and_then(|(_, statistics)| Some(statistics.as_ref()?.messages));
+        let trusted = trusted(&container);
+        let (definitions, tally) = match (&trusted, container.summary.take()) {
+            (Some(tally), Some((definitions, _))) => (definitions, tally.clone()),
+            (_, summary) => {
+                let (mut definitions, tally) = block::scan(&data, &container.blocks, options);
+                if let Some((others, _)) = summary {
+                    definitions.merge(others);
+                }
+                (definitions, tally)
+            }
+        };
+        if definitions.conflicts > 0 {
+            let text = format!(
+                "{} schemas or channels are defined twice, differently; the first definition counts",
+                definitions.conflicts
+            );
+            container
+                .damage
+                .push((Kind::BadSchema, definitions.conflicts, text));
+        }
+        if definitions.broken > 0 {
+            let text = format!(
+                "{} schema or channel records cannot be read",
+                definitions.broken
+            );
+            container
+                .damage
+                .push((Kind::BadRecord, definitions.broken, text));
+        }
+        let info = info(&container, &definitions, &tally, trusted.is_some());
+        let mut by_id = vec![None; 1 << 16];
+        for (index, channel) in info.channels.iter().enumerate() {
+            by_id[usize::from(channel.id)] = Some(index);
+        }
+        Ok(Recording {
+            data,
+            options: options.clone(),
+            container,
+            info,
+            by_id,
+            promised,
+            skipped: AtomicU64::new(0),
+        })
+    }
+
+    /// What is in the recording.
+    pub fn info(&self) -> &Info {
+        &self.info
+    }
+
+    /// The content of an attachment.
+    pub fn attachment(&self, name: &str) -> Option<Vec<u8>> {
+        let attachment = self
+            .container
+            .attachments
+            .iter()
+            .find(|attachment| attachment.name == name)?;
+        Some(self.data.get(attachment.data.clone())?.to_vec())
+    }
+
+    /// Messages that could not be used, as far as the last [`stream`](Self::stream) or [`signals`](Self::signals) found out.
+    pub fn skipped_messages(&self) -> u64 {
+        self.skipped.load(Ordering::Relaxed)
+    }
+
+    /// Decodes the whole recording: gives one [`Batch`] per channel and chunk, in the order of the file, and returns what was odd.
+    ///
+    /// `select` says by path (`TOPIC.field.path`) which fields become columns; the others cost next to nothing. The memory
+    /// in use does not grow with the file.
+    pub fn stream(
+        &self,
+        select: &(dyn Fn(&str) -> bool + Sync),
+        sink: &mut dyn FnMut(&Batch<'_>),
+    ) -> Result<Vec<Finding>, ReadError> {
+        stream::run(self, select, sink)
+    }
+
+    /// Collects signals, each sorted by time, and what was odd.
+    pub fn signals(
+        &self,
+        select: &(dyn Fn(&str) -> bool + Sync),
+    ) -> Result<(Vec<Signal>, Vec<Finding>), ReadError> {
+        collect::signals(self, select)
+    }
+
+    /// Gives the messages of the topics that `select` wants as they are, in the order of the file; messages of damaged chunks are
+    /// left out.
+    pub fn messages(
+        &self,
+        select: &dyn Fn(&str) -> bool,
+        sink: &mut dyn FnMut(&RawMessage<'_>),
+    ) -> Result<(), ReadError> {
+        stream::raw(self, select, sink)
+    }
+
+    fn damage(&self) -> &[Damage] {
+        &self.container.damage
+    }
+}
+
+/// What a look through the file, or its summary, counts.
+#[derive(Clone, Default)]
+struct Tally {
+    per_channel: BTreeMap<u16, u64>,
+    start: Option<u64>,
+    end: Option<u64>,
+}
+
+/// The summary's counts, if they and its definitions fit what the walk saw.
+fn trusted(container: &Container) -> Option<Tally> {
+    let sound = container.complete && container.damage.is_empty();
+    let (definitions, statistics) = container.summary.as_ref()?;
+    let statistics = statistics.as_ref()?;
+    let chunks = container
+        .blocks
+        .iter()
+        .filter(|block| matches!(block, container::Block::Chunk { .. }))
+        .count() as u64;
+    let counted: u64 = statistics
+        .per_channel
+        .values()
+        .fold(0, |sum, &count| sum.saturating_add(count));
+    let fits = sound
+        && statistics.chunks == chunks
+        && statistics.channels == definitions.channels.len() as u64
+        && counted == statistics.messages
+        && statistics
+            .per_channel
+            .keys()
+            .all(|id| definitions.channels.contains_key(id))
+        && definitions.channels.values().all(|channel| {
+            channel.schema == 0 || definitions.schemas.contains_key(&channel.schema)
+        });
+    let any = statistics.messages > 0;
+    fits.then(|| Tally {
+        per_channel: statistics.per_channel.clone(),
+        start: any.then_some(statistics.start),
+        end: any.then_some(statistics.end),
+    })
+}
+
+fn info(container: &Container, definitions: &Definitions, tally: &Tally, trusted: bool) -> Info {
+    let channels = definitions
+        .channels
+        .iter()
+        .map(|(&id, channel)| {
+            let schema = definitions.schemas.get(&channel.schema);
+            ChannelInfo {
+                id,
+                topic: channel.topic.clone(),
+                schema: schema.map(|schema| schema.name.clone()).unwrap_or_default(),
+                encoding: channel.encoding.clone(),
+                schema_encoding: schema
+                    .map(|schema| schema.encoding.clone())
+                    .unwrap_or_default(),
+                schema_data: schema.map(|schema| schema.data.clone()).unwrap_or_default(),
+                metadata: channel.metadata.clone(),
+                messages: tally.per_channel.get(&id).copied().unwrap_or(0),
+            }
+        })
+        .collect();
+    let time = |time: Option<u64>| time.and_then(|time| i64::try_from(time).ok()).unwrap_or(0);
+    Info {
+        profile: container.profile.clone(),
+        library: container.library.clone(),
+        channels,
+        metadata: container.metadata.clone(),
+        attachments: container
+            .attachments
+            .iter()
+            .map(|attachment| AttachmentInfo {
+                name: attachment.name.clone(),
+                media_type: attachment.media_type.clone(),
+                bytes: attachment.data.len() as u64,
+            })
+            .collect(),
+        start_ns: time(tally.start),
+        end_ns: time(tally.end),
+        messages: tally.per_channel.values().sum(),
+        salvaged: !trusted && !(container.complete && container.damage.is_empty()),
+        skipped_messages: 0,
+        warnings: container
+            .damage
+            .iter()
+            .map(|(_, _, text)| text.clone())
+            .collect(),
+    }
+}

@@ -1,0 +1,502 @@
+//! One block of a recording, a chunk or a stretch of loose records, turned into rows of numbers; the work of one thread.
+
+use std::{ops::Range, sync::Arc};
+
+use super::{
+    ReadError, ReadOptions, Recording, Tally,
+    chunk::{self, Loss, Unpacker, WHOLE_BYTES},
+    container::{Block, Definitions, Fields, op},
+    decode::{self, Decoder, NoDecoder, SchemaRef},
+    rows::{Rows, Selection},
+};
+use crate::finding::Kind;
+
+/// Decoded numbers of one channel in one block.
+#[derive(Default)]
+pub(super) struct ChannelBatch {
+    /// Index into the recording's channels.
+    pub channel: usize,
+    pub times: Vec<i64>,
+    /// Header stamps, one per row, or none at all.
+    pub stamps: Vec<i64>,
+    pub columns: Vec<BatchColumn>,
+    pub absent: Vec<(String, u64)>,
+    pub long: Vec<(String, u64)>,
+    pub trailing: u64,
+    pub remark: Option<String>,
+}
+
+/// One column of a batch.
+pub(super) struct BatchColumn {
+    pub path: Arc<str>,
+    pub values: Vec<f64>,
+    /// The rows that have a value; empty if all do.
+    pub rows: Vec<u32>,
+    /// Values that are not finite, and the row of the first.
+    pub odd: Option<(u64, u32)>,
+}
+
+/// Something that could not be used.
+pub(super) struct Trouble {
+    /// Index of the channel, or `None` for the file.
+    pub channel: Option<usize>,
+    pub kind: Kind,
+    pub count: u64,
+    pub time: Option<i64>,
+    pub text: String,
+    /// Messages that it cost, where that is known.
+    pub lost: u64,
+}
+
+/// What a block gave.
+#[derive(Default)]
+pub(super) struct BlockResult {
+    pub batches: Vec<ChannelBatch>,
+    pub troubles: Vec<Trouble>,
+    /// Messages seen, usable or not.
+    pub messages: u64,
+    /// The chunk is too large to be decoded in one go: the caller reads it in pieces.
+    pub large: bool,
+}
+
+enum State {
+    Ready(Box<dyn Decoder>),
+    /// Nothing can decode the channel; why, and how that is called.
+    Closed(Kind, String),
+}
+
+struct ChannelState<'a> {
+    index: usize,
+    rows: Rows<'a>,
+    state: State,
+    times: Vec<i64>,
+    stamps: Vec<i64>,
+    stamped: bool,
+    /// Messages that could not be decoded: count, time and text of the first.
+    failed: Option<(u64, i64, String)>,
+    closed: u64,
+    out_of_range: u64,
+    expected: usize,
+}
+
+/// The memory of one thread.
+pub(super) struct Worker<'a> {
+    recording: &'a Recording,
+    select: Selection<'a>,
+    unpacker: Unpacker,
+    /// By channel index.
+    channels: Vec<Option<Box<ChannelState<'a>>>>,
+    touched: Vec<usize>,
+}
+
+impl<'a> Worker<'a> {
+    pub fn new(recording: &'a Recording, select: Selection<'a>) -> Self {
+        let mut channels = Vec::new();
+        channels.resize_with(recording.info.channels.len(), || None);
+        Worker {
+            recording,
+            select,
+            unpacker: Unpacker::new(),
+            channels,
+            touched: Vec::new(),
+        }
+    }
+
+    /// Decodes a block.
+    pub fn block(&mut self, block: &Block) -> BlockResult {
+        let mut result = BlockResult::default();
+        match block {
+            Block::Loose(range) => self.records(&self.recording.data[range.clone()], &mut result),
+            Block::Chunk { body, indexed } => {
+                let header = match chunk::open(
+                    &self.recording.data[body.clone()],
+                    &self.recording.options,
+                ) {
+                    Ok(header) if header.uncompressed > WHOLE_BYTES => {
+                        result.large = true;
+                        return result;
+                    }
+                    Ok(header) => header,
+                    Err(loss) => {
+                        result
+                            .troubles
+                            .push(lost_chunk(self.recording, body, *indexed, loss));
+                        return result;
+                    }
+                };
+                // The unpacker's memory is borrowed while records are read from it.
+                let mut unpacker = std::mem::replace(&mut self.unpacker, Unpacker::new());
+                match unpacker.whole(&header) {
+                    Ok(records) => self.records(records, &mut result),
+                    Err(loss) => {
+                        result
+                            .troubles
+                            .push(lost_chunk(self.recording, body, *indexed, loss))
+                    }
+                }
+                self.unpacker = unpacker;
+            }
+        }
+        self.harvest(&mut result);
+        result
+    }
+
+    /// Decodes a large chunk in pieces and gives each piece's result away at once.
+    pub fn large(
+        &mut self,
+        block: &Block,
+        give: &mut dyn FnMut(BlockResult),
+    ) -> Result<(), ReadError> {
+        let Block::Chunk { body, indexed } = block else {
+            return Ok(());
+        };
+        let recording = self.recording;
+        let loss = match chunk::open(&recording.data[body.clone()], &recording.options) {
+            Err(loss) => Some(loss),
+            Ok(header) => {
+                let pieces = chunk::pieces(&header, &recording.options, &mut |records| {
+                    let mut result = BlockResult::default();
+                    self.records(records, &mut result);
+                    self.harvest(&mut result);
+                    give(result);
+                    Ok(())
+                })?;
+                match pieces {
+                    Ok(0) => None,
+                    Ok(count) => {
+                        let text = format!(
+                            "{count} messages are longer than the limit max_message_bytes of {}",
+                            recording.options.max_message_bytes
+                        );
+                        let trouble = Trouble {
+                            channel: None,
+                            kind: Kind::TooLarge,
+                            count,
+                            time: None,
+                            text,
+                            lost: count,
+                        };
+                        give(BlockResult {
+                            troubles: vec![trouble],
+                            messages: count,
+                            ..BlockResult::default()
+                        });
+                        None
+                    }
+                    Err(loss) => Some(loss),
+                }
+            }
+        };
+        if let Some(loss) = loss {
+            let trouble = lost_chunk(recording, body, *indexed, loss);
+            give(BlockResult {
+                troubles: vec![trouble],
+                ..BlockResult::default()
+            });
+        }
+        Ok(())
+    }
+
+    /// Reads records that stand one after the other.
+    fn records(&mut self, mut bytes: &[u8], result: &mut BlockResult) {
+        while let Some((opcode, body, rest)) = split_record(bytes) {
+            bytes = rest;
+            if opcode == op::MESSAGE {
+                result.messages += 1;
+                self.message(body, result);
+            }
+        }
+        if !bytes.is_empty() {
+            result.troubles.push(Trouble {
+                channel: None,
+                kind: Kind::BadRecord,
+                count: 1,
+                time: None,
+                text: format!(
+                    "{} bytes at the end of a chunk are no record and were left out",
+                    bytes.len()
+                ),
+                lost: 0,
+            });
+        }
+    }
+
+    #[inline]
+    fn message(&mut self, body: &[u8], result: &mut BlockResult) {
+        let Some((header, data)) = body.split_first_chunk::<22>() else {
+            result.troubles.push(Trouble {
+                channel: None,
+                kind: Kind::BadRecord,
+                count: 1,
+                time: None,
+                text: "a message record is too short for its header".to_owned(),
+                lost: 1,
+            });
+            return;
+        };
+        let id = u16::from_le_bytes([header[0], header[1]]);
+        let time = u64::from_le_bytes(std::array::from_fn(|i| header[6 + i]));
+        let Some(index) = self.recording.by_id[usize::from(id)] else {
+            result.troubles.push(Trouble {
+                channel: None,
+                kind: Kind::UnknownChannel,
+                count: 1,
+                time: i64::try_from(time).ok(),
+                text: format!("messages of channel {id}, which nothing defines"),
+                lost: 1,
+            });
+            return;
+        };
+        let (recording, select) = (self.recording, self.select);
+        let channel = self.channels[index]
+            .get_or_insert_with(|| Box::new(ChannelState::new(recording, index, select)));
+        if !channel.begun() {
+            self.touched.push(index);
+        }
+        let Ok(time) = i64::try_from(time) else {
+            channel.out_of_range += 1;
+            return;
+        };
+        let State::Ready(decoder) = &mut channel.state else {
+            channel.closed += 1;
+            return;
+        };
+        if channel.times.is_empty() {
+            channel.times.reserve(channel.expected);
+            channel.stamps.reserve(channel.expected);
+        }
+        channel.rows.begin();
+        match decoder.decode(data, &mut channel.rows) {
+            Ok(()) => {
+                channel.rows.keep();
+                channel.times.push(time);
+                match channel.rows.stamp_ns {
+                    Some(stamp) => channel.stamps.push(stamp),
+                    None => channel.stamped = false,
+                }
+            }
+            Err(text) => {
+                channel.rows.abort();
+                match &mut channel.failed {
+                    Some((count, _, _)) => *count += 1,
+                    none => *none = Some((1, time, text)),
+                }
+            }
+        }
+    }
+
+    /// Moves what the channels hold into the result.
+    fn harvest(&mut self, result: &mut BlockResult) {
+        // In the order of the channels, so that it does not depend on which came first.
+        self.touched.sort_unstable();
+        for index in self.touched.drain(..) {
+            let Some(channel) = &mut self.channels[index] else {
+                continue;
+            };
+            channel.harvest(result);
+        }
+    }
+}
+
+impl<'a> ChannelState<'a> {
+    fn new(recording: &Recording, index: usize, select: Selection<'a>) -> Self {
+        let info = &recording.info.channels[index];
+        let mut rows = Rows::new(&info.topic, select, recording.options.max_items);
+        let schema = SchemaRef {
+            name: &info.schema,
+            encoding: &info.schema_encoding,
+            data: &info.schema_data,
+        };
+        let state = match decode::open(&info.encoding, &schema, &mut rows) {
+            Ok(decoder) => State::Ready(decoder),
+            Err(NoDecoder::Unknown) => State::Closed(
+                Kind::NoDecoder,
+                format!(
+                    "encoding {:?} with schema encoding {:?} has no decoder",
+                    info.encoding, info.schema_encoding
+                ),
+            ),
+            Err(NoDecoder::BadSchema(problem)) => State::Closed(
+                Kind::BadSchema,
+                format!("the schema {:?} cannot be used: {problem}", info.schema),
+            ),
+        };
+        ChannelState {
+            index,
+            rows,
+            state,
+            times: Vec::new(),
+            stamps: Vec::new(),
+            stamped: true,
+            failed: None,
+            closed: 0,
+            out_of_range: 0,
+            expected: 0,
+        }
+    }
+
+    /// Whether the current block has given this channel anything yet.
+    fn begun(&self) -> bool {
+        !self.times.is_empty() || self.failed.is_some() || self.closed > 0 || self.out_of_range > 0
+    }
+
+    fn harvest(&mut self, result: &mut BlockResult) {
+        let mut trouble = |kind, count, time, text, lost| {
+            result.troubles.push(Trouble {
+                channel: Some(self.index),
+                kind,
+                count,
+                time,
+                text,
+                lost,
+            });
+        };
+        if let Some((count, time, text)) = self.failed.take() {
+            trouble(Kind::Undecodable, count, Some(time), text, count);
+        }
+        let closed = std::mem::take(&mut self.closed);
+        if let (State::Closed(kind, text), 1..) = (&self.state, closed) {
+            trouble(*kind, closed, None, text.clone(), closed);
+        }
+        let out = std::mem::take(&mut self.out_of_range);
+        if out > 0 {
+            let text = "log times beyond the year 2262 cannot be held in nanoseconds".to_owned();
+            trouble(Kind::TimeOutOfRange, out, None, text, out);
+        }
+        let rows = self.rows.finish();
+        if rows > 0 {
+            let columns = self
+                .rows
+                .columns
+                .iter_mut()
+                .filter(|column| !column.values.is_empty())
+                .map(|column| {
+                    let hint = column.values.len();
+                    let values = std::mem::replace(&mut column.values, Vec::with_capacity(hint));
+                    let rows = std::mem::take(&mut column.rows);
+                    let odd = not_finite(&values, &rows);
+                    BatchColumn {
+                        path: column.path.clone(),
+                        values,
+                        rows,
+                        odd,
+                    }
+                })
+                .collect();
+            let stamps = std::mem::take(&mut self.stamps);
+            result.batches.push(ChannelBatch {
+                channel: self.index,
+                times: std::mem::take(&mut self.times),
+                stamps: if self.stamped { stamps } else { Vec::new() },
+                columns,
+                absent: std::mem::take(&mut self.rows.absent),
+                long: std::mem::take(&mut self.rows.long),
+                trailing: self.rows.trailing,
+                remark: self.rows.remark.take(),
+            });
+        }
+        self.expected = rows;
+        self.stamped = true;
+        self.stamps.clear();
+        self.rows.clear();
+    }
+}
+
+/// Counts values that are not finite.
+fn not_finite(values: &[f64], rows: &[u32]) -> Option<(u64, u32)> {
+    // v − v is zero for what is finite and NaN for the rest: sums in lanes, which the compiler makes quick.
+    let mut lanes = [0.0f64; 8];
+    let (whole, rest) = values.as_chunks::<8>();
+    for chunk in whole {
+        for (lane, value) in lanes.iter_mut().zip(chunk) {
+            *lane += value - value;
+        }
+    }
+    let sum: f64 = lanes.iter().sum::<f64>() + rest.iter().map(|value| value - value).sum::<f64>();
+    if sum == 0.0 {
+        return None;
+    }
+    let first = values.iter().position(|value| !value.is_finite())?;
+    let count = values.iter().filter(|value| !value.is_finite()).count() as u64;
+    // OK because rows are counted in u32.
+    Some((count, rows.get(first).copied().unwrap_or(first as u32)))
+}
+
+/// The first record: opcode, body, rest. `None` at the end, or where no record fits.
+#[inline]
+pub(super) fn split_record(bytes: &[u8]) -> Option<(u8, &[u8], &[u8])> {
+    let (header, rest) = bytes.split_first_chunk::<9>()?;
+    let length = u64::from_le_bytes(std::array::from_fn(|i| header[1 + i]));
+    let (body, rest) = rest.split_at_checked(usize::try_from(length).ok()?)?;
+    Some((header[0], body, rest))
+}
+
+fn lost_chunk(
+    recording: &Recording,
+    body: &Range<usize>,
+    indexed: Option<u64>,
+    (kind, what): Loss,
+) -> Trouble {
+    let time = super::container::chunk_header(&recording.data[body.clone()])
+        .and_then(|header| i64::try_from(header.start_time).ok());
+    let messages = match indexed {
+        Some(count) => format!("its {count} messages were"),
+        None => "it was".to_owned(),
+    };
+    Trouble {
+        channel: None,
+        kind,
+        count: 1,
+        time,
+        text: format!(
+            "the chunk at byte {} {what}; {messages} left out",
+            body.start.saturating_sub(9)
+        ),
+        lost: indexed.unwrap_or(0),
+    }
+}
+
+/// Looks through all blocks for definitions, counts and times, where there is no summary to say so.
+pub(super) fn scan(data: &[u8], blocks: &[Block], options: &ReadOptions) -> (Definitions, Tally) {
+    let (mut definitions, mut tally) = (Definitions::default(), Tally::default());
+    let mut look = |mut bytes: &[u8]| {
+        while let Some((opcode, body, rest)) = split_record(bytes) {
+            bytes = rest;
+            if opcode != op::MESSAGE {
+                definitions.define(opcode, body);
+                continue;
+            }
+            let mut fields = Fields::new(body);
+            let (Some(id), Some(_), Some(time)) = (fields.u16(), fields.u32(), fields.u64()) else {
+                continue;
+            };
+            *tally.per_channel.entry(id).or_default() += 1;
+            if i64::try_from(time).is_ok() {
+                tally.start = Some(tally.start.map_or(time, |start| start.min(time)));
+                tally.end = Some(tally.end.map_or(time, |end| end.max(time)));
+            }
+        }
+    };
+    let mut unpacker = Unpacker::new();
+    for block in blocks {
+        match block {
+            Block::Loose(range) => look(&data[range.clone()]),
+            Block::Chunk { body, .. } => match chunk::open(&data[body.clone()], options) {
+                Ok(header) if header.uncompressed <= WHOLE_BYTES => {
+                    if let Ok(records) = unpacker.whole(&header) {
+                        look(records);
+                    }
+                }
+                Ok(header) => {
+                    // Damage is reported when the chunk is read for its messages.
+                    let _ = chunk::pieces(&header, options, &mut |records| {
+                        look(records);
+                        Ok(())
+                    });
+                }
+                Err(_) => {}
+            },
+        }
+    }
+    (definitions, tally)
+}

@@ -1,0 +1,191 @@
+//! ROS 2 messages (`cdr`): XCDR1 and plain XCDR2, both byte orders, laid out by `ros2msg` or IDL text.
+//!
+//! Two points of the representation differ between implementations: whether plain XCDR2 puts a size before collections of structs
+//! and strings, and how many bytes a wide character takes. A message tells by being used up exactly; the first reading
+//! that does so is kept for the channel.
+
+use super::{
+    decode::{Decoder, SchemaRef},
+    idl,
+    layout::{Fail, Program, Shape},
+    ros1::describe,
+    ros2msg::{self, Dialect},
+    rows::Rows,
+    types::{Type, Types},
+};
+
+struct Cdr {
+    types: Types,
+    /// Whether the message has wide text, or collections of structs and text: where readings differ.
+    wide: bool,
+    collections: bool,
+    programs: Vec<(Shape, Program)>,
+    /// The reading that fitted last, by representation.
+    fitted: Vec<(u8, Shape)>,
+}
+
+pub(super) fn open_ros2msg(
+    schema: &SchemaRef<'_>,
+    _rows: &mut Rows,
+) -> Result<Box<dyn Decoder>, String> {
+    let text =
+        str::from_utf8(schema.data).map_err(|_| "the definition is not UTF-8 text".to_owned())?;
+    begin(ros2msg::parse(schema.name, text, Dialect::Ros2)?)
+}
+
+pub(super) fn open_idl(
+    schema: &SchemaRef<'_>,
+    _rows: &mut Rows,
+) -> Result<Box<dyn Decoder>, String> {
+    let text =
+        str::from_utf8(schema.data).map_err(|_| "the definition is not UTF-8 text".to_owned())?;
+    begin(idl::parse(schema.name, text)?)
+}
+
+fn begin(types: Types) -> Result<Box<dyn Decoder>, String> {
+    let (mut wide, mut collections) = (false, false);
+    for kind in types
+        .structs
+        .iter()
+        .flat_map(|message| message.fields.iter().map(|(_, kind)| kind))
+    {
+        let mut kind = kind;
+        while let Type::Array(inner, _) | Type::Sequence(inner) = kind {
+            collections |= !matches!(**inner, Type::Prim(_));
+            kind = inner;
+        }
+        wide |= *kind == Type::WideText;
+    }
+    Ok(Box::new(Cdr {
+        types,
+        wide,
+        collections,
+        programs: Vec::new(),
+        fitted: Vec::new(),
+    }))
+}
+
+impl Cdr {
+    /// The readings to try for a representation, the likeliest first.
+    fn readings(&self, representation: u8) -> Result<Vec<Shape>, String> {
+        let (big_endian, second) = match representation {
+            0x00 => (true, false),
+            0x01 => (false, false),
+            0x06 => (true, true),
+            0x07 => (false, true),
+            0x02 | 0x03 | 0x0a | 0x0b => {
+                return Err("the message is a CDR parameter list, which has no decoder".to_owned());
+            }
+            0x08 | 0x09 => {
+                return Err("the message is delimited CDR, which has no decoder".to_owned());
+            }
+            other => {
+                return Err(format!(
+                    "the representation identifier 0x00{other:02x} is not known"
+                ));
+            }
+        };
+        let shape = Shape {
+            big_endian,
+            max_align: if second { 4 } else { 8 },
+            collection_headers: false,
+            wide: 2,
+            empty_takes_byte: true,
+        };
+        let mut readings = vec![shape];
+        if second && self.collections {
+            readings.insert(
+                0,
+                Shape {
+                    collection_headers: true,
+                    ..shape
+                },
+            );
+        }
+        if self.wide {
+            let four: Vec<Shape> = readings
+                .iter()
+                .map(|shape| Shape { wide: 4, ..*shape })
+                .collect();
+            readings.extend(four);
+        }
+        Ok(readings)
+    }
+
+    fn run(
+        &mut self,
+        shape: Shape,
+        body: &[u8],
+        rows: &mut Rows,
+    ) -> Result<Result<usize, Fail>, String> {
+        let position = match self.programs.iter().position(|(known, _)| *known == shape) {
+            Some(position) => position,
+            None => {
+                self.programs
+                    .push((shape, Program::message(&self.types, shape, rows)?));
+                self.programs.len() - 1
+            }
+        };
+        Ok(self.programs[position]
+            .1
+            .run(&self.types, shape, body, 0, rows))
+    }
+}
+
+impl Decoder for Cdr {
+    fn decode(&mut self, message: &[u8], rows: &mut Rows) -> Result<(), String> {
+        let Some((header, body)) = message.split_first_chunk::<4>() else {
+            return Err(format!(
+                "CDR message of {} bytes has no room for its header of 4",
+                message.len()
+            ));
+        };
+        let [first, representation, ..] = *header;
+        if first != 0 {
+            return Err(format!(
+                "the representation identifier 0x{first:02x}{representation:02x} is not known"
+            ));
+        }
+        if let Some(&(_, shape)) = self
+            .fitted
+            .iter()
+            .find(|(known, _)| *known == representation)
+            && let Ok(end) = self.run(shape, body, rows)?
+            && body.len() - end < 4
+        {
+            return Ok(());
+        }
+        let mut best: Option<Result<usize, Fail>> = None;
+        let readings = self.readings(representation)?;
+        for &shape in &readings {
+            rows.abort();
+            rows.begin();
+            match self.run(shape, body, rows)? {
+                // Up to three bytes of padding may follow.
+                Ok(end) if body.len() - end < 4 => {
+                    self.fitted.retain(|(known, _)| *known != representation);
+                    self.fitted.push((representation, shape));
+                    return Ok(());
+                }
+                other => {
+                    if best.is_none() || (matches!(best, Some(Err(_))) && other.is_ok()) {
+                        best = Some(other);
+                    }
+                }
+            }
+        }
+        match best {
+            Some(Ok(_)) if readings.len() == 1 => {
+                rows.trailing += 1;
+                Ok(())
+            }
+            Some(Ok(end)) => Err(format!(
+                "CDR message of {} bytes holds {} after its last field",
+                message.len(),
+                body.len() - end
+            )),
+            Some(Err(fail)) => Err(describe(&fail, "CDR message", message.len())),
+            None => Ok(()),
+        }
+    }
+}

@@ -1,0 +1,269 @@
+//! Chunks: unpacked, checked, and only then read. Large chunks are unpacked twice, in small pieces: once for the checksum, once for
+//! their messages, so that no chunk needs more memory than a piece.
+
+use std::io::{self, Read};
+
+use super::{
+    ReadOptions,
+    container::{ChunkHeader, Fields, chunk_header},
+};
+use crate::finding::Kind;
+
+/// Chunks up to this size are unpacked in one go.
+pub(super) const WHOLE_BYTES: u64 = 16 << 20;
+
+/// Pieces in which larger chunks are read.
+const PIECE_BYTES: usize = 2 << 20;
+
+/// Why a chunk was left out.
+pub(super) type Loss = (Kind, String);
+
+/// Unpacks chunks; its memory is used again and again.
+pub(super) struct Unpacker {
+    zstd: Option<zstd::bulk::Decompressor<'static>>,
+    buffer: Vec<u8>,
+}
+
+impl Unpacker {
+    pub fn new() -> Self {
+        Unpacker {
+            zstd: None,
+            buffer: Vec::new(),
+        }
+    }
+
+    /// The records of a chunk of at most [`WHOLE_BYTES`], checked.
+    pub fn whole<'a>(&'a mut self, header: &ChunkHeader<'a>) -> Result<&'a [u8], Loss> {
+        // OK because the caller only passes chunks up to WHOLE_BYTES.
+        let expected = header.uncompressed as usize;
+        let records: &[u8] = match header.compression {
+            b"" => header.records,
+            b"zstd" => {
+                let zstd = match &mut self.zstd {
+                    Some(zstd) => zstd,
+                    none => none.insert(
+                        zstd::bulk::Decompressor::new().map_err(|error| bad("zstd", &error))?,
+                    ),
+                };
+                self.buffer.resize(expected, 0);
+                let length = zstd
+                    .decompress_to_buffer(header.records, self.buffer.as_mut_slice())
+                    .map_err(|error| bad("zstd", &error))?;
+                &self.buffer[..length]
+            }
+            other => {
+                self.buffer.clear();
+                let mut stream = stream(other, header.records)?;
+                // One byte more than promised shows a chunk that holds too much.
+                stream
+                    .by_ref()
+                    .take(header.uncompressed + 1)
+                    .read_to_end(&mut self.buffer)
+                    .map_err(|error| bad(&String::from_utf8_lossy(other), &error))?;
+                &self.buffer
+            }
+        };
+        check(header, records.len() as u64, || crc32fast::hash(records))?;
+        Ok(records)
+    }
+}
+
+fn bad(compression: &str, error: &io::Error) -> Loss {
+    (
+        Kind::BadChunk,
+        format!("cannot be unpacked ({compression}: {error})"),
+    )
+}
+
+fn check(header: &ChunkHeader<'_>, length: u64, crc: impl FnOnce() -> u32) -> Result<(), Loss> {
+    if header.crc != 0 {
+        let found = crc();
+        if found != header.crc {
+            return Err((
+                Kind::BadCrc,
+                format!(
+                    "does not match its checksum ({:08x} expected, {found:08x} found)",
+                    header.crc
+                ),
+            ));
+        }
+    }
+    if length != header.uncompressed {
+        return Err((
+            Kind::BadChunk,
+            format!(
+                "holds {length} bytes where its header says {}",
+                header.uncompressed
+            ),
+        ));
+    }
+    Ok(())
+}
+
+/// The content of a chunk as a stream.
+fn stream<'a>(compression: &[u8], records: &'a [u8]) -> Result<Box<dyn Read + 'a>, Loss> {
+    Ok(match compression {
+        b"" => Box::new(records),
+        b"zstd" => Box::new(
+            zstd::stream::read::Decoder::with_buffer(records)
+                .map_err(|error| bad("zstd", &error))?,
+        ),
+        b"lz4" => Box::new(Lz4 {
+            decoder: lz4_flex::frame::FrameDecoder::new(records),
+        }),
+        other => {
+            let name: String = String::from_utf8_lossy(other).chars().take(32).collect();
+            return Err((
+                Kind::BadChunk,
+                format!("is compressed with {name:?}; zstd, lz4 and none can be read"),
+            ));
+        }
+    })
+}
+
+/// LZ4 frames one after the other.
+struct Lz4<'a> {
+    decoder: lz4_flex::frame::FrameDecoder<&'a [u8]>,
+}
+
+impl Read for Lz4<'_> {
+    fn read(&mut self, buffer: &mut [u8]) -> io::Result<usize> {
+        loop {
+            let count = self.decoder.read(buffer).map_err(io::Error::from)?;
+            if count > 0 || buffer.is_empty() || self.decoder.get_ref().is_empty() {
+                return Ok(count);
+            }
+            // A frame has ended and another one follows.
+            let rest: &[u8] = self.decoder.get_ref();
+            self.decoder = lz4_flex::frame::FrameDecoder::new(rest);
+        }
+    }
+}
+
+/// Reads a chunk's header and holds it against the limits.
+pub(super) fn open<'a>(body: &'a [u8], options: &ReadOptions) -> Result<ChunkHeader<'a>, Loss> {
+    let header = chunk_header(body)
+        .ok_or_else(|| (Kind::BadChunk, "has a header that does not fit".to_owned()))?;
+    if header.uncompressed > options.max_chunk_bytes {
+        return Err((
+            Kind::TooLarge,
+            format!(
+                "claims {} bytes unpacked; the limit max_chunk_bytes is {}",
+                header.uncompressed, options.max_chunk_bytes
+            ),
+        ));
+    }
+    if header.compression.is_empty() && header.uncompressed != header.records.len() as u64 {
+        return Err((
+            Kind::BadChunk,
+            format!(
+                "holds {} bytes where its header says {}",
+                header.records.len(),
+                header.uncompressed
+            ),
+        ));
+    }
+    Ok(header)
+}
+
+/// Gives the records of a chunk in pieces that hold whole records; a record longer than `max_message_bytes` is stepped over.
+///
+/// Returns how many records were too long.
+pub(super) fn pieces(
+    header: &ChunkHeader<'_>,
+    options: &ReadOptions,
+    each: &mut dyn FnMut(&[u8]) -> Result<(), super::ReadError>,
+) -> Result<Result<u64, Loss>, super::ReadError> {
+    // First pass: nothing but the checksum, so that no number of a damaged chunk gets out.
+    let name = String::from_utf8_lossy(header.compression);
+    let first = (|| {
+        let mut stream = stream(header.compression, header.records)?;
+        let mut crc = crc32fast::Hasher::new();
+        let mut buffer = vec![0; PIECE_BYTES];
+        let mut length = 0u64;
+        loop {
+            let count = stream
+                .read(&mut buffer)
+                .map_err(|error| bad(&name, &error))?;
+            if count == 0 {
+                break;
+            }
+            length += count as u64;
+            if length > header.uncompressed {
+                return Err((
+                    Kind::BadChunk,
+                    format!(
+                        "holds more than the {} bytes that its header says",
+                        header.uncompressed
+                    ),
+                ));
+            }
+            crc.update(&buffer[..count]);
+        }
+        check(header, length, || crc.finalize())
+    })();
+    if let Err(loss) = first {
+        return Ok(Err(loss));
+    }
+
+    let mut stream = match stream(header.compression, header.records) {
+        Ok(stream) => stream,
+        Err(loss) => return Ok(Err(loss)),
+    };
+    let (mut buffer, mut filled, mut skip, mut too_long) =
+        (vec![0u8; PIECE_BYTES], 0usize, 0u64, 0u64);
+    loop {
+        let count = match stream.read(&mut buffer[filled..]) {
+            Ok(count) => count,
+            Err(error) => return Ok(Err(bad(&name, &error))),
+        };
+        filled += count;
+        if skip > 0 {
+            // Inside a record that is stepped over.
+            let drop = skip.min(filled as u64) as usize;
+            buffer.copy_within(drop..filled, 0);
+            filled -= drop;
+            skip -= drop as u64;
+        }
+        let whole = whole_records(&buffer[..filled]);
+        if whole > 0 && (filled == buffer.len() || count == 0) {
+            each(&buffer[..whole])?;
+            buffer.copy_within(whole..filled, 0);
+            filled -= whole;
+        }
+        if count == 0 && filled < buffer.len() {
+            break;
+        }
+        if let Some(length) = Fields::new(buffer[..filled].get(1..).unwrap_or_default()).u64() {
+            let needed = length.saturating_add(9);
+            if needed > options.max_message_bytes && needed > filled as u64 && skip == 0 {
+                too_long += 1;
+                skip = needed - filled as u64;
+                filled = 0;
+            } else if needed > buffer.len() as u64 && needed <= options.max_message_bytes {
+                // OK because it is below the limit on messages.
+                buffer.resize(needed as usize, 0);
+            }
+        }
+    }
+    if filled > 0 {
+        // The caller's walk says what is wrong with the rest.
+        each(&buffer[..filled])?;
+    }
+    Ok(Ok(too_long))
+}
+
+/// How many of the bytes are whole records.
+fn whole_records(bytes: &[u8]) -> usize {
+    let mut at = 0;
+    while let Some(length) = bytes.get(at + 1..).and_then(|rest| Fields::new(rest).u64()) {
+        match usize::try_from(length)
+            .ok()
+            .and_then(|length| length.checked_add(at + 9))
+        {
+            Some(end) if end <= bytes.len() => at = end,
+            _ => break,
+        }
+    }
+    at
+}

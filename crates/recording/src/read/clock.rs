@@ -1,0 +1,387 @@
+//! What the times of a channel tell: gaps, duplicates, steps back, and how log time and header stamps run against each other.
+
+use crate::finding::{Finding, Kind};
+
+/// So many intervals are looked at before 'usual' means something, and no more than so many are kept.
+const SAMPLE: usize = 256;
+/// Fewer intervals than this say nothing about regularity.
+const ENOUGH: usize = 16;
+/// An interval longer than so many usual ones is a gap.
+const GAP: i64 = 3;
+/// A constant difference between the clocks below this is what networks and drivers do, s.
+const OFFSET_S: f64 = 0.1;
+/// Drift below this is what quartz does, parts per million.
+const DRIFT_PPM: f64 = 20.0;
+
+/// Times of one kind (log times or stamps) in the order of the file.
+#[derive(Debug, Default)]
+pub(super) struct Order {
+    last: Option<i64>,
+    duplicates: Count,
+    backward: Count,
+    /// The first intervals, to learn what is usual, with where they ended.
+    sample: Vec<(i64, i64)>,
+    usual: Option<i64>,
+    learned: bool,
+    gaps: Count,
+    longest: (i64, i64),
+}
+
+#[derive(Clone, Copy, Debug, Default)]
+struct Count {
+    count: u64,
+    first: i64,
+}
+
+impl Count {
+    fn add(&mut self, at: i64) {
+        if self.count == 0 {
+            self.first = at;
+        }
+        self.count += 1;
+    }
+}
+
+impl Order {
+    /// Takes in the next times.
+    pub fn observe(&mut self, times: &[i64]) {
+        let Some((&first, rest)) = times.split_first() else {
+            return;
+        };
+        if let Some(last) = self.last {
+            self.interval(last, first);
+        }
+        self.last = times.last().copied();
+        // Mostly nothing is odd: the extremes of the intervals say so without a look at each.
+        let mut shortest = i64::MAX;
+        let mut longest = i64::MIN;
+        let mut previous = first;
+        for &time in rest {
+            let interval = time.wrapping_sub(previous);
+            shortest = shortest.min(interval);
+            longest = longest.max(interval);
+            previous = time;
+        }
+        let quiet = shortest > 0
+            && self.learned
+            && self
+                .usual
+                .is_none_or(|usual| longest <= usual.saturating_mul(GAP));
+        if quiet {
+            return;
+        }
+        for pair in times.windows(2) {
+            self.interval(pair[0], pair[1]);
+        }
+    }
+
+    fn interval(&mut self, from: i64, to: i64) {
+        let interval = to.saturating_sub(from);
+        match interval {
+            0 => self.duplicates.add(to),
+            ..0 => self.backward.add(to),
+            _ if self.learned => self.judge(interval, from),
+            _ => {
+                self.sample.push((interval, from));
+                if self.sample.len() >= SAMPLE {
+                    self.learn();
+                }
+            }
+        }
+    }
+
+    fn judge(&mut self, interval: i64, from: i64) {
+        if self
+            .usual
+            .is_some_and(|usual| interval > usual.saturating_mul(GAP))
+        {
+            self.gaps.add(from);
+            if interval > self.longest.0 {
+                self.longest = (interval, from);
+            }
+        }
+    }
+
+    /// Decides what interval is usual, if any: the median, where nine of ten intervals are below twice that.
+    fn learn(&mut self) {
+        self.learned = true;
+        let sample = std::mem::take(&mut self.sample);
+        if sample.len() < ENOUGH {
+            return;
+        }
+        let mut sorted: Vec<i64> = sample.iter().map(|(interval, _)| *interval).collect();
+        sorted.sort_unstable();
+        let usual = sorted[sorted.len() / 2];
+        if sorted[sorted.len() * 9 / 10] < usual.saturating_mul(2) {
+            self.usual = Some(usual);
+            for (interval, from) in sample {
+                self.judge(interval, from);
+            }
+        }
+    }
+
+    /// Says what was odd. `what` names the times ("log times", "header stamps").
+    pub fn report(&mut self, topic: &str, what: &str, start_ns: i64, findings: &mut Vec<Finding>) {
+        if !self.learned {
+            self.learn();
+        }
+        let mut say = |kind, count: Count, text| {
+            if count.count > 0 {
+                let t_s = Some(seconds(count.first, start_ns));
+                findings.push(Finding {
+                    topic: topic.to_owned(),
+                    kind,
+                    count: count.count,
+                    t_s,
+                    text,
+                });
+            }
+        };
+        let at = |count: Count| seconds(count.first, start_ns);
+        say(
+            Kind::Duplicate,
+            self.duplicates,
+            format!(
+                "{} {what} repeat the one before, first at {:.3} s",
+                self.duplicates.count,
+                at(self.duplicates)
+            ),
+        );
+        say(
+            Kind::Backward,
+            self.backward,
+            format!(
+                "{} {what} lie before the one before, first at {:.3} s",
+                self.backward.count,
+                at(self.backward)
+            ),
+        );
+        let usual_s = self.usual.unwrap_or(0) as f64 / 1e9;
+        say(
+            Kind::Gap,
+            self.gaps,
+            format!(
+                "{} gaps in the {what} (usual interval {usual_s:.6} s), the longest {:.3} s at {:.3} s",
+                self.gaps.count,
+                self.longest.0 as f64 / 1e9,
+                seconds(self.longest.1, start_ns)
+            ),
+        );
+    }
+}
+
+/// Log time against header stamp: offset = log time − stamp, and its trend.
+#[derive(Debug, Default)]
+pub(super) struct Clocks {
+    /// First log time and offset: the origin of the sums, so that they keep their digits.
+    origin: Option<(i64, i64)>,
+    weight: f64,
+    t: f64,
+    d: f64,
+    tt: f64,
+    td: f64,
+    dd: f64,
+    span_s: f64,
+    zero: Count,
+    differ: bool,
+}
+
+impl Clocks {
+    /// Takes in times and stamps, row by row.
+    pub fn observe(&mut self, times: &[i64], stamps: &[i64]) {
+        // Means of short stretches carry offset and trend as well as every message would.
+        for (times, stamps) in times.chunks(64).zip(stamps.chunks(64)) {
+            let Some((&t0, &s0)) = times.first().zip(stamps.first()) else {
+                return;
+            };
+            let (t_origin, d_origin) = *self.origin.get_or_insert((t0, t0.wrapping_sub(s0)));
+            let (mut count, mut t_sum, mut d_sum, mut differ) = (0i64, 0i64, 0i64, 0i64);
+            for (&time, &stamp) in times.iter().zip(stamps) {
+                if stamp == 0 && time != 0 {
+                    self.zero.add(time);
+                    continue;
+                }
+                let offset = time.wrapping_sub(stamp);
+                differ |= offset;
+                count += 1;
+                t_sum = t_sum.wrapping_add(time.wrapping_sub(t0));
+                d_sum = d_sum.wrapping_add(offset.wrapping_sub(d_origin));
+            }
+            self.differ |= differ != 0;
+            if count == 0 {
+                continue;
+            }
+            let n = count as f64;
+            let t = (t0.wrapping_sub(t_origin)) as f64 / 1e9 + t_sum as f64 / 1e9 / n;
+            let d = d_sum as f64 / 1e9 / n;
+            self.weight += n;
+            self.t += n * t;
+            self.d += n * d;
+            self.tt += n * t * t;
+            self.td += n * t * d;
+            self.dd += n * d * d;
+            self.span_s = self.span_s.max(t);
+        }
+    }
+
+    /// Whether log times and stamps are simply the same.
+    pub fn same(&self) -> bool {
+        !self.differ
+    }
+
+    /// Says how the clocks stand to each other where that is odd.
+    pub fn report(&self, topic: &str, start_ns: i64, findings: &mut Vec<Finding>) {
+        let mut say = |kind, count, t_s, text| {
+            findings.push(Finding {
+                topic: topic.to_owned(),
+                kind,
+                count,
+                t_s,
+                text,
+            })
+        };
+        if self.zero.count > 0 {
+            let t_s = seconds(self.zero.first, start_ns);
+            say(
+                Kind::ZeroStamp,
+                self.zero.count,
+                Some(t_s),
+                format!(
+                    "{} header stamps are zero, first at {t_s:.3} s",
+                    self.zero.count
+                ),
+            );
+        }
+        let (Some((_, d_origin)), true) = (self.origin, self.weight > 0.0 && self.differ) else {
+            return;
+        };
+        let (t, d) = (self.t / self.weight, self.d / self.weight);
+        let offset_s = d_origin as f64 / 1e9 + d;
+        if offset_s.abs() > OFFSET_S {
+            let word = if offset_s > 0.0 { "after" } else { "before" };
+            say(
+                Kind::ClockOffset,
+                1,
+                None,
+                format!(
+                    "log time lies {:.3} s {word} the header stamp on average",
+                    offset_s.abs()
+                ),
+            );
+        }
+        let (var_t, cov, var_d) = (
+            self.tt / self.weight - t * t,
+            self.td / self.weight - t * d,
+            self.dd / self.weight - d * d,
+        );
+        if var_t <= 0.0 || self.span_s < 5.0 {
+            return;
+        }
+        let slope = cov / var_t;
+        let residual = (var_d - slope * cov).max(0.0).sqrt();
+        // A trend counts where it stands out of the scatter about it, over the whole recording.
+        let change_s = slope * self.span_s;
+        if (slope * 1e6).abs() > DRIFT_PPM
+            && change_s.abs() > 3.0 * residual
+            && change_s.abs() > 1e-3
+        {
+            say(
+                Kind::ClockDrift,
+                1,
+                None,
+                format!(
+                    "log time runs {:.0} ppm {} than the header stamp ({:.1} ms over {:.1} s)",
+                    (slope * 1e6).abs(),
+                    if slope > 0.0 { "faster" } else { "slower" },
+                    change_s * 1e3,
+                    self.span_s
+                ),
+            );
+        }
+    }
+}
+
+/// Seconds since the start.
+pub(super) fn seconds(t_ns: i64, start_ns: i64) -> f64 {
+    (i128::from(t_ns) - i128::from(start_ns)) as f64 / 1e9
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn words(order: &mut Order) -> Vec<(Kind, u64, Option<f64>)> {
+        let mut findings = Vec::new();
+        order.report("/t", "log times", 0, &mut findings);
+        findings
+            .iter()
+            .map(|finding| (finding.kind, finding.count, finding.t_s))
+            .collect()
+    }
+
+    #[test]
+    fn gaps_duplicates_and_steps_back_are_counted_across_batches() {
+        let mut times: Vec<i64> = (0..1000).map(|i| i * 1_000_000).collect();
+        times[500] = times[499];
+        for time in &mut times[800..] {
+            *time += 50_000_000;
+        }
+        times[900] = times[10];
+        for batch in [1, 7, 64, 1000] {
+            let mut order = Order::default();
+            for part in times.chunks(batch) {
+                order.observe(part);
+            }
+            // The step back at 900 is followed by a leap of almost a second.
+            assert_eq!(
+                words(&mut order),
+                [
+                    (Kind::Duplicate, 1, Some(0.499)),
+                    (Kind::Backward, 1, Some(0.01)),
+                    (Kind::Gap, 2, Some(0.799))
+                ],
+                "batches of {batch}"
+            );
+        }
+    }
+
+    #[test]
+    fn an_irregular_topic_has_no_gaps() {
+        let mut order = Order::default();
+        order.observe(
+            &(0..100i64)
+                .map(|i| i * i * i * 1_000_000)
+                .collect::<Vec<_>>(),
+        );
+        assert_eq!(words(&mut order), []);
+    }
+
+    #[test]
+    fn drift_and_offset_come_out_as_put_in() {
+        let stamps: Vec<i64> = (0..60_000)
+            .map(|i| 1_700_000_000_000_000_000 + i * 1_000_000)
+            .collect();
+        let times: Vec<i64> = stamps
+            .iter()
+            .enumerate()
+            .map(|(i, s)| s + 2_000_000_000 + i as i64 * 100)
+            .collect();
+        let mut clocks = Clocks::default();
+        for (times, stamps) in times.chunks(300).zip(stamps.chunks(300)) {
+            clocks.observe(times, stamps);
+        }
+        let mut findings = Vec::new();
+        clocks.report("/t", times[0], &mut findings);
+        let texts: Vec<&str> = findings
+            .iter()
+            .map(|finding| finding.text.as_str())
+            .collect();
+        assert_eq!(
+            texts,
+            [
+                "log time lies 2.003 s after the header stamp on average",
+                "log time runs 100 ppm faster than the header stamp (6.0 ms over 60.0 s)"
+            ]
+        );
+    }
+}

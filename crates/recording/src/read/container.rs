@@ -1,0 +1,684 @@
+//! The container: a walk over the top-level records of an MCAP, which needs no index and survives lengths that lie.
+//!
+//! The walk touches a few bytes per record and leaves chunks packed. Where a record is not possible, it looks for the next
+//! place from which records follow each other, and says how many bytes it left out.
+
+use std::{borrow::Cow, collections::BTreeMap, ops::Range};
+
+use crate::finding::Kind;
+
+pub(super) const MAGIC: &[u8; 8] = b"\x89MCAP0\r\n";
+
+/// Opcodes of records.
+pub(super) mod op {
+    pub const HEADER: u8 = 0x01;
+    pub const FOOTER: u8 = 0x02;
+    pub const SCHEMA: u8 = 0x03;
+    pub const CHANNEL: u8 = 0x04;
+    pub const MESSAGE: u8 = 0x05;
+    pub const CHUNK: u8 = 0x06;
+    pub const MESSAGE_INDEX: u8 = 0x07;
+    pub const ATTACHMENT: u8 = 0x09;
+    pub const STATISTICS: u8 = 0x0b;
+    pub const METADATA: u8 = 0x0c;
+    pub const SUMMARY_OFFSET: u8 = 0x0e;
+    pub const DATA_END: u8 = 0x0f;
+}
+
+/// Reads little-endian fields off the front of a record; every read is checked.
+#[derive(Clone, Copy)]
+pub(super) struct Fields<'a> {
+    pub rest: &'a [u8],
+}
+
+impl<'a> Fields<'a> {
+    pub fn new(rest: &'a [u8]) -> Self {
+        Fields { rest }
+    }
+
+    pub fn array<const N: usize>(&mut self) -> Option<[u8; N]> {
+        let (taken, rest) = self.rest.split_first_chunk::<N>()?;
+        self.rest = rest;
+        Some(*taken)
+    }
+
+    pub fn u16(&mut self) -> Option<u16> {
+        self.array().map(u16::from_le_bytes)
+    }
+
+    pub fn u32(&mut self) -> Option<u32> {
+        self.array().map(u32::from_le_bytes)
+    }
+
+    pub fn u64(&mut self) -> Option<u64> {
+        self.array().map(u64::from_le_bytes)
+    }
+
+    pub fn take(&mut self, length: u64) -> Option<&'a [u8]> {
+        let length = usize::try_from(length).ok()?;
+        let (taken, rest) = self.rest.split_at_checked(length)?;
+        self.rest = rest;
+        Some(taken)
+    }
+
+    /// A text with a 32-bit length; bytes that are not UTF-8 are replaced.
+    pub fn text(&mut self) -> Option<Cow<'a, str>> {
+        let length = self.u32()?;
+        self.take(u64::from(length)).map(String::from_utf8_lossy)
+    }
+
+    /// Steps over a text.
+    pub fn skip_text(&mut self) -> Option<()> {
+        let length = self.u32()?;
+        self.take(u64::from(length)).map(drop)
+    }
+
+    pub fn map(&mut self) -> Option<BTreeMap<String, String>> {
+        let length = self.u32()?;
+        let mut inner = Fields::new(self.take(u64::from(length))?);
+        let mut map = BTreeMap::new();
+        while !inner.rest.is_empty() {
+            let key = inner.text()?.into_owned();
+            map.insert(key, inner.text()?.into_owned());
+        }
+        Some(map)
+    }
+}
+
+/// A schema, wherever in the file it stands.
+#[derive(Clone, Debug, PartialEq)]
+pub(super) struct Schema {
+    pub name: String,
+    pub encoding: String,
+    pub data: Vec<u8>,
+}
+
+/// A channel, wherever in the file it stands.
+#[derive(Clone, Debug, PartialEq)]
+pub(super) struct Channel {
+    pub schema: u16,
+    pub topic: String,
+    pub encoding: String,
+    pub metadata: BTreeMap<String, String>,
+}
+
+/// All schemas and channels by id; the first definition of an id counts, another one that differs is a conflict.
+#[derive(Clone, Debug, Default)]
+pub(super) struct Definitions {
+    pub schemas: BTreeMap<u16, Schema>,
+    pub channels: BTreeMap<u16, Channel>,
+    pub conflicts: u64,
+    pub broken: u64,
+}
+
+impl Definitions {
+    /// Takes in a schema or channel record.
+    pub fn define(&mut self, opcode: u8, body: &[u8]) {
+        let known = match opcode {
+            op::SCHEMA => self.schema(body),
+            op::CHANNEL => self.channel(body),
+            _ => Some(()),
+        };
+        if known.is_none() {
+            self.broken += 1;
+        }
+    }
+
+    fn schema(&mut self, body: &[u8]) -> Option<()> {
+        let mut fields = Fields::new(body);
+        let id = fields.u16()?;
+        let (name, encoding) = (fields.text()?, fields.text()?);
+        let length = fields.u32()?;
+        let data = fields.take(u64::from(length))?;
+        match self.schemas.get(&id) {
+            Some(known) => {
+                if known.name != name || known.encoding != encoding || known.data != data {
+                    self.conflicts += 1;
+                }
+            }
+            None => {
+                let schema = Schema {
+                    name: name.into_owned(),
+                    encoding: encoding.into_owned(),
+                    data: data.to_vec(),
+                };
+                self.schemas.insert(id, schema);
+            }
+        }
+        Some(())
+    }
+
+    fn channel(&mut self, body: &[u8]) -> Option<()> {
+        let mut fields = Fields::new(body);
+        let (id, schema) = (fields.u16()?, fields.u16()?);
+        let (topic, encoding) = (fields.text()?, fields.text()?);
+        let metadata = fields.map()?;
+        match self.channels.get(&id) {
+            Some(known) => {
+                if known.schema != schema || known.topic != topic || known.encoding != encoding {
+                    self.conflicts += 1;
+                }
+            }
+            None => {
+                let channel = Channel {
+                    schema,
+                    topic: topic.into_owned(),
+                    encoding: encoding.into_owned(),
+                    metadata,
+                };
+                self.channels.insert(id, channel);
+            }
+        }
+        Some(())
+    }
+
+    /// Adds what another set defines and this one does not.
+    pub fn merge(&mut self, other: Definitions) {
+        for (id, schema) in other.schemas {
+            match self.schemas.get(&id) {
+                Some(known) => self.conflicts += u64::from(*known != schema),
+                None => drop(self.schemas.insert(id, schema)),
+            }
+        }
+        for (id, channel) in other.channels {
+            match self.channels.get(&id) {
+                Some(known) => self.conflicts += u64::from(*known != channel),
+                None => drop(self.channels.insert(id, channel)),
+            }
+        }
+        self.conflicts += other.conflicts;
+        self.broken += other.broken;
+    }
+}
+
+/// A stretch of the file that holds messages.
+#[derive(Clone, Debug)]
+pub(super) enum Block {
+    /// A chunk: its body, and how many messages its index names (`None` without one).
+    Chunk {
+        body: Range<usize>,
+        indexed: Option<u64>,
+    },
+    /// Records outside chunks.
+    Loose(Range<usize>),
+}
+
+/// What a chunk's header says.
+pub(super) struct ChunkHeader<'a> {
+    pub start_time: u64,
+    pub uncompressed: u64,
+    pub crc: u32,
+    pub compression: &'a [u8],
+    pub records: &'a [u8],
+    /// Bytes after the records, which the format allows.
+    pub spare: usize,
+}
+
+/// Reads a chunk's header; `None` where it does not fit into its record.
+pub(super) fn chunk_header(body: &[u8]) -> Option<ChunkHeader<'_>> {
+    let mut fields = Fields::new(body);
+    let start_time = fields.u64()?;
+    fields.u64()?;
+    let (uncompressed, crc) = (fields.u64()?, fields.u32()?);
+    let length = fields.u32()?;
+    let compression = fields.take(u64::from(length))?;
+    let length = fields.u64()?;
+    let records = fields.take(length)?;
+    Some(ChunkHeader {
+        start_time,
+        uncompressed,
+        crc,
+        compression,
+        records,
+        spare: fields.rest.len(),
+    })
+}
+
+/// An attachment's place in the file.
+#[derive(Clone, Debug)]
+pub(super) struct Attachment {
+    pub name: String,
+    pub media_type: String,
+    pub data: Range<usize>,
+    pub crc_ok: bool,
+}
+
+/// The summary's count of messages.
+#[derive(Clone, Debug, Default)]
+pub(super) struct Statistics {
+    pub messages: u64,
+    pub channels: u64,
+    pub chunks: u64,
+    pub start: u64,
+    pub end: u64,
+    pub per_channel: BTreeMap<u16, u64>,
+}
+
+/// What is wrong with the container: kind, count, text.
+pub(super) type Damage = (Kind, u64, String);
+
+/// The result of the walk.
+#[derive(Default)]
+pub(super) struct Container {
+    pub profile: String,
+    pub library: String,
+    pub blocks: Vec<Block>,
+    pub attachments: Vec<Attachment>,
+    pub metadata: BTreeMap<String, BTreeMap<String, String>>,
+    /// What the summary defines and counts, if there is a summary whose checksum holds.
+    pub summary: Option<(Definitions, Option<Statistics>)>,
+    pub damage: Vec<Damage>,
+    /// The file's end was reached in good order.
+    pub complete: bool,
+}
+
+/// Loose records are cut into stretches of this size, so that they can be read like chunks.
+const LOOSE_BYTES: usize = 1 << 20;
+
+struct Walk<'a> {
+    bytes: &'a [u8],
+    found: Container,
+    summary: Definitions,
+    statistics: Option<Statistics>,
+    data_end: Option<usize>,
+    data_crc: u32,
+    unchecked: bool,
+    footer: Option<(usize, u64, u32)>,
+    unknown: BTreeMap<u8, u64>,
+}
+
+/// Walks over a whole file, which must not be empty; `None` if nothing in it looks like an MCAP.
+pub(super) fn walk(bytes: &[u8]) -> Option<Container> {
+    let magic = bytes.starts_with(MAGIC);
+    let mut walk = Walk {
+        bytes,
+        found: Container::default(),
+        summary: Definitions::default(),
+        statistics: None,
+        data_end: None,
+        data_crc: 0,
+        unchecked: false,
+        footer: None,
+        unknown: BTreeMap::new(),
+    };
+    if !magic {
+        // A damaged first byte should not cost the file: the header record behind it must be sound then.
+        let header = bytes.get(8) == Some(&op::HEADER) && walk.possible(8).is_some();
+        if !header {
+            return None;
+        }
+        walk.damage(
+            Kind::BadRecord,
+            1,
+            "the first eight bytes are damaged".to_owned(),
+        );
+    }
+    walk.records();
+    walk.close();
+    Some(walk.found)
+}
+
+impl Walk<'_> {
+    fn damage(&mut self, kind: Kind, count: u64, text: String) {
+        self.found.damage.push((kind, count, text));
+    }
+
+    /// The end of the record at `at`, if there can be one.
+    fn possible(&self, at: usize) -> Option<usize> {
+        let opcode = *self.bytes.get(at)?;
+        let mut fields = Fields::new(self.bytes.get(at + 1..)?);
+        let length = fields.u64()?;
+        let body = fields.take(length)?;
+        let end = at + 9 + body.len();
+        let mut fields = Fields::new(body);
+        let fits = match opcode {
+            op::HEADER => fields
+                .skip_text()
+                .and_then(|_| fields.skip_text())
+                .is_some(),
+            op::FOOTER => body.len() >= 20,
+            op::SCHEMA => fields
+                .u16()
+                .and_then(|_| fields.skip_text())
+                .and_then(|_| fields.skip_text())
+                .is_some(),
+            op::CHANNEL => fields
+                .u32()
+                .and_then(|_| fields.skip_text())
+                .and_then(|_| fields.skip_text())
+                .is_some(),
+            op::MESSAGE => body.len() >= 22,
+            op::CHUNK => chunk_header(body).is_some(),
+            op::MESSAGE_INDEX => fields
+                .u16()
+                .and_then(|_| fields.u32())
+                .and_then(|length| fields.take(u64::from(length)))
+                .is_some(),
+            op::ATTACHMENT => body.len() >= 8 + 8 + 4 + 4 + 8 + 4,
+            op::METADATA => fields.skip_text().and_then(|_| fields.u32()).is_some(),
+            op::STATISTICS => body.len() >= 42,
+            op::DATA_END => body.len() >= 4,
+            0x08 | 0x0a | 0x0d | op::SUMMARY_OFFSET => true,
+            // Opcodes from 0x80 on are private; those between are unknown, and readers must step over them.
+            _ => opcode != 0,
+        };
+        fits.then_some(end)
+    }
+
+    /// Whether records follow each other from `at`: three possible ones of known kinds, or fewer up to the end of the file.
+    fn plausible(&self, mut at: usize) -> bool {
+        for _ in 0..3 {
+            if self.bytes.len() - at == MAGIC.len() && self.bytes.ends_with(MAGIC) {
+                return true;
+            }
+            if !(1..=0x0f).contains(&self.bytes[at]) {
+                return false;
+            }
+            match self.possible(at) {
+                Some(end) if end < self.bytes.len() => at = end,
+                Some(_) => return true,
+                None => return false,
+            }
+        }
+        true
+    }
+
+    /// The next place after `from` where records follow each other.
+    fn resync(&self, from: usize) -> Option<usize> {
+        (from..self.bytes.len().saturating_sub(9)).find(|&at| {
+            // Lengths of more than four gigabytes are not believed here; the test also makes the search quick.
+            (1..=0x0f).contains(&self.bytes[at])
+                && self.bytes[at + 5..at + 9] == [0; 4]
+                && self.plausible(at)
+        })
+    }
+
+    /// Whether the record at `at` vouches for its own length: its inner lengths use it up.
+    fn tight(&self, at: usize, end: usize) -> bool {
+        let body = &self.bytes[at + 9..end];
+        match self.bytes[at] {
+            op::CHUNK => chunk_header(body).is_some_and(|header| header.spare == 0),
+            op::MESSAGE_INDEX => {
+                body.get(2..6)
+                    .and_then(|length| length.try_into().ok())
+                    .map(u32::from_le_bytes)
+                    == u32::try_from(body.len() - 6).ok()
+            }
+            _ => false,
+        }
+    }
+
+    fn records(&mut self) {
+        let end_of_file = self.bytes.len();
+        let mut at = MAGIC.len();
+        while at < end_of_file {
+            if self.footer.is_some() {
+                self.closing(at);
+                return;
+            }
+            let next = match self.possible(at) {
+                Some(end) => {
+                    let believed = end == end_of_file
+                        || self.bytes[at] == op::FOOTER
+                        || self.possible(end).is_some()
+                        || self.tight(at, end);
+                    // A record that leads nowhere is sound where nothing better begins inside it.
+                    match if believed { None } else { self.resync(at + 9) } {
+                        Some(next) if next < end => Some(next),
+                        _ => {
+                            self.record(at, end);
+                            at = end;
+                            continue;
+                        }
+                    }
+                }
+                None => self.resync(at + 1),
+            };
+            let Some(next) = next else {
+                self.cut(at);
+                return;
+            };
+            let kind = if self.data_end.is_some() {
+                Kind::BadSummary
+            } else {
+                Kind::BadRecord
+            };
+            self.damage(
+                kind,
+                1,
+                format!(
+                    "{} bytes at byte {at} are no record and were left out",
+                    next - at
+                ),
+            );
+            at = next;
+        }
+        if self.footer.is_none() {
+            self.cut(at);
+        } else {
+            self.closing(at);
+        }
+    }
+
+    /// The file stops at `at`, before its closing records.
+    fn cut(&mut self, at: usize) {
+        let left = self.bytes.len() - at;
+        let what = match self.bytes.get(at) {
+            Some(&op::CHUNK) => "a chunk",
+            Some(&op::MESSAGE) => "a message",
+            Some(&op::ATTACHMENT) => "an attachment",
+            _ => "a record",
+        };
+        let (kind, text) = match (self.data_end, left) {
+            (Some(_), _) => (
+                Kind::BadSummary,
+                "the file ends inside its summary; its messages are all there".to_owned(),
+            ),
+            (None, 0) => (
+                Kind::Truncated,
+                "the file ends without its closing records; what came after is lost".to_owned(),
+            ),
+            (None, _) => (
+                Kind::Truncated,
+                format!(
+                    "the file ends inside {what}: its last {left} bytes, from byte {at} on, were left out"
+                ),
+            ),
+        };
+        self.damage(kind, 1, text);
+    }
+
+    /// What stands after the footer.
+    fn closing(&mut self, at: usize) {
+        let rest = &self.bytes[at..];
+        self.found.complete = rest == MAGIC;
+        if !self.found.complete {
+            let text = match rest.strip_prefix(MAGIC) {
+                Some(more) => format!(
+                    "{} bytes follow the end of the recording and were left out",
+                    more.len()
+                ),
+                None => {
+                    "the closing eight bytes are damaged or missing; the messages are all there"
+                        .to_owned()
+                }
+            };
+            self.damage(Kind::BadSummary, 1, text);
+        }
+    }
+
+    fn record(&mut self, at: usize, end: usize) {
+        let opcode = self.bytes[at];
+        let body = at + 9..end;
+        let bytes = self.bytes;
+        let mut fields = Fields::new(&bytes[body.clone()]);
+        match opcode {
+            op::HEADER => {
+                let (profile, library) = (fields.text(), fields.text());
+                self.found.profile = profile.unwrap_or_default().into_owned();
+                self.found.library = library.unwrap_or_default().into_owned();
+            }
+            op::SCHEMA | op::CHANNEL if self.data_end.is_some() => {
+                self.summary.define(opcode, &bytes[body])
+            }
+            op::SCHEMA | op::CHANNEL | op::MESSAGE => {
+                self.unchecked |= opcode == op::MESSAGE;
+                match self.found.blocks.last_mut() {
+                    Some(Block::Loose(range)) if range.end == at && range.len() < LOOSE_BYTES => {
+                        range.end = end
+                    }
+                    _ => self.found.blocks.push(Block::Loose(at..end)),
+                }
+            }
+            op::CHUNK => {
+                self.unchecked |=
+                    chunk_header(&bytes[body.clone()]).is_some_and(|header| header.crc == 0);
+                self.found.blocks.push(Block::Chunk {
+                    body,
+                    indexed: None,
+                });
+            }
+            op::MESSAGE_INDEX => {
+                if let (Some(Block::Chunk { indexed, .. }), Some(_), Some(length)) =
+                    (self.found.blocks.last_mut(), fields.u16(), fields.u32())
+                {
+                    *indexed.get_or_insert(0) += u64::from(length / 16);
+                }
+            }
+            op::ATTACHMENT => self.attachment(body),
+            op::METADATA => {
+                if let (Some(name), Some(map)) = (fields.text(), fields.map()) {
+                    self.found
+                        .metadata
+                        .entry(name.into_owned())
+                        .or_default()
+                        .extend(map);
+                } else {
+                    self.damage(
+                        Kind::BadRecord,
+                        1,
+                        format!("the metadata record at byte {at} cannot be read"),
+                    );
+                }
+            }
+            op::STATISTICS => self.statistics = statistics(fields),
+            op::DATA_END => {
+                self.data_end = Some(at);
+                self.data_crc = fields.u32().unwrap_or(0);
+            }
+            op::FOOTER => {
+                if let (Some(start), Some(_), Some(crc)) =
+                    (fields.u64(), fields.u64(), fields.u32())
+                {
+                    self.footer = Some((at, start, crc));
+                }
+            }
+            0x10..=0x7f => *self.unknown.entry(opcode).or_default() += 1,
+            _ => {}
+        }
+    }
+
+    fn attachment(&mut self, body: Range<usize>) {
+        let bytes = &self.bytes[body.clone()];
+        let mut fields = Fields::new(bytes);
+        let parsed = (|| {
+            fields.u64()?;
+            fields.u64()?;
+            let (name, media_type) = (fields.text()?.into_owned(), fields.text()?.into_owned());
+            let length = fields.u64()?;
+            let start = body.start + (bytes.len() - fields.rest.len());
+            let data = fields.take(length)?;
+            let checked = bytes.len() - fields.rest.len();
+            let crc = fields.u32()?;
+            let crc_ok = crc == 0 || crc32fast::hash(&bytes[..checked]) == crc;
+            Some(Attachment {
+                name,
+                media_type,
+                data: start..start + data.len(),
+                crc_ok,
+            })
+        })();
+        match parsed {
+            Some(attachment) => {
+                if !attachment.crc_ok {
+                    self.damage(
+                        Kind::BadCrc,
+                        1,
+                        format!(
+                            "the attachment {:?} does not match its checksum",
+                            attachment.name
+                        ),
+                    );
+                }
+                self.found.attachments.push(attachment);
+            }
+            None => self.damage(
+                Kind::BadRecord,
+                1,
+                format!("the attachment at byte {} cannot be read", body.start - 9),
+            ),
+        }
+    }
+
+    /// What can be said only at the end: unknown records, checksums, the summary.
+    fn close(&mut self) {
+        for (opcode, count) in std::mem::take(&mut self.unknown) {
+            self.damage(
+                Kind::BadRecord,
+                count,
+                format!("{count} records of the unknown kind 0x{opcode:02x} were stepped over"),
+            );
+        }
+        // Chunks carry their own checksum; the one over all data matters where something stands outside them.
+        if let Some(end) = self.data_end
+            && self.data_crc != 0
+            && self.unchecked
+            && crc32fast::hash(&self.bytes[..end]) != self.data_crc
+        {
+            self.damage(Kind::BadCrc, 1, "the data do not match their checksum: numbers in messages outside chunks may be wrong".to_owned());
+        }
+        let Some((footer, start, crc)) = self.footer else {
+            return;
+        };
+        let start = usize::try_from(start).unwrap_or(usize::MAX);
+        if start == 0 {
+            return; // The file was written without a summary.
+        }
+        // The checksum covers the summary and the footer up to itself.
+        let covered = self.bytes.get(start..footer + 9 + 16);
+        if crc != 0 && covered.is_none_or(|covered| crc32fast::hash(covered) != crc) {
+            self.damage(
+                Kind::BadSummary,
+                1,
+                "the summary does not match its checksum and was not used".to_owned(),
+            );
+            return;
+        }
+        self.found.summary = Some((std::mem::take(&mut self.summary), self.statistics.take()));
+    }
+}
+
+fn statistics(mut fields: Fields<'_>) -> Option<Statistics> {
+    let messages = fields.u64()?;
+    fields.u16()?;
+    let channels = u64::from(fields.u32()?);
+    fields.u32()?;
+    fields.u32()?;
+    let chunks = u64::from(fields.u32()?);
+    let (start, end) = (fields.u64()?, fields.u64()?);
+    let length = fields.u32()?;
+    let mut counts = Fields::new(fields.take(u64::from(length))?);
+    let mut per_channel = BTreeMap::new();
+    while !counts.rest.is_empty() {
+        let id = counts.u16()?;
+        per_channel.insert(id, counts.u64()?);
+    }
+    Some(Statistics {
+        messages,
+        channels,
+        chunks,
+        start,
+        end,
+        per_channel,
+    })
+}

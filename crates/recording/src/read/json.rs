@@ -1,0 +1,247 @@
+//! JSON messages (`json`), with a JSON Schema or none: every number and truth value is a signal.
+
+use serde::de::{DeserializeSeed, IgnoredAny, MapAccess, SeqAccess, Visitor};
+
+use super::{
+    decode::{Decoder, SchemaRef},
+    rows::{Rows, UNWANTED},
+};
+
+struct Json {
+    root: Node,
+    pending: Vec<(u32, f64)>,
+}
+
+/// One place in the document: what has been seen there.
+#[derive(Default)]
+struct Node {
+    field: String,
+    column: Option<u32>,
+    children: Vec<(String, Node)>,
+    items: Vec<Node>,
+}
+
+pub(super) fn open(schema: &SchemaRef<'_>, rows: &mut Rows) -> Result<Box<dyn Decoder>, String> {
+    if schema.encoding == "jsonschema"
+        && let Err(problem) = serde_json::from_slice::<IgnoredAny>(schema.data)
+    {
+        rows.remark = Some(format!(
+            "its JSON Schema is not JSON ({problem}); the messages are read without it"
+        ));
+    }
+    Ok(Box::new(Json {
+        root: Node::default(),
+        pending: Vec::new(),
+    }))
+}
+
+impl Decoder for Json {
+    fn decode(&mut self, message: &[u8], rows: &mut Rows) -> Result<(), String> {
+        self.pending.clear();
+        let mut stamp = Stamp::default();
+        let mut deserializer = serde_json::Deserializer::from_slice(message);
+        let place = Place {
+            node: &mut self.root,
+            rows,
+            pending: &mut self.pending,
+            stamp: &mut stamp,
+        };
+        place
+            .deserialize(&mut deserializer)
+            .and_then(|()| deserializer.end())
+            .map_err(|problem| format!("JSON message of {} bytes: {problem}", message.len()))?;
+        for &(column, value) in &self.pending {
+            rows.push(column, value);
+        }
+        rows.stamp_ns = stamp.ns();
+        Ok(())
+    }
+}
+
+/// Seconds and nanoseconds of the header's stamp, or of a `timestamp`.
+#[derive(Default)]
+struct Stamp {
+    seconds: Option<f64>,
+    nanoseconds: f64,
+}
+
+impl Stamp {
+    fn ns(&self) -> Option<i64> {
+        let seconds = self.seconds?;
+        // OK because a cast of a double saturates.
+        Some(
+            (seconds as i64)
+                .saturating_mul(1_000_000_000)
+                .saturating_add(self.nanoseconds as i64),
+        )
+    }
+
+    fn see(&mut self, field: &str, value: f64) {
+        match field {
+            "header.stamp.sec" | "timestamp.sec" | "header.stamp.secs" => {
+                self.seconds = Some(value)
+            }
+            "header.stamp.nanosec"
+            | "header.stamp.nsec"
+            | "timestamp.nsec"
+            | "header.stamp.nsecs" => self.nanoseconds = value,
+            _ => {}
+        }
+    }
+}
+
+struct Place<'a, 'r> {
+    node: &'a mut Node,
+    rows: &'a mut Rows<'r>,
+    pending: &'a mut Vec<(u32, f64)>,
+    stamp: &'a mut Stamp,
+}
+
+impl Place<'_, '_> {
+    fn number(self, value: f64) {
+        let column = *self
+            .node
+            .column
+            .get_or_insert_with(|| self.rows.column(&self.node.field));
+        if column != UNWANTED {
+            self.pending.push((column, value));
+        }
+        self.stamp.see(&self.node.field, value);
+    }
+}
+
+impl<'de> DeserializeSeed<'de> for Place<'_, '_> {
+    type Value = ();
+
+    fn deserialize<D: serde::Deserializer<'de>>(self, deserializer: D) -> Result<(), D::Error> {
+        deserializer.deserialize_any(self)
+    }
+}
+
+impl<'de> Visitor<'de> for Place<'_, '_> {
+    type Value = ();
+
+    fn expecting(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.write_str("any JSON value")
+    }
+
+    fn visit_bool<E>(self, value: bool) -> Result<(), E> {
+        self.number(f64::from(u8::from(value)));
+        Ok(())
+    }
+
+    fn visit_i64<E>(self, value: i64) -> Result<(), E> {
+        self.number(value as f64);
+        Ok(())
+    }
+
+    fn visit_u64<E>(self, value: u64) -> Result<(), E> {
+        self.number(value as f64);
+        Ok(())
+    }
+
+    fn visit_f64<E>(self, value: f64) -> Result<(), E> {
+        self.number(value);
+        Ok(())
+    }
+
+    fn visit_str<E>(self, _: &str) -> Result<(), E> {
+        Ok(())
+    }
+
+    fn visit_unit<E>(self) -> Result<(), E> {
+        Ok(())
+    }
+
+    fn visit_map<A: MapAccess<'de>>(self, mut map: A) -> Result<(), A::Error> {
+        let Place {
+            node,
+            rows,
+            pending,
+            stamp,
+        } = self;
+        // Keys mostly come in the same order, so the next one is tried first.
+        let mut hint = 0;
+        while let Some(key) = map.next_key::<std::borrow::Cow<'_, str>>()? {
+            let position = match node.children.get(hint) {
+                Some((known, _)) if *known == key => Some(hint),
+                _ => node.children.iter().position(|(known, _)| *known == key),
+            };
+            let position = match position {
+                Some(position) => position,
+                None if node.children.len() >= MAX_KEYS => {
+                    map.next_value::<IgnoredAny>()?;
+                    rows.note_long(&node.field);
+                    continue;
+                }
+                None => {
+                    let field = if node.field.is_empty() {
+                        key.to_string()
+                    } else {
+                        format!("{}.{key}", node.field)
+                    };
+                    node.children.push((
+                        key.into_owned(),
+                        Node {
+                            field,
+                            ..Node::default()
+                        },
+                    ));
+                    node.children.len() - 1
+                }
+            };
+            hint = position + 1;
+            let child = &mut node.children[position].1;
+            map.next_value_seed(Place {
+                node: child,
+                rows,
+                pending,
+                stamp,
+            })?;
+        }
+        Ok(())
+    }
+
+    fn visit_seq<A: SeqAccess<'de>>(self, mut seq: A) -> Result<(), A::Error> {
+        let Place {
+            node,
+            rows,
+            pending,
+            stamp,
+        } = self;
+        let before = pending.len();
+        let mut item = 0;
+        loop {
+            if item >= rows.max_items {
+                if seq.next_element::<IgnoredAny>()?.is_none() {
+                    break;
+                }
+                if item == rows.max_items {
+                    rows.note_long(&node.field);
+                    pending.truncate(before);
+                }
+            } else {
+                if node.items.len() <= item {
+                    node.items.push(Node {
+                        field: format!("{}[{item}]", node.field),
+                        ..Node::default()
+                    });
+                }
+                let place = Place {
+                    node: &mut node.items[item],
+                    rows,
+                    pending,
+                    stamp,
+                };
+                if seq.next_element_seed(place)?.is_none() {
+                    break;
+                }
+            }
+            item += 1;
+        }
+        Ok(())
+    }
+}
+
+/// A document that never stops inventing keys would otherwise grow without end.
+const MAX_KEYS: usize = 4096;

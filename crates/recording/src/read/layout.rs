@@ -1,0 +1,582 @@
+//! A message type compiled to where its numbers lie: the decoder of ROS 1, ROS 2 CDR and IDL messages.
+//!
+//! Fields of fixed size that follow each other are one *run*. Where in the run each lies depends only on the alignment of the run's
+//! start, so every run has at most eight tables of offsets, made when first needed; a run is checked against the message's end once.
+//! Between runs stand the things of varying length: strings, sequences, arrays of structs that hold either.
+
+use super::{
+    rows::{Rows, UNWANTED},
+    types::{Prim, Type, Types},
+};
+
+/// How the bytes are laid out.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) struct Shape {
+    pub big_endian: bool,
+    /// Numbers are aligned to their size, but to no more than this: 8 in XCDR1, 4 in XCDR2, 1 in ROS 1.
+    pub max_align: usize,
+    /// Arrays and sequences of structs and strings begin with their size in bytes (XCDR2).
+    pub collection_headers: bool,
+    /// Bytes per character of a wide string.
+    pub wide: usize,
+    /// A struct without fields takes one byte (ROS 2).
+    pub empty_takes_byte: bool,
+}
+
+/// Why a message could not be decoded.
+#[derive(Debug, PartialEq)]
+pub(super) struct Fail {
+    /// Byte at which it stopped, counted from after the representation header.
+    pub at: usize,
+    /// The field that it was reading.
+    pub field: String,
+    /// What was wrong.
+    pub problem: Problem,
+}
+
+#[derive(Debug, PartialEq)]
+pub(super) enum Problem {
+    /// The message ends before the field does.
+    Short,
+    /// Anything else, in words.
+    Other(&'static str),
+}
+
+/// Where a number of a run goes.
+#[derive(Clone, Copy, Debug, PartialEq)]
+enum Sink {
+    Nowhere,
+    Column(u32),
+    StampSeconds,
+    StampNanoseconds,
+    /// First element of a covariance: −1 says that the field is not given. Index into the program's fields.
+    Covariance(u32),
+}
+
+#[derive(Clone, Debug)]
+struct RunField {
+    prim: Prim,
+    count: usize,
+    sinks: [Sink; 2],
+    name: String,
+}
+
+#[derive(Clone, Copy, Debug)]
+struct Load {
+    offset: u32,
+    prim: Prim,
+    sink: Sink,
+}
+
+/// Offsets for one alignment of a run's start.
+#[derive(Clone, Debug, Default)]
+struct Table {
+    /// Doubles that go to columns, the bulk of most messages: offset and column.
+    doubles: Vec<(u32, u32)>,
+    others: Vec<Load>,
+    length: usize,
+}
+
+#[derive(Clone, Debug, Default)]
+struct Run {
+    fields: Vec<RunField>,
+    tables: [Option<Box<Table>>; 8],
+}
+
+#[derive(Clone, Debug)]
+enum Op {
+    Run(Run),
+    Text(String),
+    WideText(String),
+    Sequence(Box<Items>),
+    /// An array whose items vary in length.
+    Array(Box<Items>, usize),
+}
+
+/// The items of a sequence or array.
+#[derive(Clone, Debug)]
+struct Items {
+    field: String,
+    kind: Type,
+    /// Size of an item that is a number; such items are skipped without being looked at.
+    prim: Option<Prim>,
+    header: bool,
+    /// Programs of the items seen so far.
+    programs: Vec<Program>,
+    /// Walks over an item without taking anything.
+    skip: Option<Box<Program>>,
+}
+
+/// A compiled type in one shape.
+#[derive(Clone, Debug, Default)]
+pub(super) struct Program {
+    ops: Vec<Op>,
+    covariances: Vec<String>,
+}
+
+/// More fields than this in one message type are refused: a schema could otherwise multiply arrays of arrays without end.
+const MAX_FIELDS: usize = 100_000;
+
+struct Compiler<'a, 'r> {
+    types: &'a Types,
+    shape: Shape,
+    take: bool,
+    rows: &'a mut Rows<'r>,
+    program: Program,
+    run: Run,
+    fields: usize,
+}
+
+impl Program {
+    /// Compiles the message type: the first struct of `types`.
+    pub fn message(types: &Types, shape: Shape, rows: &mut Rows) -> Result<Self, String> {
+        compile(types, &Type::Struct(0), "", shape, rows, true)
+    }
+
+    /// Decodes `data` from `at`, aligned from the slice's start, and returns where it ended.
+    pub fn run(
+        &mut self,
+        types: &Types,
+        shape: Shape,
+        data: &[u8],
+        mut at: usize,
+        rows: &mut Rows,
+    ) -> Result<usize, Fail> {
+        for op in &mut self.ops {
+            at = match op {
+                Op::Run(run) if shape.big_endian => {
+                    run.read::<true>(shape, data, at, rows, &self.covariances)?
+                }
+                Op::Run(run) => run.read::<false>(shape, data, at, rows, &self.covariances)?,
+                Op::Text(field) => {
+                    let (length, at) = read_length(shape, data, at, field)?;
+                    end_of(data, at, length, field)?
+                }
+                Op::WideText(field) => {
+                    let (length, at) = read_length(shape, data, at, field)?;
+                    let bytes = length
+                        .checked_mul(shape.wide)
+                        .ok_or_else(|| short(at, field))?;
+                    end_of(data, at, bytes, field)?
+                }
+                Op::Sequence(items) => {
+                    let start = items.header(shape, data, at)?;
+                    let (count, at) = read_length(shape, data, start, &items.field)?;
+                    items.read(types, shape, data, at, count, rows)?
+                }
+                Op::Array(items, count) => {
+                    let at = items.header(shape, data, at)?;
+                    items.read(types, shape, data, at, *count, rows)?
+                }
+            };
+        }
+        Ok(at)
+    }
+}
+
+fn compile(
+    types: &Types,
+    kind: &Type,
+    field: &str,
+    shape: Shape,
+    rows: &mut Rows,
+    take: bool,
+) -> Result<Program, String> {
+    let mut compiler = Compiler {
+        types,
+        shape,
+        take,
+        rows,
+        program: Program::default(),
+        run: Run::default(),
+        fields: 0,
+    };
+    compiler.add(kind, field, Role::Plain)?;
+    compiler.close_run();
+    Ok(compiler.program)
+}
+
+/// What a field means beyond its type.
+#[derive(Clone, Copy, PartialEq)]
+enum Role {
+    Plain,
+    /// The header of the message.
+    Header,
+    /// The stamp in the header.
+    Stamp,
+    StampSeconds,
+    StampNanoseconds,
+}
+
+impl Compiler<'_, '_> {
+    fn add(&mut self, kind: &Type, field: &str, role: Role) -> Result<(), String> {
+        self.fields += 1;
+        if self.fields > MAX_FIELDS {
+            return Err(format!(
+                "the message type has more than {MAX_FIELDS} fields"
+            ));
+        }
+        match kind {
+            Type::Prim(prim) => self.number(*prim, 1, field, role),
+            Type::Text => self.push(Op::Text(field.to_owned())),
+            Type::WideText => self.push(Op::WideText(field.to_owned())),
+            Type::Struct(index) => {
+                let types = self.types;
+                let fields = &types.structs[*index].fields;
+                let name = &types.structs[*index].name;
+                if fields.is_empty() && self.shape.empty_takes_byte {
+                    self.run.fields.push(RunField {
+                        prim: Prim::U8,
+                        count: 1,
+                        sinks: [Sink::Nowhere; 2],
+                        name: field.to_owned(),
+                    });
+                }
+                // A message that is a header is stamped too.
+                let header =
+                    role == Role::Header || (field.is_empty() && name.ends_with("/Header"));
+                for (inner, kind) in fields {
+                    let role = match inner.as_str() {
+                        "header" if field.is_empty() => Role::Header,
+                        "stamp" if header => Role::Stamp,
+                        "sec" if role == Role::Stamp => Role::StampSeconds,
+                        "nanosec" | "nsec" if role == Role::Stamp => Role::StampNanoseconds,
+                        _ => Role::Plain,
+                    };
+                    let path = if field.is_empty() {
+                        inner.clone()
+                    } else {
+                        format!("{field}.{inner}")
+                    };
+                    self.add(kind, &path, role)?;
+                }
+            }
+            Type::Array(inner, count) => self.array(inner, *count, field)?,
+            Type::Sequence(inner) => {
+                let items = self.items(inner, field);
+                self.push(Op::Sequence(items));
+            }
+        }
+        Ok(())
+    }
+
+    fn number(&mut self, prim: Prim, count: usize, field: &str, role: Role) {
+        let mut sinks = [Sink::Nowhere; 2];
+        if self.take && count == 1 {
+            let column = self.rows.column(field);
+            if column != UNWANTED {
+                sinks[0] = Sink::Column(column);
+            }
+            sinks[1] = match role {
+                Role::StampSeconds => Sink::StampSeconds,
+                Role::StampNanoseconds => Sink::StampNanoseconds,
+                _ => Sink::Nowhere,
+            };
+        }
+        self.run.fields.push(RunField {
+            prim,
+            count,
+            sinks,
+            name: field.to_owned(),
+        });
+    }
+
+    fn array(&mut self, inner: &Type, count: usize, field: &str) -> Result<(), String> {
+        let items_wanted = self.take && count <= self.rows.max_items;
+        if let Type::Prim(prim) = inner {
+            if !items_wanted {
+                if count > 0 {
+                    self.number(*prim, count, field, Role::Plain);
+                }
+                if self.take && self.rows.column(&format!("{field}[0]")) != UNWANTED {
+                    self.rows.note_long(field);
+                }
+                return Ok(());
+            }
+            for item in 0..count {
+                self.fields += 1;
+                self.number(*prim, 1, &format!("{field}[{item}]"), Role::Plain);
+            }
+            // ROS says with −1 in a covariance's first element that its field is not given.
+            if let (Some(given), Prim::F64, Some(first)) = (
+                field.strip_suffix("_covariance"),
+                prim,
+                self.run.fields.len().checked_sub(count.max(1)),
+            ) && count > 0
+            {
+                self.run.fields[first].sinks[1] =
+                    Sink::Covariance(self.program.covariances.len() as u32);
+                self.program.covariances.push(given.to_owned());
+            }
+            return Ok(());
+        }
+        let headed = self.shape.collection_headers && has_header(inner);
+        if items_wanted && !headed {
+            for item in 0..count {
+                self.add(inner, &format!("{field}[{item}]"), Role::Plain)?;
+            }
+            return Ok(());
+        }
+        let items = self.items(inner, field);
+        self.push(Op::Array(items, count));
+        Ok(())
+    }
+
+    fn items(&self, inner: &Type, field: &str) -> Box<Items> {
+        Box::new(Items {
+            field: field.to_owned(),
+            kind: inner.clone(),
+            prim: match inner {
+                Type::Prim(prim) => Some(*prim),
+                _ => None,
+            },
+            header: self.shape.collection_headers && has_header(inner),
+            programs: Vec::new(),
+            skip: None,
+        })
+    }
+
+    fn push(&mut self, op: Op) {
+        self.close_run();
+        self.program.ops.push(op);
+    }
+
+    fn close_run(&mut self) {
+        if !self.run.fields.is_empty() {
+            self.program
+                .ops
+                .push(Op::Run(std::mem::take(&mut self.run)));
+        }
+    }
+}
+
+fn has_header(kind: &Type) -> bool {
+    !matches!(kind, Type::Prim(_))
+}
+
+impl Items {
+    /// Steps over the size that XCDR2 puts before collections of non-numbers.
+    fn header(&self, shape: Shape, data: &[u8], at: usize) -> Result<usize, Fail> {
+        if !self.header {
+            return Ok(at);
+        }
+        let (_, at) = read_length(shape, data, at, &self.field)?;
+        Ok(at)
+    }
+
+    fn read(
+        &mut self,
+        types: &Types,
+        shape: Shape,
+        data: &[u8],
+        mut at: usize,
+        count: usize,
+        rows: &mut Rows,
+    ) -> Result<usize, Fail> {
+        let wanted = count <= rows.max_items;
+        if !wanted {
+            rows.note_long(&self.field);
+        }
+        if let (Some(prim), false) = (self.prim, wanted) {
+            let start = align(at, prim.size(), shape);
+            let bytes = count
+                .checked_mul(prim.size())
+                .ok_or_else(|| short(at, &self.field))?;
+            return end_of(data, start, bytes, &self.field);
+        }
+        for item in 0..count {
+            let before = at;
+            if wanted {
+                while self.programs.len() <= item {
+                    let field = format!("{}[{}]", self.field, self.programs.len());
+                    let program = compile(types, &self.kind, &field, shape, rows, true);
+                    self.programs.push(
+                        program.map_err(|_| {
+                            other(at, &self.field, "its items have too many fields")
+                        })?,
+                    );
+                }
+                at = self.programs[item].run(types, shape, data, at, rows)?;
+            } else {
+                let skip = match &mut self.skip {
+                    Some(skip) => skip,
+                    none => {
+                        let program = compile(types, &self.kind, &self.field, shape, rows, false);
+                        none.insert(Box::new(program.map_err(|_| {
+                            other(at, &self.field, "its items have too many fields")
+                        })?))
+                    }
+                };
+                at = skip.run(types, shape, data, at, rows)?;
+                if at == before {
+                    break; // Items without bytes: the rest is as empty.
+                }
+            }
+        }
+        Ok(at)
+    }
+}
+
+impl Run {
+    #[inline]
+    fn read<const BIG: bool>(
+        &mut self,
+        shape: Shape,
+        data: &[u8],
+        at: usize,
+        rows: &mut Rows,
+        covariances: &[String],
+    ) -> Result<usize, Fail> {
+        let phase = at % 8;
+        if self.tables[phase].is_none() {
+            self.tables[phase] = Some(Box::new(self.table(shape, phase)));
+        }
+        let Some(table) = &self.tables[phase] else {
+            return Ok(at);
+        };
+        let Some(bytes) = data.get(at..at + table.length) else {
+            return Err(self.name_shortfall(shape, data.len(), at));
+        };
+        for &(offset, column) in &table.doubles {
+            rows.push(
+                column,
+                f64::from_bits(load::<8, BIG>(bytes, offset as usize)),
+            );
+        }
+        for load in &table.others {
+            let value = read::<BIG>(load.prim, bytes, load.offset as usize);
+            match load.sink {
+                Sink::Column(column) => rows.push(column, value),
+                // OK because these fields are 32-bit integers, which doubles hold exactly.
+                Sink::StampSeconds => {
+                    rows.stamp_ns = Some(
+                        rows.stamp_ns
+                            .unwrap_or(0)
+                            .wrapping_add((value as i64).wrapping_mul(1_000_000_000)),
+                    );
+                }
+                Sink::StampNanoseconds => {
+                    rows.stamp_ns = Some(rows.stamp_ns.unwrap_or(0).wrapping_add(value as i64))
+                }
+                Sink::Covariance(field) if value == -1.0 => {
+                    rows.note_absent(&covariances[field as usize])
+                }
+                Sink::Covariance(_) | Sink::Nowhere => {}
+            }
+        }
+        Ok(at + table.length)
+    }
+
+    fn table(&self, shape: Shape, phase: usize) -> Table {
+        let mut table = Table::default();
+        let mut at = phase;
+        for field in &self.fields {
+            at = align(at, field.prim.size(), shape);
+            // OK because a type has at most MAX_FIELDS fields and arrays that are not taken have no load.
+            let offset = (at - phase) as u32;
+            for sink in field.sinks {
+                match sink {
+                    Sink::Nowhere => {}
+                    Sink::Column(column) if field.prim == Prim::F64 => {
+                        table.doubles.push((offset, column))
+                    }
+                    sink => table.others.push(Load {
+                        offset,
+                        prim: field.prim,
+                        sink,
+                    }),
+                }
+            }
+            at = at.saturating_add(field.prim.size().saturating_mul(field.count));
+        }
+        table.length = at - phase;
+        table
+    }
+
+    /// Finds the field at which a message of `length` bytes ends too soon.
+    fn name_shortfall(&self, shape: Shape, length: usize, start: usize) -> Fail {
+        let mut at = start;
+        for field in &self.fields {
+            at = align(at, field.prim.size(), shape)
+                .saturating_add(field.prim.size().saturating_mul(field.count));
+            if at > length {
+                return short(length, &field.name);
+            }
+        }
+        short(length, "the end")
+    }
+}
+
+#[inline]
+fn align(at: usize, size: usize, shape: Shape) -> usize {
+    at.next_multiple_of(size.min(shape.max_align))
+}
+
+fn short(at: usize, field: &str) -> Fail {
+    Fail {
+        at,
+        field: field.to_owned(),
+        problem: Problem::Short,
+    }
+}
+
+fn other(at: usize, field: &str, what: &'static str) -> Fail {
+    Fail {
+        at,
+        field: field.to_owned(),
+        problem: Problem::Other(what),
+    }
+}
+
+fn end_of(data: &[u8], at: usize, bytes: usize, field: &str) -> Result<usize, Fail> {
+    match at.checked_add(bytes) {
+        Some(end) if end <= data.len() => Ok(end),
+        _ => Err(short(data.len(), field)),
+    }
+}
+
+/// A 32-bit length and the place after it.
+#[inline]
+fn read_length(shape: Shape, data: &[u8], at: usize, field: &str) -> Result<(usize, usize), Fail> {
+    let at = align(at, 4, shape);
+    let Some(bytes) = data.get(at..at + 4) else {
+        return Err(short(data.len(), field));
+    };
+    let bits = if shape.big_endian {
+        load::<4, true>(bytes, 0)
+    } else {
+        load::<4, false>(bytes, 0)
+    };
+    Ok((bits as usize, at + 4))
+}
+
+/// `N` bytes at `offset` as an unsigned integer. The caller has checked the run's length; a wrong offset would panic, never read outside.
+#[inline]
+fn load<const N: usize, const BIG: bool>(bytes: &[u8], offset: usize) -> u64 {
+    let mut word = [0u8; 8];
+    if BIG {
+        word[8 - N..].copy_from_slice(&bytes[offset..offset + N]);
+        u64::from_be_bytes(word)
+    } else {
+        word[..N].copy_from_slice(&bytes[offset..offset + N]);
+        u64::from_le_bytes(word)
+    }
+}
+
+/// A number as a double: integers beyond 2⁵³ are rounded.
+#[inline]
+fn read<const BIG: bool>(prim: Prim, bytes: &[u8], at: usize) -> f64 {
+    match prim {
+        Prim::Bool => f64::from(u8::from(bytes[at] != 0)),
+        Prim::U8 => f64::from(bytes[at]),
+        Prim::I8 => f64::from(bytes[at] as i8),
+        Prim::U16 => load::<2, BIG>(bytes, at) as f64,
+        Prim::I16 => f64::from(load::<2, BIG>(bytes, at) as i16),
+        Prim::U32 => load::<4, BIG>(bytes, at) as f64,
+        Prim::I32 => f64::from(load::<4, BIG>(bytes, at) as i32),
+        Prim::U64 => load::<8, BIG>(bytes, at) as f64,
+        Prim::I64 => load::<8, BIG>(bytes, at) as i64 as f64,
+        Prim::F32 => f64::from(f32::from_bits(load::<4, BIG>(bytes, at) as u32)),
+        Prim::F64 => f64::from_bits(load::<8, BIG>(bytes, at)),
+    }
+}

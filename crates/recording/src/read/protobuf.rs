@@ -1,0 +1,676 @@
+//! Protobuf messages, laid out by the `FileDescriptorSet` in the file: every number, truth value and enum is a signal.
+//!
+//! A plan per message type says what each field number holds. Values wait in the plan until the message is whole, because fields may
+//! come in any order and more than once (the last one counts), and fields that are not there have the value zero where proto3 says so.
+
+use std::collections::HashSet;
+
+use prost::Message as _;
+use prost_reflect::{DescriptorPool, FieldDescriptor, Kind as FieldKind, MessageDescriptor};
+
+use super::{
+    decode::{Decoder, SchemaRef},
+    rows::{Rows, UNWANTED},
+};
+
+/// Messages nested deeper than this are refused.
+const MAX_DEPTH: usize = 64;
+
+struct Protobuf {
+    root: Node,
+}
+
+pub(super) fn open(schema: &SchemaRef<'_>, rows: &mut Rows) -> Result<Box<dyn Decoder>, String> {
+    let descriptor = descriptor(schema)?;
+    Ok(Box::new(Protobuf {
+        root: Node::new(&descriptor, "", rows),
+    }))
+}
+
+/// The message's descriptor out of the set in the file.
+fn descriptor(schema: &SchemaRef<'_>) -> Result<MessageDescriptor, String> {
+    let mut set = prost_types::FileDescriptorSet::decode(schema.data)
+        .map_err(|problem| format!("the schema is no FileDescriptorSet: {problem}"))?;
+    // Writers repeat files, and some leave out what Google defines.
+    let mut present = HashSet::new();
+    set.file
+        .retain(|file| present.insert(file.name().to_owned()));
+    let needed: Vec<String> = set
+        .file
+        .iter()
+        .flat_map(|file| file.dependency.iter().cloned())
+        .collect();
+    let global = DescriptorPool::global();
+    let mut missing = Vec::new();
+    for name in needed {
+        if !present.insert(name.clone()) {
+            continue;
+        }
+        match global.get_file_by_name(&name) {
+            Some(file) => set.file.push(file.file_descriptor_proto().clone()),
+            None => missing.push(name),
+        }
+    }
+    let pool = DescriptorPool::from_file_descriptor_set(set).map_err(|problem| {
+        if missing.is_empty() {
+            format!("the FileDescriptorSet is not consistent: {problem}")
+        } else {
+            format!(
+                "the FileDescriptorSet lacks the imported {}",
+                missing.join(", ")
+            )
+        }
+    })?;
+    pool.get_message_by_name(schema.name).ok_or_else(|| {
+        format!(
+            "the FileDescriptorSet does not define the message {}",
+            schema.name
+        )
+    })
+}
+
+/// How a number is on the wire.
+#[derive(Clone, Copy, PartialEq)]
+enum Number {
+    Double,
+    Float,
+    Signed32,
+    Signed64,
+    Unsigned,
+    Unsigned32,
+    Zigzag,
+    Fixed32,
+    Fixed64,
+    SignedFixed32,
+    SignedFixed64,
+    Bool,
+}
+
+impl Number {
+    fn of(kind: &FieldKind) -> Option<Self> {
+        Some(match kind {
+            FieldKind::Double => Number::Double,
+            FieldKind::Float => Number::Float,
+            FieldKind::Int32 | FieldKind::Enum(_) => Number::Signed32,
+            FieldKind::Int64 => Number::Signed64,
+            FieldKind::Uint32 => Number::Unsigned32,
+            FieldKind::Uint64 => Number::Unsigned,
+            FieldKind::Sint32 | FieldKind::Sint64 => Number::Zigzag,
+            FieldKind::Fixed32 => Number::Fixed32,
+            FieldKind::Fixed64 => Number::Fixed64,
+            FieldKind::Sfixed32 => Number::SignedFixed32,
+            FieldKind::Sfixed64 => Number::SignedFixed64,
+            FieldKind::Bool => Number::Bool,
+            FieldKind::String | FieldKind::Bytes | FieldKind::Message(_) => return None,
+        })
+    }
+
+    /// The wire type that it has outside packed fields.
+    fn wire(self) -> u8 {
+        match self {
+            Number::Double | Number::Fixed64 | Number::SignedFixed64 => 1,
+            Number::Float | Number::Fixed32 | Number::SignedFixed32 => 5,
+            _ => 0,
+        }
+    }
+
+    fn read(self, input: &mut Input<'_>) -> Result<f64, &'static str> {
+        Ok(match self {
+            Number::Double => f64::from_le_bytes(input.take()?),
+            Number::Float => f64::from(f32::from_le_bytes(input.take()?)),
+            Number::Fixed64 => u64::from_le_bytes(input.take()?) as f64,
+            Number::SignedFixed64 => i64::from_le_bytes(input.take()?) as f64,
+            Number::Fixed32 => f64::from(u32::from_le_bytes(input.take()?)),
+            Number::SignedFixed32 => f64::from(i32::from_le_bytes(input.take()?)),
+            Number::Signed32 => f64::from(input.varint()? as i32),
+            Number::Signed64 => input.varint()? as i64 as f64,
+            Number::Unsigned32 => f64::from(input.varint()? as u32),
+            Number::Unsigned => input.varint()? as f64,
+            Number::Bool => f64::from(u8::from(input.varint()? != 0)),
+            Number::Zigzag => {
+                let bits = input.varint()?;
+                ((bits >> 1) as i64 ^ -((bits & 1) as i64)) as f64
+            }
+        })
+    }
+}
+
+/// The bytes that are left of a message.
+struct Input<'a> {
+    rest: &'a [u8],
+}
+
+impl<'a> Input<'a> {
+    #[inline]
+    fn take<const N: usize>(&mut self) -> Result<[u8; N], &'static str> {
+        let (taken, rest) = self
+            .rest
+            .split_first_chunk::<N>()
+            .ok_or("it ends inside a number")?;
+        self.rest = rest;
+        Ok(*taken)
+    }
+
+    #[inline]
+    fn varint(&mut self) -> Result<u64, &'static str> {
+        let mut value = 0u64;
+        for (position, &byte) in self.rest.iter().take(10).enumerate() {
+            value |= u64::from(byte & 0x7f) << (7 * position);
+            if byte < 0x80 {
+                self.rest = &self.rest[position + 1..];
+                return Ok(value);
+            }
+        }
+        Err(if self.rest.len() < 10 {
+            "it ends inside a number"
+        } else {
+            "a number has more than ten bytes"
+        })
+    }
+
+    fn bytes(&mut self) -> Result<&'a [u8], &'static str> {
+        let length =
+            usize::try_from(self.varint()?).map_err(|_| "a length is beyond the message")?;
+        if length > self.rest.len() {
+            return Err("a length is beyond the message");
+        }
+        let (taken, rest) = self.rest.split_at(length);
+        self.rest = rest;
+        Ok(taken)
+    }
+
+    /// Steps over a field that nobody wants.
+    fn skip(&mut self, wire: u8, number: u64, depth: usize) -> Result<(), &'static str> {
+        match wire {
+            0 => self.varint().map(drop),
+            1 => self.take::<8>().map(drop),
+            2 => self.bytes().map(drop),
+            5 => self.take::<4>().map(drop),
+            3 if depth < MAX_DEPTH => loop {
+                let tag = self.varint()?;
+                if (tag & 7) == 4 {
+                    return if tag >> 3 == number {
+                        Ok(())
+                    } else {
+                        Err("a group ends that did not begin")
+                    };
+                }
+                self.skip((tag & 7) as u8, tag >> 3, depth + 1)?;
+            },
+            _ => Err("a field has an unknown wire type"),
+        }
+    }
+}
+
+/// The plan of one message, at one place.
+struct Node {
+    fields: Vec<(u64, Plan)>,
+    present: bool,
+    stamp: bool,
+}
+
+enum Plan {
+    /// A number; `implied` where an absent one is zero.
+    Number {
+        number: Number,
+        column: u32,
+        implied: bool,
+        value: Option<f64>,
+    },
+    /// A message; its plan is made when the first one comes, because types may contain themselves.
+    Message {
+        descriptor: MessageDescriptor,
+        field: String,
+        node: Option<Box<Node>>,
+    },
+    Numbers {
+        number: Number,
+        field: String,
+        columns: Vec<u32>,
+        values: Vec<f64>,
+        count: usize,
+    },
+    Messages {
+        descriptor: MessageDescriptor,
+        field: String,
+        items: Vec<Node>,
+        count: usize,
+    },
+    Map {
+        entry: MessageDescriptor,
+        field: String,
+        entries: Vec<(String, Plan)>,
+        seen: usize,
+        long: bool,
+    },
+    /// Text and bytes.
+    Opaque,
+}
+
+impl Plan {
+    fn new(descriptor: &FieldDescriptor, field: String, rows: &mut Rows) -> Self {
+        let kind = descriptor.kind();
+        if descriptor.is_map()
+            && let FieldKind::Message(entry) = kind
+        {
+            return Plan::Map {
+                entry,
+                field,
+                entries: Vec::new(),
+                seen: 0,
+                long: false,
+            };
+        }
+        match (kind, descriptor.is_list()) {
+            (FieldKind::Message(descriptor), true) => Plan::Messages {
+                descriptor,
+                field,
+                items: Vec::new(),
+                count: 0,
+            },
+            (FieldKind::Message(descriptor), false) => Plan::Message {
+                descriptor,
+                field,
+                node: None,
+            },
+            (kind, list) => match Number::of(&kind) {
+                None => Plan::Opaque,
+                Some(number) if list => Plan::Numbers {
+                    number,
+                    field,
+                    columns: Vec::new(),
+                    values: Vec::new(),
+                    count: 0,
+                },
+                Some(number) => Plan::Number {
+                    number,
+                    column: rows.column(&field),
+                    implied: !descriptor.supports_presence(),
+                    value: None,
+                },
+            },
+        }
+    }
+}
+
+impl Node {
+    fn new(descriptor: &MessageDescriptor, field: &str, rows: &mut Rows) -> Self {
+        let mut fields: Vec<(u64, Plan)> = descriptor
+            .fields()
+            .map(|inner| {
+                let path = if field.is_empty() {
+                    inner.name().to_owned()
+                } else {
+                    format!("{field}.{}", inner.name())
+                };
+                (u64::from(inner.number()), Plan::new(&inner, path, rows))
+            })
+            .collect();
+        fields.sort_by_key(|(number, _)| *number);
+        let stamp = matches!(
+            field,
+            "timestamp" | "stamp" | "header.stamp" | "header.timestamp"
+        ) && descriptor.full_name() == "google.protobuf.Timestamp";
+        Node {
+            fields,
+            present: false,
+            stamp,
+        }
+    }
+
+    /// Reads fields until the input ends, or until the group `group` does.
+    fn read(
+        &mut self,
+        input: &mut Input<'_>,
+        group: Option<u64>,
+        depth: usize,
+        rows: &mut Rows,
+    ) -> Result<(), &'static str> {
+        if depth > MAX_DEPTH {
+            return Err("messages are nested more than 64 deep");
+        }
+        self.present = true;
+        let mut hint = 0;
+        while !input.rest.is_empty() {
+            let tag = input.varint()?;
+            let (number, wire) = (tag >> 3, (tag & 7) as u8);
+            if wire == 4 {
+                return if group == Some(number) {
+                    Ok(())
+                } else {
+                    Err("a group ends that did not begin")
+                };
+            }
+            // Fields mostly come in order.
+            let position = match self.fields.get(hint) {
+                Some((known, _)) if *known == number => Ok(hint),
+                _ => self
+                    .fields
+                    .binary_search_by_key(&number, |(known, _)| *known),
+            };
+            let Ok(position) = position else {
+                input.skip(wire, number, depth)?;
+                continue;
+            };
+            hint = position + 1;
+            self.fields[position]
+                .1
+                .read(input, wire, number, depth, rows)?;
+            if matches!(
+                self.fields[position].1,
+                Plan::Messages { .. } | Plan::Map { .. }
+            ) {
+                hint = position;
+            }
+        }
+        if group.is_some() {
+            Err("a group has no end")
+        } else {
+            Ok(())
+        }
+    }
+
+    /// Gives the values to the current row, or forgets them, and is ready for the next message.
+    fn flush(&mut self, rows: &mut Rows, keep: bool) {
+        let present = std::mem::take(&mut self.present);
+        if !present {
+            return;
+        }
+        if self.stamp && keep {
+            let part = |number: u64| {
+                self.fields.iter().find_map(|(known, plan)| match plan {
+                    Plan::Number { value, .. } if *known == number => *value,
+                    _ => None,
+                })
+            };
+            // OK because casts of doubles saturate.
+            let (seconds, nanoseconds) =
+                (part(1).unwrap_or(0.0) as i64, part(2).unwrap_or(0.0) as i64);
+            rows.stamp_ns = Some(
+                seconds
+                    .saturating_mul(1_000_000_000)
+                    .saturating_add(nanoseconds),
+            );
+        }
+        for (_, plan) in &mut self.fields {
+            plan.flush(rows, keep);
+        }
+    }
+}
+
+impl Plan {
+    fn read(
+        &mut self,
+        input: &mut Input<'_>,
+        wire: u8,
+        tag: u64,
+        depth: usize,
+        rows: &mut Rows,
+    ) -> Result<(), &'static str> {
+        const WRONG: &str = "a field has another wire type than its schema says";
+        match self {
+            Plan::Number { number, value, .. } => {
+                if wire == 2 {
+                    // A packed list where the schema has one value: the last one counts.
+                    let mut packed = Input {
+                        rest: input.bytes()?,
+                    };
+                    while !packed.rest.is_empty() {
+                        *value = Some(number.read(&mut packed)?);
+                    }
+                    return Ok(());
+                }
+                if wire != number.wire() {
+                    return Err(WRONG);
+                }
+                *value = Some(number.read(input)?);
+            }
+            Plan::Message {
+                descriptor,
+                field,
+                node,
+            } => {
+                let node = node.get_or_insert_with(|| Box::new(Node::new(descriptor, field, rows)));
+                read_message(node, input, wire, tag, depth, rows)?;
+            }
+            Plan::Numbers {
+                number,
+                values,
+                count,
+                ..
+            } => {
+                let mut add = |value| {
+                    *count += 1;
+                    if *count <= rows.max_items {
+                        values.push(value);
+                    }
+                };
+                if wire == 2 {
+                    let mut packed = Input {
+                        rest: input.bytes()?,
+                    };
+                    while !packed.rest.is_empty() {
+                        add(number.read(&mut packed)?);
+                    }
+                } else if wire == number.wire() {
+                    add(number.read(input)?);
+                } else {
+                    return Err(WRONG);
+                }
+            }
+            Plan::Messages {
+                descriptor,
+                field,
+                items,
+                count,
+            } => {
+                *count += 1;
+                if *count > rows.max_items {
+                    return input.skip(wire, tag, depth);
+                }
+                if items.len() < *count {
+                    items.push(Node::new(
+                        descriptor,
+                        &format!("{field}[{}]", items.len()),
+                        rows,
+                    ));
+                }
+                read_message(&mut items[*count - 1], input, wire, tag, depth, rows)?;
+            }
+            Plan::Map {
+                entry,
+                field,
+                entries,
+                seen,
+                long,
+            } => {
+                if wire != 2 {
+                    return Err(WRONG);
+                }
+                *seen += 1;
+                read_entry(entry, field, entries, long, input.bytes()?, depth, rows)?;
+            }
+            Plan::Opaque => input.skip(wire, tag, depth)?,
+        }
+        Ok(())
+    }
+
+    fn flush(&mut self, rows: &mut Rows, keep: bool) {
+        match self {
+            Plan::Number {
+                column,
+                implied,
+                value,
+                ..
+            } => {
+                let value = value.take();
+                if keep && *column != UNWANTED {
+                    if let Some(value) = value {
+                        rows.push(*column, value);
+                    } else if *implied {
+                        rows.push(*column, 0.0);
+                    }
+                }
+            }
+            Plan::Message {
+                node: Some(node), ..
+            } => node.flush(rows, keep),
+            Plan::Message { node: None, .. } | Plan::Opaque => {}
+            Plan::Numbers {
+                field,
+                columns,
+                values,
+                count,
+                ..
+            } => {
+                let fits = *count <= rows.max_items;
+                if !fits && keep {
+                    rows.note_long(field);
+                }
+                while columns.len() < values.len() && fits {
+                    columns.push(rows.column(&format!("{field}[{}]", columns.len())));
+                }
+                if fits && keep {
+                    for (&column, &value) in columns.iter().zip(values.iter()) {
+                        rows.push(column, value);
+                    }
+                }
+                values.clear();
+                *count = 0;
+            }
+            Plan::Messages {
+                field,
+                items,
+                count,
+                ..
+            } => {
+                let fits = *count <= rows.max_items;
+                if !fits && keep {
+                    rows.note_long(field);
+                }
+                for item in items.iter_mut() {
+                    item.flush(rows, keep && fits);
+                }
+                *count = 0;
+            }
+            Plan::Map {
+                field,
+                entries,
+                seen,
+                long,
+                ..
+            } => {
+                if std::mem::take(long) && keep {
+                    rows.note_long(field);
+                }
+                if std::mem::take(seen) > 0 {
+                    for (_, plan) in entries {
+                        plan.flush(rows, keep);
+                    }
+                }
+            }
+        }
+    }
+}
+
+fn read_message(
+    node: &mut Node,
+    input: &mut Input<'_>,
+    wire: u8,
+    tag: u64,
+    depth: usize,
+    rows: &mut Rows,
+) -> Result<(), &'static str> {
+    match wire {
+        2 => node.read(
+            &mut Input {
+                rest: input.bytes()?,
+            },
+            None,
+            depth + 1,
+            rows,
+        ),
+        3 => node.read(input, Some(tag), depth + 1, rows),
+        _ => Err("a field has another wire type than its schema says"),
+    }
+}
+
+/// Reads one entry of a map: the value goes to the plan of its key.
+fn read_entry(
+    entry: &MessageDescriptor,
+    field: &str,
+    entries: &mut Vec<(String, Plan)>,
+    long: &mut bool,
+    bytes: &[u8],
+    depth: usize,
+    rows: &mut Rows,
+) -> Result<(), &'static str> {
+    let key_kind = entry.map_entry_key_field().kind();
+    let value_field = entry.map_entry_value_field();
+    let mut key = match key_kind {
+        FieldKind::String => String::new(),
+        FieldKind::Bool => "false".to_owned(),
+        _ => "0".to_owned(),
+    };
+    // The key may follow the value: find it first.
+    let mut input = Input { rest: bytes };
+    let mut values = Vec::new();
+    while !input.rest.is_empty() {
+        let tag = input.varint()?;
+        let (number, wire) = (tag >> 3, (tag & 7) as u8);
+        let before = input.rest;
+        if number == 1 {
+            key = match (&key_kind, Number::of(&key_kind)) {
+                (FieldKind::String, _) if wire == 2 => {
+                    String::from_utf8_lossy(input.bytes()?).into_owned()
+                }
+                (FieldKind::Bool, Some(number)) if wire == 0 => {
+                    (number.read(&mut input)? != 0.0).to_string()
+                }
+                (FieldKind::Uint64, _) if wire == 0 => input.varint()?.to_string(),
+                (FieldKind::Int64, _) if wire == 0 => (input.varint()? as i64).to_string(),
+                (_, Some(number)) if wire == number.wire() => number.read(&mut input)?.to_string(),
+                _ => return Err("a map's key has another wire type than its schema says"),
+            };
+        } else {
+            input.skip(wire, number, depth)?;
+            if number == 2 {
+                values.push((wire, before));
+            }
+        }
+    }
+    let position = match entries.iter().position(|(known, _)| *known == key) {
+        Some(position) => position,
+        None if entries.len() >= rows.max_items => {
+            *long = true;
+            return Ok(());
+        }
+        None => {
+            let mut plan = Plan::new(&value_field, format!("{field}[{key}]"), rows);
+            // An entry that is not there has no value, unlike a field.
+            if let Plan::Number { implied, .. } = &mut plan {
+                *implied = false;
+            }
+            entries.push((key, plan));
+            entries.len() - 1
+        }
+    };
+    let plan = &mut entries[position].1;
+    if values.is_empty()
+        && let Plan::Number { value, .. } = plan
+    {
+        *value = Some(0.0);
+    }
+    for (wire, rest) in values {
+        plan.read(&mut Input { rest }, wire, 2, depth + 1, rows)?;
+    }
+    Ok(())
+}
+
+impl Decoder for Protobuf {
+    fn decode(&mut self, message: &[u8], rows: &mut Rows) -> Result<(), String> {
+        let read = self.root.read(&mut Input { rest: message }, None, 0, rows);
+        self.root.flush(rows, read.is_ok());
+        read.map_err(|problem| format!("protobuf message of {} bytes: {problem}", message.len()))
+    }
+}

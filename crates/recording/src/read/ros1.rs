@@ -1,0 +1,57 @@
+//! ROS 1 messages (`ros1`): packed little-endian fields, laid out by `ros1msg` text.
+
+use super::{
+    decode::{Decoder, SchemaRef},
+    layout::{Fail, Problem, Program, Shape},
+    ros2msg::{self, Dialect},
+    rows::Rows,
+    types::Types,
+};
+
+const SHAPE: Shape = Shape {
+    big_endian: false,
+    max_align: 1,
+    collection_headers: false,
+    wide: 2,
+    empty_takes_byte: false,
+};
+
+struct Ros1 {
+    types: Types,
+    program: Program,
+}
+
+pub(super) fn open(schema: &SchemaRef<'_>, rows: &mut Rows) -> Result<Box<dyn Decoder>, String> {
+    let text =
+        str::from_utf8(schema.data).map_err(|_| "the definition is not UTF-8 text".to_owned())?;
+    let types = ros2msg::parse(schema.name, text, Dialect::Ros1)?;
+    let program = Program::message(&types, SHAPE, rows)?;
+    Ok(Box::new(Ros1 { types, program }))
+}
+
+impl Decoder for Ros1 {
+    fn decode(&mut self, message: &[u8], rows: &mut Rows) -> Result<(), String> {
+        let end = self
+            .program
+            .run(&self.types, SHAPE, message, 0, rows)
+            .map_err(|fail| describe(&fail, "ROS 1 message", message.len()))?;
+        if end < message.len() {
+            rows.trailing += 1;
+        }
+        Ok(())
+    }
+}
+
+/// The sentence for a message that does not fit its schema.
+pub(super) fn describe(fail: &Fail, what: &str, length: usize) -> String {
+    match fail.problem {
+        Problem::Short => format!(
+            "{what} of {length} bytes ends while reading {:?}",
+            fail.field
+        ),
+        Problem::Other(problem) => format!(
+            "{what} stopped at byte {} in {:?}: {problem}",
+            fail.at, fail.field
+        ),
+    }
+}

@@ -1,0 +1,209 @@
+//! Columns under construction: where decoders put the numbers of a batch of messages, one row per message.
+
+use std::{collections::HashMap, sync::Arc};
+
+/// No column: a field that nobody wants.
+pub(super) const UNWANTED: u32 = u32::MAX;
+
+/// More columns than this in one channel are refused: items of items of items would otherwise fill the memory.
+const MAX_COLUMNS: usize = 1 << 16;
+
+/// One numeric field while a batch is decoded.
+#[derive(Debug, Default)]
+pub(super) struct RowColumn {
+    /// `TOPIC.field.path`.
+    pub path: Arc<str>,
+    /// The values.
+    pub values: Vec<f64>,
+    /// The row of each value once some row had none; empty while every row has one.
+    pub rows: Vec<u32>,
+    sparse: bool,
+}
+
+/// Decoded numbers of one channel, and what the decoder noticed on the way.
+pub(super) struct Rows<'a> {
+    topic: String,
+    select: Selection<'a>,
+    /// All columns that somebody wants, in the order of first sight.
+    pub columns: Vec<RowColumn>,
+    index: HashMap<Arc<str>, u32>,
+    row: u32,
+    /// Header stamp of the message that is being decoded.
+    pub stamp_ns: Option<i64>,
+    /// Fields that messages declare as not given, with how many do.
+    pub absent: Vec<(String, u64)>,
+    /// Sequences that were too long to become signals: field and count.
+    pub long: Vec<(String, u64)>,
+    /// What the decoder has to say about the schema.
+    pub remark: Option<String>,
+    /// Messages with bytes left over.
+    pub trailing: u64,
+    /// Up to how many items of a sequence become signals.
+    pub max_items: usize,
+}
+
+/// Which signals are wanted, by path.
+pub(super) type Selection<'a> = &'a (dyn Fn(&str) -> bool + Sync);
+
+impl<'a> Rows<'a> {
+    pub fn new(topic: &str, select: Selection<'a>, max_items: usize) -> Self {
+        Rows {
+            topic: topic.to_owned(),
+            select,
+            columns: Vec::new(),
+            index: HashMap::new(),
+            row: 0,
+            stamp_ns: None,
+            absent: Vec::new(),
+            long: Vec::new(),
+            remark: None,
+            trailing: 0,
+            max_items,
+        }
+    }
+
+    /// The column of a field, or [`UNWANTED`].
+    ///
+    /// `field` is the path without the topic; it is empty where the message itself is the value.
+    pub fn column(&mut self, field: &str) -> u32 {
+        let path = if field.is_empty() {
+            self.topic.clone()
+        } else {
+            format!("{}.{field}", self.topic)
+        };
+        if !(self.select)(&path) {
+            return UNWANTED;
+        }
+        // A second look-up of the same field happens when a layout is compiled again for another representation.
+        if let Some(&known) = self.index.get(path.as_str()) {
+            return known;
+        }
+        if self.columns.len() >= MAX_COLUMNS {
+            self.remark = Some(format!(
+                "it has more than {MAX_COLUMNS} numeric fields; the others are left out"
+            ));
+            return UNWANTED;
+        }
+        // Every row so far is without this field.
+        let sparse = self.row > 0;
+        // OK because MAX_COLUMNS fits.
+        let column = self.columns.len() as u32;
+        let path: Arc<str> = path.into();
+        self.index.insert(path.clone(), column);
+        self.columns.push(RowColumn {
+            path,
+            sparse,
+            ..RowColumn::default()
+        });
+        column
+    }
+
+    /// Sets a column's value in the current row.
+    #[inline]
+    pub fn push(&mut self, column: u32, value: f64) {
+        let row = self.row;
+        // OK because callers only pass what `column` gave them; UNWANTED is checked by them or falls through here.
+        let Some(column) = self.columns.get_mut(column as usize) else {
+            return;
+        };
+        if !column.sparse && column.values.len() == row as usize {
+            column.values.push(value);
+        } else {
+            column.push_slowly(row, value);
+        }
+    }
+
+    /// Counts a sequence that is too long to become signals.
+    pub fn note_long(&mut self, field: &str) {
+        count(&mut self.long, field);
+    }
+
+    /// Counts a message that declares a field as not given.
+    pub fn note_absent(&mut self, field: &str) {
+        count(&mut self.absent, field);
+    }
+
+    /// Begins the next message.
+    pub fn begin(&mut self) {
+        self.stamp_ns = None;
+    }
+
+    /// Keeps the message that was decoded.
+    pub fn keep(&mut self) {
+        self.row += 1;
+    }
+
+    /// Takes back what a message gave before it turned out to be broken.
+    pub fn abort(&mut self) {
+        let row = self.row;
+        for column in &mut self.columns {
+            if column.sparse {
+                while column.rows.last() == Some(&row) {
+                    column.rows.pop();
+                    column.values.pop();
+                }
+            } else {
+                column.values.truncate(row as usize);
+            }
+        }
+    }
+
+    /// Ends the batch: the number of rows; columns with fewer values than rows know which rows they have.
+    pub fn finish(&mut self) -> usize {
+        let rows = self.row as usize;
+        for column in &mut self.columns {
+            if !column.sparse && column.values.len() != rows {
+                column.become_sparse();
+            }
+        }
+        rows
+    }
+
+    /// Empties everything for the next batch but keeps the columns and their memory.
+    pub fn clear(&mut self) {
+        self.row = 0;
+        self.absent.clear();
+        self.long.clear();
+        self.trailing = 0;
+        for column in &mut self.columns {
+            column.values.clear();
+            column.rows.clear();
+            column.sparse = false;
+        }
+    }
+}
+
+impl RowColumn {
+    fn become_sparse(&mut self) {
+        self.sparse = true;
+        // OK because rows are counted in u32.
+        self.rows = (0..self.values.len() as u32).collect();
+    }
+
+    #[cold]
+    fn push_slowly(&mut self, row: u32, value: f64) {
+        if !self.sparse {
+            if self.values.len() == row as usize + 1 {
+                // Twice in one message: the last one counts, as in protobuf.
+                self.values[row as usize] = value;
+                return;
+            }
+            self.become_sparse();
+        }
+        if self.rows.last() == Some(&row) {
+            if let Some(last) = self.values.last_mut() {
+                *last = value;
+            }
+        } else {
+            self.rows.push(row);
+            self.values.push(value);
+        }
+    }
+}
+
+fn count(counts: &mut Vec<(String, u64)>, field: &str) {
+    match counts.iter_mut().find(|(known, _)| known == field) {
+        Some((_, count)) => *count += 1,
+        None => counts.push((field.to_owned(), 1)),
+    }
+}

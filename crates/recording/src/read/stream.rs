@@ -1,0 +1,556 @@
+//! The stream of batches: threads unpack and decode blocks, the caller's thread takes them in the order of the file.
+
+use std::{
+    collections::{BTreeMap, HashMap},
+    sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError, atomic::Ordering},
+};
+
+use super::{
+    ReadError, Recording,
+    block::{BlockResult, ChannelBatch, Worker, split_record},
+    chunk::{self, Unpacker, WHOLE_BYTES},
+    clock::{Clocks, Order, seconds},
+    container::{Block, op},
+    rows::Selection,
+};
+use crate::{Finding, Kind};
+
+/// Decoded numbers of one channel out of one chunk.
+#[derive(Clone, Copy, Debug)]
+pub struct Batch<'a> {
+    /// Index into [`Info::channels`](super::Info::channels).
+    pub channel: usize,
+    /// Topic.
+    pub topic: &'a str,
+    /// Name of the schema.
+    pub schema: &'a str,
+    /// Log time of each message, ns, in the order of the file.
+    pub times_ns: &'a [i64],
+    /// Header stamp of each message, ns, where all have one.
+    pub stamps_ns: Option<&'a [i64]>,
+    /// The columns that were selected and have values here.
+    pub columns: &'a [Column<'a>],
+}
+
+/// One numeric field in a [`Batch`].
+#[derive(Clone, Copy, Debug)]
+pub struct Column<'a> {
+    /// A number that stands for the path throughout the stream, counted from 0 in the order of first sight.
+    pub id: usize,
+    /// `TOPIC.field.path`.
+    pub path: &'a str,
+    /// The messages that have a value, as indices into `times_ns`; `None` where all do.
+    pub rows: Option<&'a [u32]>,
+    /// The values.
+    pub values: &'a [f64],
+}
+
+/// A message as it is in the file.
+#[derive(Clone, Copy, Debug)]
+pub struct RawMessage<'a> {
+    /// Index into [`Info::channels`](super::Info::channels).
+    pub channel: usize,
+    /// Topic.
+    pub topic: &'a str,
+    /// Sequence number.
+    pub sequence: u32,
+    /// Log time, ns.
+    pub log_time_ns: i64,
+    /// Publish time, ns.
+    pub publish_time_ns: i64,
+    /// The encoded message.
+    pub data: &'a [u8],
+}
+
+/// The blocks in work: who has taken which, and what is ready.
+struct Progress {
+    next: usize,
+    taken: usize,
+    ready: BTreeMap<usize, BlockResult>,
+    stop: bool,
+}
+
+struct Shared {
+    progress: Mutex<Progress>,
+    changed: Condvar,
+}
+
+impl Shared {
+    fn lock(&self) -> MutexGuard<'_, Progress> {
+        self.progress.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+}
+
+/// Stops the helpers when the caller's thread leaves, in whatever way.
+struct StopOnDrop<'a>(&'a Shared);
+
+impl Drop for StopOnDrop<'_> {
+    fn drop(&mut self) {
+        self.0.lock().stop = true;
+        self.0.changed.notify_all();
+    }
+}
+
+pub(super) fn run(
+    recording: &Recording,
+    select: Selection<'_>,
+    sink: &mut dyn FnMut(&Batch<'_>),
+) -> Result<Vec<Finding>, ReadError> {
+    let blocks = &recording.container.blocks;
+    let threads = match recording.options.threads {
+        0 => std::thread::available_parallelism().map_or(1, usize::from),
+        threads => threads,
+    }
+    .min(blocks.len().max(1));
+    // So many blocks may be ready or in work before the first of them is taken: the bound on memory.
+    let window = 2 * threads + 1;
+    let shared = Shared {
+        progress: Mutex::new(Progress {
+            next: 0,
+            taken: 0,
+            ready: BTreeMap::new(),
+            stop: false,
+        }),
+        changed: Condvar::new(),
+    };
+    let mut taker = Taker::new(recording);
+    std::thread::scope(|scope| {
+        let _stop = StopOnDrop(&shared);
+        for _ in 1..threads {
+            scope.spawn(|| help(&shared, Worker::new(recording, select), blocks, window));
+        }
+        let mut worker = Worker::new(recording, select);
+        for (position, block) in blocks.iter().enumerate() {
+            let result = wait_for(position, &shared, &mut worker, blocks, window);
+            if result.large {
+                worker.large(block, &mut |result| taker.take(result, sink))?;
+            } else {
+                taker.take(result, sink);
+            }
+            let mut progress = shared.lock();
+            progress.taken = position + 1;
+            drop(progress);
+            shared.changed.notify_all();
+        }
+        Ok(())
+    })?;
+    Ok(taker.findings())
+}
+
+/// A helper's life: take the next block, decode it, put it down.
+fn help(shared: &Shared, mut worker: Worker<'_>, blocks: &[Block], window: usize) {
+    loop {
+        let position = {
+            let mut progress = shared.lock();
+            loop {
+                if progress.stop || progress.next >= blocks.len() {
+                    return;
+                }
+                if progress.next < progress.taken + window {
+                    break;
+                }
+                progress = shared
+                    .changed
+                    .wait(progress)
+                    .unwrap_or_else(PoisonError::into_inner);
+            }
+            progress.next += 1;
+            progress.next - 1
+        };
+        let result = worker.block(&blocks[position]);
+        shared.lock().ready.insert(position, result);
+        shared.changed.notify_all();
+    }
+}
+
+/// The caller's thread needs block `position`; while another thread works on it, this one helps with those that follow.
+fn wait_for(
+    position: usize,
+    shared: &Shared,
+    worker: &mut Worker<'_>,
+    blocks: &[Block],
+    window: usize,
+) -> BlockResult {
+    let mut progress = shared.lock();
+    loop {
+        if let Some(result) = progress.ready.remove(&position) {
+            return result;
+        }
+        if progress.next < blocks.len() && progress.next < progress.taken + window {
+            let mine = progress.next;
+            progress.next += 1;
+            drop(progress);
+            let result = worker.block(&blocks[mine]);
+            if mine == position {
+                return result;
+            }
+            progress = shared.lock();
+            progress.ready.insert(mine, result);
+        } else {
+            progress = shared
+                .changed
+                .wait(progress)
+                .unwrap_or_else(PoisonError::into_inner);
+        }
+    }
+}
+
+/// What is known about a channel while its batches come in.
+#[derive(Default)]
+struct Watch {
+    log: Order,
+    stamps: Order,
+    clocks: Clocks,
+    absent: Vec<(String, u64)>,
+    long: Vec<(String, u64)>,
+    trailing: u64,
+    odd: Vec<(Arc<str>, u64, i64)>,
+    messages: u64,
+}
+
+/// The taking end: numbers the columns, feeds the sink, keeps the findings.
+struct Taker<'a> {
+    recording: &'a Recording,
+    watches: Vec<Watch>,
+    ids: HashMap<Arc<str>, usize>,
+    findings: Vec<Finding>,
+    /// Position in `findings` of troubles that repeat.
+    known: HashMap<(Option<usize>, Kind, String), usize>,
+    messages: u64,
+    lost: u64,
+    start_ns: i64,
+}
+
+impl<'a> Taker<'a> {
+    fn new(recording: &'a Recording) -> Self {
+        let mut watches = Vec::new();
+        watches.resize_with(recording.info.channels.len(), Watch::default);
+        let mut findings = Vec::new();
+        for (kind, count, text) in recording.damage() {
+            findings.push(Finding {
+                topic: String::new(),
+                kind: *kind,
+                count: *count,
+                t_s: None,
+                text: text.clone(),
+            });
+        }
+        Taker {
+            recording,
+            watches,
+            ids: HashMap::new(),
+            findings,
+            known: HashMap::new(),
+            messages: 0,
+            lost: 0,
+            start_ns: recording.info.start_ns,
+        }
+    }
+
+    fn take(&mut self, result: BlockResult, sink: &mut dyn FnMut(&Batch<'_>)) {
+        self.messages += result.messages;
+        for trouble in result.troubles {
+            // Messages are named by their first; chunks each by their own place.
+            let key = match trouble.kind {
+                Kind::Undecodable => (trouble.channel, trouble.kind, String::new()),
+                kind => (trouble.channel, kind, trouble.text.clone()),
+            };
+            self.lost += trouble.lost;
+            if let Some(&position) = self.known.get(&key) {
+                self.findings[position].count += trouble.count;
+                continue;
+            }
+            if self.known.len() >= MAX_TROUBLES {
+                let key = (None, trouble.kind, "further".to_owned());
+                match self.known.get(&key) {
+                    Some(&position) => self.findings[position].count += trouble.count,
+                    None => {
+                        self.known.insert(key, self.findings.len());
+                        let text = format!(
+                            "further {} trouble of this kind, not listed one by one",
+                            trouble.kind
+                        );
+                        self.findings.push(Finding {
+                            topic: String::new(),
+                            kind: trouble.kind,
+                            count: trouble.count,
+                            t_s: None,
+                            text,
+                        });
+                    }
+                }
+                continue;
+            }
+            self.known.insert(key, self.findings.len());
+            let topic = trouble
+                .channel
+                .map(|index| self.recording.info.channels[index].topic.clone());
+            self.findings.push(Finding {
+                topic: topic.unwrap_or_default(),
+                kind: trouble.kind,
+                count: trouble.count,
+                t_s: trouble.time.map(|time| seconds(time, self.start_ns)),
+                text: trouble.text,
+            });
+        }
+        for batch in result.batches {
+            self.batch(batch, sink);
+        }
+    }
+
+    fn batch(&mut self, batch: ChannelBatch, sink: &mut dyn FnMut(&Batch<'_>)) {
+        let watch = &mut self.watches[batch.channel];
+        watch.messages += batch.times.len() as u64;
+        watch.log.observe(&batch.times);
+        if !batch.stamps.is_empty() {
+            watch.clocks.observe(&batch.times, &batch.stamps);
+            watch.stamps.observe(&batch.stamps);
+        }
+        add(&mut watch.absent, batch.absent);
+        add(&mut watch.long, batch.long);
+        watch.trailing += batch.trailing;
+        let info = &self.recording.info.channels[batch.channel];
+        if let Some(text) = batch.remark {
+            let key = (Some(batch.channel), Kind::BadSchema, text.clone());
+            if !self.known.contains_key(&key) {
+                self.known.insert(key, self.findings.len());
+                self.findings.push(Finding {
+                    topic: info.topic.clone(),
+                    kind: Kind::BadSchema,
+                    count: 1,
+                    t_s: None,
+                    text,
+                });
+            }
+        }
+        let mut columns = Vec::with_capacity(batch.columns.len());
+        for column in &batch.columns {
+            if let Some((count, row)) = column.odd {
+                match watch
+                    .odd
+                    .iter_mut()
+                    .find(|(path, _, _)| *path == column.path)
+                {
+                    Some((_, known, _)) => *known += count,
+                    None => watch
+                        .odd
+                        .push((column.path.clone(), count, batch.times[row as usize])),
+                }
+            }
+            let id = match self.ids.get(&column.path) {
+                Some(&id) => id,
+                None => {
+                    let id = self.ids.len();
+                    self.ids.insert(column.path.clone(), id);
+                    id
+                }
+            };
+            let rows = (column.values.len() != batch.times.len()).then_some(column.rows.as_slice());
+            columns.push(Column {
+                id,
+                path: &column.path,
+                rows,
+                values: &column.values,
+            });
+        }
+        sink(&Batch {
+            channel: batch.channel,
+            topic: &info.topic,
+            schema: &info.schema,
+            times_ns: &batch.times,
+            stamps_ns: (!batch.stamps.is_empty()).then_some(&batch.stamps),
+            columns: &columns,
+        });
+    }
+
+    fn findings(mut self) -> Vec<Finding> {
+        let start_ns = self.start_ns;
+        if let Some(promised) = self.recording.promised
+            && promised != self.messages
+        {
+            let lost = promised.saturating_sub(self.messages);
+            // Chunks that were left out explain as many as their indexes name.
+            if lost > self.lost || promised < self.messages {
+                let text = format!(
+                    "the summary counts {promised} messages, {} were found",
+                    self.messages
+                );
+                self.findings.push(Finding {
+                    topic: String::new(),
+                    kind: Kind::BadSummary,
+                    count: 1,
+                    t_s: None,
+                    text,
+                });
+            }
+            self.lost = self.lost.max(lost);
+        }
+        for (watch, info) in self.watches.iter_mut().zip(&self.recording.info.channels) {
+            let topic = &info.topic;
+            watch
+                .log
+                .report(topic, "log times", start_ns, &mut self.findings);
+            watch.clocks.report(topic, start_ns, &mut self.findings);
+            if !watch.clocks.same() {
+                watch
+                    .stamps
+                    .report(topic, "header stamps", start_ns, &mut self.findings);
+            }
+            let mut say = |kind, count, t_s, text| {
+                self.findings.push(Finding {
+                    topic: topic.clone(),
+                    kind,
+                    count,
+                    t_s,
+                    text,
+                })
+            };
+            for (path, count, time) in &watch.odd {
+                let t_s = seconds(*time, start_ns);
+                let field = path
+                    .strip_prefix(topic.as_str())
+                    .unwrap_or(path)
+                    .trim_start_matches('.');
+                say(
+                    Kind::Nan,
+                    *count,
+                    Some(t_s),
+                    format!("{count} values of {field} are NaN or infinite, first at {t_s:.3} s"),
+                );
+            }
+            for (field, count) in &watch.absent {
+                let text = if *count == watch.messages {
+                    format!("{field} is declared as not given (covariance -1)")
+                } else {
+                    format!(
+                        "{field} is declared as not given (covariance -1) in {count} of {} messages",
+                        watch.messages
+                    )
+                };
+                say(Kind::AbsentField, *count, None, text);
+            }
+            for (field, count) in &watch.long {
+                let limit = self.recording.options.max_items;
+                say(
+                    Kind::LongSequence,
+                    *count,
+                    None,
+                    format!(
+                        "{field} has more than {limit} items (the limit max_items) in {count} messages; it is not among the signals there"
+                    ),
+                );
+            }
+            if watch.trailing > 0 {
+                let text = format!(
+                    "{} messages are longer than their schema says",
+                    watch.trailing
+                );
+                say(Kind::TrailingBytes, watch.trailing, None, text);
+            }
+        }
+        for finding in &mut self.findings {
+            // Sentences that began with the first of several get the count.
+            if finding.kind == Kind::Undecodable {
+                let more = if finding.count == 1 {
+                    "1 message"
+                } else {
+                    "messages"
+                };
+                let count = if finding.count == 1 {
+                    String::new()
+                } else {
+                    format!("{} ", finding.count)
+                };
+                finding.text = format!(
+                    "{count}{more} could not be decoded; the first: {}",
+                    finding.text
+                );
+            } else if matches!(finding.kind, Kind::NoDecoder | Kind::UnknownChannel)
+                || (finding.kind == Kind::BadSchema && finding.count > 1)
+            {
+                finding.text = format!("skipped {} messages: {}", finding.count, finding.text);
+            }
+        }
+        self.recording.skipped.store(self.lost, Ordering::Relaxed);
+        self.findings
+    }
+}
+
+/// More troubles than this are counted, not listed.
+const MAX_TROUBLES: usize = 1000;
+
+fn add(counts: &mut Vec<(String, u64)>, more: Vec<(String, u64)>) {
+    for (field, count) in more {
+        match counts.iter_mut().find(|(known, _)| *known == field) {
+            Some((_, sum)) => *sum += count,
+            None => counts.push((field, count)),
+        }
+    }
+}
+
+/// Messages as they are.
+pub(super) fn raw(
+    recording: &Recording,
+    select: &dyn Fn(&str) -> bool,
+    sink: &mut dyn FnMut(&RawMessage<'_>),
+) -> Result<(), ReadError> {
+    let wanted: Vec<bool> = recording
+        .info
+        .channels
+        .iter()
+        .map(|channel| select(&channel.topic))
+        .collect();
+    let mut give = |mut bytes: &[u8]| {
+        while let Some((opcode, body, rest)) = split_record(bytes) {
+            bytes = rest;
+            let (true, Some((header, data))) =
+                (opcode == op::MESSAGE, body.split_first_chunk::<22>())
+            else {
+                continue;
+            };
+            let id = u16::from_le_bytes([header[0], header[1]]);
+            let Some(channel) = recording.by_id[usize::from(id)].filter(|&index| wanted[index])
+            else {
+                continue;
+            };
+            let time = |at: usize| {
+                i64::try_from(u64::from_le_bytes(std::array::from_fn(|i| header[at + i])))
+            };
+            let (Ok(log_time_ns), publish) = (time(6), time(14)) else {
+                continue;
+            };
+            sink(&RawMessage {
+                channel,
+                topic: &recording.info.channels[channel].topic,
+                sequence: u32::from_le_bytes(std::array::from_fn(|i| header[2 + i])),
+                log_time_ns,
+                publish_time_ns: publish.unwrap_or(log_time_ns),
+                data,
+            });
+        }
+    };
+    let mut unpacker = Unpacker::new();
+    for block in &recording.container.blocks {
+        match block {
+            Block::Loose(range) => give(&recording.data[range.clone()]),
+            Block::Chunk { body, .. } => {
+                match chunk::open(&recording.data[body.clone()], &recording.options) {
+                    Ok(header) if header.uncompressed <= WHOLE_BYTES => {
+                        if let Ok(records) = unpacker.whole(&header) {
+                            give(records);
+                        }
+                    }
+                    Ok(header) => {
+                        // A damaged chunk is left out, as `stream` says it is.
+                        let _ = chunk::pieces(&header, &recording.options, &mut |records| {
+                            give(records);
+                            Ok(())
+                        })?;
+                    }
+                    Err(_) => {}
+                }
+            }
+        }
+    }
+    Ok(())
+}
