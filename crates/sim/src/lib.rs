@@ -8,6 +8,7 @@ pub mod freedoms;
 pub mod lanes;
 pub mod model;
 pub mod random;
+pub mod record;
 pub mod run;
 pub mod scene;
 pub mod solve;

@@ -1,1 +1,5 @@
-//! study
+//! Many runs, one table. The only crate that puts `sim` and `analyze` together, in memory.
+
+pub mod ensemble;
+pub mod paper;
+pub mod statistics;

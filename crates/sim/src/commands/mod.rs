@@ -1,0 +1,31 @@
+//! One file per subcommand.
+
+mod record;
+mod scenes;
+
+use clap::Subcommand;
+use std::process::ExitCode;
+
+/// What `sim` can do.
+#[derive(Subcommand)]
+pub enum Command {
+    /// Run a scene and write the recording (MCAP).
+    Record(record::Args),
+    /// List the built-in scenes, or print one as TOML.
+    Scenes(scenes::Args),
+}
+
+/// Runs a command; errors go to stderr, one sentence first, then the causes.
+pub fn run(command: Command) -> ExitCode {
+    let outcome = match command {
+        Command::Record(args) => record::run(&args),
+        Command::Scenes(args) => scenes::run(&args),
+    };
+    match outcome {
+        Ok(()) => ExitCode::SUCCESS,
+        Err(error) => {
+            eprintln!("sim: {error:#}");
+            ExitCode::from(1)
+        }
+    }
+}

@@ -1,0 +1,173 @@
+//! `sim record`: a scene becomes a recording.
+
+use anyhow::{Context, Result, anyhow};
+use indicatif::{ProgressBar, ProgressStyle};
+use recording::write::{RecordingWriter, WriterOptions, remove_unfinished_files};
+use sim::model::Model;
+use sim::record::Recorder;
+use sim::run::{Listener, Sample, run_model, settings};
+use sim::scene::load;
+use sim::solve::{Stopped, method};
+use std::path::{Path, PathBuf};
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::time::{Duration, Instant};
+
+/// Arguments of `sim record`.
+#[derive(clap::Args)]
+#[command(after_help = EXAMPLES)]
+pub struct Args {
+    /// A built-in scene (see `sim scenes`) or the path of a TOML file.
+    #[arg(default_value = "music")]
+    scene: String,
+    /// Seed of everything random.
+    #[arg(long)]
+    seed: Option<u64>,
+    /// Where to write; `-` is standard output. Default: SCENE-SEED.mcap here.
+    #[arg(long, short, value_name = "FILE.mcap")]
+    out: Option<PathBuf>,
+    /// Simulated time, s.
+    #[arg(long, value_name = "S")]
+    duration: Option<f64>,
+    /// Change a value of the scene; `effects.NAME=false` takes an effect away. May be repeated.
+    #[arg(long, value_name = "KEY=VALUE")]
+    set: Vec<String>,
+    /// Integration method.
+    #[arg(long)]
+    method: Option<String>,
+    /// Tolerance of an adaptive method.
+    #[arg(long, value_name = "X")]
+    tolerance: Option<f64>,
+}
+
+const EXAMPLES: &str = "Examples:
+  sim record
+  sim record baseline --seed 1002 --out b.mcap
+  sim record music --duration 120 --set effects.music.strength_rad_per_s=1.5
+  sim record music --method semi-implicit-euler --set solver.step_s=0.001
+  sim record --out - | view -";
+
+/// Simulates and records.
+pub fn run(args: &Args) -> Result<()> {
+    let mut settings_given = args.set.clone();
+    // The flags are settings like any other, so that they are checked and reported alike.
+    settings_given.extend(args.seed.map(|seed| format!("seed={seed}")));
+    settings_given.extend(args.duration.map(|s| format!("duration_s={s:?}")));
+    settings_given.extend(args.method.as_ref().map(|m| format!("solver.method={m:?}")));
+    settings_given.extend(args.tolerance.map(|x| format!("solver.tolerance={x:?}")));
+    let scene = load(&args.scene, &settings_given)?;
+
+    let interrupted = catch_interrupts()?;
+    let to_stdout = args.out.as_deref() == Some(Path::new("-"));
+    let path = args
+        .out
+        .clone()
+        .unwrap_or_else(|| PathBuf::from(format!("{}-{}.mcap", scene.name, scene.seed)));
+    let options = WriterOptions::default();
+    let writer = if to_stdout {
+        RecordingWriter::to_stream(std::io::stdout(), &options)?
+    } else {
+        RecordingWriter::create(&path, &options)?
+    };
+
+    let began = Instant::now();
+    let model = Model::new(&scene);
+    let recorder = Recorder::new(&model, writer)?;
+    let mut watch = Watch {
+        recorder,
+        interrupted,
+        progress: None,
+        began,
+        duration_s: scene.duration_s,
+        samples: 0,
+    };
+    let method = method(&scene.solver.method).map_err(|e| anyhow!(e))?;
+    let (stats, outcome) = run_model(&model, method, &settings(&scene), &mut watch);
+    if let Some(bar) = watch.progress.take() {
+        bar.finish_and_clear();
+    }
+    let nothing_left = if to_stdout {
+        "the stream ends there"
+    } else {
+        "no file was made"
+    };
+    match outcome {
+        Ok(()) => watch.recorder.finish()?,
+        Err(Stopped::ByObserver { t_s }) if watch.interrupted.load(Ordering::Relaxed) => {
+            remove_unfinished_files();
+            return Err(anyhow!(
+                "interrupted at {t_s:.3} s of {} s; {nothing_left}",
+                scene.duration_s
+            ));
+        }
+        // The writer stopped it: `finish` says why.
+        Err(Stopped::ByObserver { .. }) => watch.recorder.finish()?,
+        Err(error) => {
+            return Err(error).with_context(|| {
+                format!(
+                    "scene `{}` did not run to its end; {nothing_left}",
+                    scene.name
+                )
+            });
+        }
+    }
+    let what = if to_stdout {
+        "standard output".to_owned()
+    } else {
+        path.display().to_string()
+    };
+    eprintln!(
+        "{what}: {} seed {}, {} s at {} Hz ({} samples); {} in {:.3} s: {} steps, {} contact events",
+        scene.name,
+        scene.seed,
+        scene.duration_s,
+        scene.log_rate_hz,
+        watch.samples,
+        method.name,
+        began.elapsed().as_secs_f64(),
+        stats.steps,
+        stats.events
+    );
+    Ok(())
+}
+
+/// A flag that ctrl-C sets. The run notices it at its next sample; a second ctrl-C ends the program at once.
+fn catch_interrupts() -> Result<&'static AtomicBool> {
+    static INTERRUPTED: AtomicBool = AtomicBool::new(false);
+    ctrlc::set_handler(|| {
+        if INTERRUPTED.swap(true, Ordering::Relaxed) {
+            remove_unfinished_files();
+            std::process::exit(1);
+        }
+    })
+    .context("ctrl-C cannot be watched")?;
+    Ok(&INTERRUPTED)
+}
+
+struct Watch<'m> {
+    recorder: Recorder<'m>,
+    interrupted: &'static AtomicBool,
+    progress: Option<ProgressBar>,
+    began: Instant,
+    duration_s: f64,
+    samples: u64,
+}
+
+impl Listener for Watch<'_> {
+    fn sample(&mut self, sample: &Sample) -> bool {
+        self.samples += 1;
+        // A short run needs no progress bar; indicatif shows one on a terminal only.
+        if self.samples.is_multiple_of(64) {
+            if self.progress.is_none() && self.began.elapsed() > Duration::from_secs(1) {
+                let bar = ProgressBar::new((self.duration_s * 1e3) as u64);
+                let style =
+                    ProgressStyle::with_template("{wide_bar} {percent}% of the scene, {eta} left");
+                bar.set_style(style.unwrap_or_else(|_| ProgressStyle::default_bar()));
+                self.progress = Some(bar);
+            }
+            if let Some(bar) = &self.progress {
+                bar.set_position((sample.t_s * 1e3) as u64);
+            }
+        }
+        !self.interrupted.load(Ordering::Relaxed) && self.recorder.sample(sample)
+    }
+}

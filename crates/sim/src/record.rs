@@ -1,0 +1,447 @@
+//! Samples → a recording: every topic of the contract, from one sample at a time.
+
+use crate::model::Model;
+use crate::run::{Listener, Sample};
+use crate::scene::{Scene, to_toml};
+use recording::cdr::{
+    Header, Quaternion, StringMessage, TfMessage, Time, Transform, TransformStamped, Vector3,
+};
+use recording::schema::{foxglove, rath};
+use recording::topics::{self, MessageKind};
+use recording::write::{ChannelId, RecordingWriter, WriteError};
+use std::collections::BTreeMap;
+
+/// Version of the program, as written into recordings.
+pub const VERSION: &str = env!("CARGO_PKG_VERSION");
+
+/// Writes samples as messages.
+pub struct Recorder<'m> {
+    model: &'m Model,
+    writer: RecordingWriter,
+    epoch_ns: i64,
+    state: ChannelId,
+    phases: Option<ChannelId>,
+    forces: ChannelId,
+    energy: Option<ChannelId>,
+    tf: ChannelId,
+    scene: ChannelId,
+    beat: Option<ChannelId>,
+    next_beat: u64,
+    frames: Vec<String>,
+    natural: Vec<f64>,
+    weight_n: f64,
+    failed: Option<WriteError>,
+}
+
+impl<'m> Recorder<'m> {
+    /// Begins a recording of `model`: metadata, the attached scene, channels, and the description of the bodies.
+    ///
+    /// # Errors
+    /// What the writer says.
+    pub fn new(model: &'m Model, mut writer: RecordingWriter) -> Result<Self, WriteError> {
+        let scene = &model.scene;
+        writer.metadata("rath", &metadata(scene))?;
+        writer.attachment("scene.toml", "application/toml", to_toml(scene).as_bytes())?;
+        // OK because a checked scene keeps stamps below 2262.
+        let epoch_ns = (scene.epoch_s * 1e9).round() as i64;
+        let has = |there: bool, writer: &mut RecordingWriter, topic, kind| {
+            there.then(|| writer.channel(topic, kind)).transpose()
+        };
+        let state = writer.channel(topics::STATE, MessageKind::RathState)?;
+        let phases = has(
+            model.layout().phases > 0,
+            &mut writer,
+            topics::PHASES,
+            MessageKind::Phases,
+        )?;
+        let forces = writer.channel(topics::FORCES, MessageKind::HandleForces)?;
+        let energy = has(
+            scene.solver.energy,
+            &mut writer,
+            topics::ENERGY,
+            MessageKind::Energy,
+        )?;
+        let tf = writer.channel(topics::TF, MessageKind::Tf)?;
+        let arrows = writer.channel(topics::SCENE, MessageKind::SceneUpdate)?;
+        let beat = has(
+            model.beat().is_some(),
+            &mut writer,
+            topics::BEAT,
+            MessageKind::Beat,
+        )?;
+        let description =
+            writer.channel(topics::ROBOT_DESCRIPTION, MessageKind::RobotDescription)?;
+        writer.message(description, epoch_ns, &StringMessage { data: urdf(scene) })?;
+        Ok(Self {
+            model,
+            writer,
+            epoch_ns,
+            state,
+            phases,
+            forces,
+            energy,
+            tf,
+            scene: arrows,
+            beat,
+            next_beat: 0,
+            frames: (1..=model.carriers())
+                .map(|i| format!("carrier_{i}"))
+                .collect(),
+            natural: model.natural_rad_per_s().to_vec(),
+            weight_n: model.body.mass_kg * model.body.gravity_m_per_s2.norm(),
+            failed: None,
+        })
+    }
+
+    /// Completes the recording and gives it its name.
+    ///
+    /// # Errors
+    /// What the writer says, now or at an earlier sample.
+    pub fn finish(self) -> Result<(), WriteError> {
+        match self.failed {
+            Some(error) => Err(error),
+            None => self.writer.finish(),
+        }
+    }
+
+    fn stamp_ns(&self, t_s: f64) -> i64 {
+        // OK because a checked scene keeps stamps below 2262.
+        self.epoch_ns + (t_s * 1e9).round() as i64
+    }
+
+    fn write(&mut self, s: &Sample) -> Result<(), WriteError> {
+        self.write_beats(s.t_s)?;
+        let t_ns = self.stamp_ns(s.t_s);
+        let [roll_rad, pitch_rad, yaw_rad] = s.roll_pitch_yaw_rad;
+        let [x, y, z, w] = s.pose.orientation;
+        self.writer.message(
+            self.state,
+            t_ns,
+            &rath::State {
+                time_s: s.t_s,
+                position_m: Some(vector(s.pose.position_m)),
+                orientation: Some(rath::Quaternion { x, y, z, w }),
+                velocity_m_per_s: Some(vector(s.pose.velocity_m_per_s)),
+                angular_velocity_rad_per_s: Some(vector(s.pose.spin_rad_per_s)),
+                roll_rad,
+                pitch_rad,
+                yaw_rad,
+            },
+        )?;
+        if let Some(channel) = self.phases {
+            let message = rath::Phases {
+                time_s: s.t_s,
+                phase_rad: s.phase_rad.clone(),
+                natural_frequency_rad_per_s: self.natural.clone(),
+                beat_phase_rad: s.beat_phase_rad,
+                beat_present: s.beat_phase_rad.is_some(),
+                order_parameter: s.order_parameter().unwrap_or(0.0),
+            };
+            self.writer.message(channel, t_ns, &message)?;
+        }
+        let message = rath::HandleForces {
+            time_s: s.t_s,
+            normal_n: s.normal_n.clone(),
+            tangential_n: s
+                .tangential_n
+                .iter()
+                .map(|t| vector([t[0], t[1], 0.0]))
+                .collect(),
+            compression_m: s.compression_m.clone(),
+            in_contact: s.normal_n.iter().map(|n| *n > 0.0).collect(),
+        };
+        self.writer.message(self.forces, t_ns, &message)?;
+        if let (Some(channel), Some(e)) = (self.energy, s.energy) {
+            let message = rath::Energy {
+                time_s: s.t_s,
+                kinetic_j: e.kinetic_j,
+                potential_j: e.potential_j,
+                elastic_j: e.elastic_j,
+                work_in_j: e.work_in_j,
+                dissipated_j: e.dissipated_j,
+                unexplained_j: e.unexplained_j,
+                shares: Vec::new(),
+            };
+            self.writer.message(channel, t_ns, &message)?;
+        }
+        self.writer
+            .message(self.tf, t_ns, &self.transforms(s, t_ns))?;
+        let arrows = self.arrows(s, t_ns);
+        self.writer.message(self.scene, t_ns, &arrows)
+    }
+
+    /// Every beat up to and including `until_s`, at its own time.
+    fn write_beats(&mut self, until_s: f64) -> Result<(), WriteError> {
+        let (Some(channel), Some(beat)) = (self.beat, self.model.beat()) else {
+            return Ok(());
+        };
+        if beat.rate_rad_per_s <= 0.0 {
+            return Ok(());
+        }
+        // Beats are where ψ passes a whole number of turns, once the music has begun.
+        let first = (beat.phase_at(beat.onset_s) / std::f64::consts::TAU - 1e-9).ceil();
+        loop {
+            let turn = first + self.next_beat as f64;
+            let time_s = (turn * std::f64::consts::TAU - beat.phase_rad) / beat.rate_rad_per_s;
+            if time_s > until_s {
+                return Ok(());
+            }
+            let tempo_hz = beat.rate_rad_per_s / std::f64::consts::TAU;
+            let message = rath::Beat {
+                number: self.next_beat,
+                time_s,
+                tempo_hz,
+            };
+            self.writer
+                .message(channel, self.stamp_ns(time_s.max(0.0)), &message)?;
+            self.next_beat += 1;
+        }
+    }
+
+    fn transforms(&self, s: &Sample, t_ns: i64) -> TfMessage {
+        let [x, y, z, w] = s.pose.orientation;
+        let mut transforms = Vec::with_capacity(1 + self.frames.len());
+        transforms.push(transform(
+            t_ns,
+            "rath",
+            s.pose.position_m,
+            Quaternion { x, y, z, w },
+        ));
+        for (frame, shoulder) in self.frames.iter().zip(&s.shoulder_m) {
+            let level = Quaternion {
+                x: 0.0,
+                y: 0.0,
+                z: 0.0,
+                w: 1.0,
+            };
+            transforms.push(transform(t_ns, frame, *shoulder, level));
+        }
+        TfMessage { transforms }
+    }
+
+    /// Force arrows (one metre is the body's weight) and contact marks.
+    fn arrows(&self, s: &Sample, t_ns: i64) -> foxglove::SceneUpdate {
+        let mut arrows = Vec::with_capacity(s.normal_n.len());
+        let mut spheres = Vec::with_capacity(s.normal_n.len());
+        for ((&normal_n, tangential_n), handle_m) in
+            s.normal_n.iter().zip(&s.tangential_n).zip(&s.handle_m)
+        {
+            let share = if self.weight_n > 0.0 {
+                normal_n / self.weight_n
+            } else {
+                0.0
+            };
+            let color = Some(contact_color(normal_n, self.weight_n));
+            let [tx, ty] = tangential_n.map(|t| {
+                if self.weight_n > 0.0 {
+                    t / self.weight_n
+                } else {
+                    0.0
+                }
+            });
+            let length = (tx * tx + ty * ty + share * share).sqrt();
+            if length > 1e-6 {
+                let orientation = Some(turn_from_x([tx / length, ty / length, share / length]));
+                arrows.push(foxglove::ArrowPrimitive {
+                    pose: Some(foxglove::Pose {
+                        position: Some(point(*handle_m)),
+                        orientation,
+                    }),
+                    shaft_length: 0.8 * length,
+                    shaft_diameter: 0.03,
+                    head_length: 0.2 * length,
+                    head_diameter: 0.06,
+                    color,
+                });
+            }
+            spheres.push(foxglove::SpherePrimitive {
+                pose: Some(foxglove::Pose {
+                    position: Some(point(*handle_m)),
+                    orientation: Some(foxglove::Quaternion {
+                        x: 0.0,
+                        y: 0.0,
+                        z: 0.0,
+                        w: 1.0,
+                    }),
+                }),
+                size: Some(point(if normal_n > 0.0 { [0.1; 3] } else { [0.16; 3] })),
+                color,
+            });
+        }
+        foxglove::SceneUpdate {
+            deletions: Vec::new(),
+            entities: vec![foxglove::SceneEntity {
+                timestamp: Some(timestamp(t_ns)),
+                frame_id: "world".into(),
+                id: "handle_forces".into(),
+                arrows,
+                spheres,
+                ..foxglove::SceneEntity::default()
+            }],
+        }
+    }
+}
+
+impl Listener for Recorder<'_> {
+    fn sample(&mut self, sample: &Sample) -> bool {
+        if let Err(error) = self.write(sample) {
+            self.failed = Some(error);
+            return false;
+        }
+        true
+    }
+}
+
+/// The metadata record `rath`: what an analyzer may need without opening the scene.
+pub fn metadata(scene: &Scene) -> BTreeMap<String, String> {
+    let [gx, gy, gz] = scene.body.gravity_m_per_s2;
+    let gravity = (gx * gx + gy * gy + gz * gz).sqrt();
+    [
+        ("source", "sim".to_owned()),
+        ("version", VERSION.to_owned()),
+        ("scene", scene.name.clone()),
+        ("seed", scene.seed.to_string()),
+        ("method", scene.solver.method.clone()),
+        ("tolerance", format!("{:e}", scene.solver.tolerance)),
+        ("step_s", scene.solver.step_s.to_string()),
+        ("analysis_start_s", scene.analysis_start_s.to_string()),
+        ("mass_kg", scene.body.mass_kg.to_string()),
+        ("gravity_m_per_s2", gravity.to_string()),
+    ]
+    .map(|(key, value)| (key.to_owned(), value))
+    .into()
+}
+
+/// Loaded, nearly unloaded (below a tenth of the fair share) and slack, in colours that colour-blind people tell apart.
+fn contact_color(normal_n: f64, weight_n: f64) -> foxglove::Color {
+    let [r, g, b] = if normal_n <= 0.0 {
+        [0.84, 0.37, 0.0]
+    } else if normal_n < 0.05 * weight_n {
+        [0.94, 0.89, 0.26]
+    } else {
+        [0.0, 0.45, 0.70]
+    };
+    foxglove::Color { r, g, b, a: 1.0 }
+}
+
+/// The shortest rotation that takes +x to the unit vector `d`.
+fn turn_from_x(d: [f64; 3]) -> foxglove::Quaternion {
+    let w = 1.0 + d[0];
+    if w < 1e-12 {
+        return foxglove::Quaternion {
+            x: 0.0,
+            y: 0.0,
+            z: 1.0,
+            w: 0.0,
+        };
+    }
+    let n = (w * w + d[1] * d[1] + d[2] * d[2]).sqrt();
+    foxglove::Quaternion {
+        x: 0.0,
+        y: -d[2] / n,
+        z: d[1] / n,
+        w: w / n,
+    }
+}
+
+fn vector([x, y, z]: [f64; 3]) -> rath::Vector3 {
+    rath::Vector3 { x, y, z }
+}
+
+fn point([x, y, z]: [f64; 3]) -> foxglove::Vector3 {
+    foxglove::Vector3 { x, y, z }
+}
+
+fn timestamp(t_ns: i64) -> prost_types::Timestamp {
+    prost_types::Timestamp {
+        seconds: t_ns.div_euclid(1_000_000_000),
+        nanos: t_ns.rem_euclid(1_000_000_000) as i32,
+    }
+}
+
+fn transform(
+    t_ns: i64,
+    child: &str,
+    [x, y, z]: [f64; 3],
+    rotation: Quaternion,
+) -> TransformStamped {
+    TransformStamped {
+        header: Header {
+            stamp: Time::from_ns(t_ns),
+            frame_id: "world".into(),
+        },
+        child_frame_id: child.into(),
+        transform: Transform {
+            translation: Vector3 { x, y, z },
+            rotation,
+        },
+    }
+}
+
+/// Body, poles and carriers as URDF: boxes and cylinders on the frames of `/tf`. The shapes are for the eye alone.
+fn urdf(scene: &Scene) -> String {
+    use std::fmt::Write;
+    let handles = &scene.carriers.handles_m;
+    let mut text =
+        String::from("<?xml version=\"1.0\"?>\n<robot name=\"rath\">\n  <link name=\"world\"/>\n");
+    text += "  <joint name=\"world_to_rath\" type=\"floating\"><parent link=\"world\"/><child link=\"rath\"/></joint>\n";
+    text += "  <link name=\"rath\">\n";
+    text += "    <visual><geometry><box size=\"0.7 0.5 0.6\"/></geometry>\
+             <material name=\"body\"><color rgba=\"0.80 0.47 0.65 1\"/></material></visual>\n";
+    // One pole for every distinct (y, z) of the handles.
+    let mut poles: Vec<[f64; 4]> = Vec::new();
+    for &[x, y, z] in handles {
+        match poles
+            .iter_mut()
+            .find(|p| (p[0] - y).abs() < 1e-6 && (p[1] - z).abs() < 1e-6)
+        {
+            Some(pole) => (pole[2], pole[3]) = (pole[2].min(x), pole[3].max(x)),
+            None => poles.push([y, z, x, x]),
+        }
+    }
+    for [y, z, from, to] in poles {
+        let (middle, length) = (0.5 * (from + to), (to - from).max(0.2) + 0.4);
+        let _ = writeln!(
+            text,
+            "    <visual><origin xyz=\"{middle} {y} {z}\" rpy=\"0 1.5707963267948966 0\"/><geometry><cylinder radius=\"0.04\" \
+             length=\"{length}\"/></geometry><material name=\"pole\"><color rgba=\"0.35 0.25 0.15 1\"/></material></visual>"
+        );
+    }
+    text += "  </link>\n";
+    for i in 1..=handles.len() {
+        let height = scene.carriers.shoulder_height_m.get(i - 1).abs().max(0.2);
+        let _ = writeln!(
+            text,
+            "  <joint name=\"world_to_carrier_{i}\" type=\"floating\"><parent link=\"world\"/><child link=\"carrier_{i}\"/></joint>\n  \
+             <link name=\"carrier_{i}\"><visual><origin xyz=\"0 0 {}\"/><geometry><cylinder radius=\"0.15\" length=\"{height}\"/></geometry>\
+             <material name=\"carrier\"><color rgba=\"0.34 0.71 0.91 1\"/></material></visual></link>",
+            -0.5 * height
+        );
+    }
+    text + "</robot>\n"
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn arrows_point_where_the_force_does() {
+        for d in [
+            [1.0, 0.0, 0.0],
+            [0.0, 0.0, 1.0],
+            [0.0, -0.6, 0.8],
+            [-0.6, 0.0, 0.8],
+        ] {
+            let q = turn_from_x(d);
+            let q = nalgebra::UnitQuaternion::new_normalize(nalgebra::Quaternion::new(
+                q.w, q.x, q.y, q.z,
+            ));
+            let got = q * nalgebra::Vector3::x();
+            assert!(
+                (got - nalgebra::Vector3::from(d)).norm() < 1e-12,
+                "{d:?}: {got}"
+            );
+        }
+    }
+}

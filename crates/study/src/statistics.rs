@@ -1,0 +1,65 @@
+//! Mean, spread and interval of an ensemble.
+
+/// Summary of one number over the runs that have it.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Summary {
+    /// How many runs have it.
+    pub runs: usize,
+    /// Arithmetic mean.
+    pub mean: f64,
+    /// Sample standard deviation (n − 1); 0 for one run.
+    pub sd: f64,
+    /// Half-width of the 95 % interval of the mean, 1.96·SD/√n: the large-sample formula, which the paper's table uses too.
+    pub ci95: f64,
+}
+
+/// Summarises finite values in their order, so that the result does not depend on who computed them when; `None` where there are none.
+pub fn summarise(values: impl Iterator<Item = f64>) -> Option<Summary> {
+    let values: Vec<f64> = values.collect();
+    let n = values.len();
+    if n == 0 {
+        return None;
+    }
+    let mean = values.iter().sum::<f64>() / n as f64;
+    let sd = match n {
+        1 => 0.0,
+        _ => (values.iter().map(|x| (x - mean) * (x - mean)).sum::<f64>() / (n - 1) as f64).sqrt(),
+    };
+    Some(Summary {
+        runs: n,
+        mean,
+        sd,
+        ci95: 1.96 * sd / (n as f64).sqrt(),
+    })
+}
+
+/// Pearson's correlation of two equally long columns; `None` where one of them does not vary.
+pub fn correlation(x: &[f64], y: &[f64]) -> Option<f64> {
+    let n = x.len().min(y.len()) as f64;
+    let (mx, my) = (x.iter().sum::<f64>() / n, y.iter().sum::<f64>() / n);
+    let (mut xy, mut xx, mut yy) = (0.0, 0.0, 0.0);
+    for (a, b) in x.iter().zip(y) {
+        let (a, b) = (a - mx, b - my);
+        xy += a * b;
+        xx += a * a;
+        yy += b * b;
+    }
+    let r = xy / (xx * yy).sqrt();
+    r.is_finite().then_some(r)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn textbook_numbers() {
+        let s = summarise([2.0, 4.0, 4.0, 4.0, 5.0, 5.0, 7.0, 9.0].into_iter()).unwrap();
+        assert_eq!((s.runs, s.mean), (8, 5.0));
+        assert!((s.sd - (32.0_f64 / 7.0).sqrt()).abs() < 1e-15);
+        assert!(summarise(std::iter::empty()).is_none());
+        assert_eq!(summarise([3.0].into_iter()).unwrap().sd, 0.0);
+        assert!((correlation(&[1.0, 2.0, 3.0], &[6.0, 4.0, 2.0]).unwrap() + 1.0).abs() < 1e-15);
+        assert!(correlation(&[1.0, 1.0], &[1.0, 2.0]).is_none());
+    }
+}
