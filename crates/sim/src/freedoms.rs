@@ -49,7 +49,7 @@ pub trait Freedoms: Send + Sync {
     fn positions(&self) -> usize;
     /// Puts the body where a scene starts.
     fn place(&self, start: &Start, height_m: f64, y: &mut [f64]);
-    /// Fills `arm`, `gap`, `gap_rate` and `spin` of the workspace.
+    /// Fills `arm`, `gap`, `gap_rate`, `rotation` and `spin` of the workspace.
     fn gaps(&self, y: &[f64], w: &mut Workspace);
     /// Writes the derivatives of the body's states from the forces in the workspace.
     fn accelerate(&self, y: &[f64], w: &mut Workspace, dy: &mut [f64]);
@@ -73,10 +73,10 @@ pub trait Freedoms: Send + Sync {
 /// Source: paper, section 3.4; Murray, Li, Sastry (1994), ch. 4. A quaternion off the unit sphere (within a step) is read
 /// as the rotation of q/|q|, which leaves the order of every Runge–Kutta method untouched.
 pub struct Six {
-    handle: [Vec<f64x2>; 3],
+    handle: Vec<[f64x2; 3]>,
     mass: f64,
     inverse_mass: f64,
-    gravity: Vector3<f64>,
+    gravity: [f64; 3],
     inertia: Matrix3<f64>,
     inverse_inertia: Matrix3<f64>,
 }
@@ -84,15 +84,21 @@ pub struct Six {
 impl Six {
     /// For a body held at `handles_m` (body coordinates).
     pub fn new(body: &Body, handles_m: &[[f64; 3]]) -> Self {
+        let [x, y, z] = [0, 1, 2].map(|a| pack(handles_m.iter().map(|h| h[a])));
         Self {
-            handle: [0, 1, 2].map(|a| pack(handles_m.iter().map(|h| h[a]))),
+            handle: (0..x.len()).map(|p| [x[p], y[p], z[p]]).collect(),
             mass: body.mass_kg,
             inverse_mass: 1.0 / body.mass_kg,
-            gravity: body.gravity_m_per_s2,
+            gravity: body.gravity_m_per_s2.into(),
             inertia: body.inertia_kg_m2,
             inverse_inertia: body.inverse_inertia,
         }
     }
+}
+
+#[inline(always)]
+fn times(m: &Matrix3<f64>, v: [f64; 3]) -> [f64; 3] {
+    [0, 1, 2].map(|a| m[(a, 0)] * v[0] + m[(a, 1)] * v[1] + m[(a, 2)] * v[2])
 }
 
 /// Rows of the rotation matrix of q/|q|.
@@ -139,40 +145,39 @@ impl Freedoms for Six {
         y[10..13].copy_from_slice(&start.angular_velocity_rad_per_s);
     }
 
-    #[inline]
     fn gaps(&self, y: &[f64], w: &mut Workspace) {
+        let y: &[f64; 13] = y.first_chunk().expect("thirteen states");
         let r = rotation(&y[3..7]);
         let spin = [y[10], y[11], y[12]];
-        // ω in the world: the rates of the arms are ω × arm there.
-        let world: [f64x2; 3] =
-            [0, 1, 2].map(|a| f64x2::splat(r[a][0] * spin[0] + r[a][1] * spin[1] + r[a][2] * spin[2]));
-        let rows = r.map(|row| row.map(f64x2::splat));
-        let position = [0, 1, 2].map(|a| f64x2::splat(y[a]));
-        let velocity = [0, 1, 2].map(|a| f64x2::splat(y[7 + a]));
         w.spin = spin;
-        for p in 0..w.normal.len() {
-            let (hx, hy, hz) = (self.handle[0][p], self.handle[1][p], self.handle[2][p]);
-            let arm = rows.map(|row| row[0] * hx + row[1] * hy + row[2] * hz);
+        w.rotation = r;
+        // ω in the world: the rates of the arms are ω × arm there.
+        let world = r.map(|row| f64x2::splat(row[0] * spin[0] + row[1] * spin[1] + row[2] * spin[2]));
+        let rows = r.map(|row| row.map(f64x2::splat));
+        let position = [y[0], y[1], y[2]].map(f64x2::splat);
+        let velocity = [y[7], y[8], y[9]].map(f64x2::splat);
+        for (p, h) in w.pair.iter_mut().zip(&self.handle) {
+            let arm = rows.map(|row| row[0] * h[0] + row[1] * h[1] + row[2] * h[2]);
             let arm_rate = [
                 world[1] * arm[2] - world[2] * arm[1],
                 world[2] * arm[0] - world[0] * arm[2],
                 world[0] * arm[1] - world[1] * arm[0],
             ];
             for a in 0..3 {
-                w.arm[a][p] = arm[a];
-                w.gap[a][p] = w.base[a][p] - position[a] - arm[a];
-                w.gap_rate[a][p] = w.base_rate[a][p] - velocity[a] - arm_rate[a];
+                p.arm[a] = arm[a];
+                p.gap[a] = p.base[a] - position[a] - arm[a];
+                p.gap_rate[a] = p.base_rate[a] - velocity[a] - arm_rate[a];
             }
         }
     }
 
-    #[inline]
     fn accelerate(&self, y: &[f64], w: &mut Workspace, dy: &mut [f64]) {
+        let y: &[f64; 13] = y.first_chunk().expect("thirteen states");
+        let dy: &mut [f64; 13] = dy.first_chunk_mut().expect("thirteen states");
         let zero = f64x2::ZERO;
         let (mut force, mut torque) = ([zero; 3], [zero; 3]);
-        for p in 0..w.normal.len() {
-            let (fx, fy, fz) = (w.tangential[0][p], w.tangential[1][p], w.normal[p]);
-            let (ax, ay, az) = (w.arm[0][p], w.arm[1][p], w.arm[2][p]);
+        for p in &w.pair {
+            let ([fx, fy], fz, [ax, ay, az]) = (p.tangential, p.normal, p.arm);
             force[0] += fx;
             force[1] += fy;
             force[2] += fz;
@@ -180,25 +185,28 @@ impl Freedoms for Six {
             torque[1] += az * fx - ax * fz;
             torque[2] += ax * fy - ay * fx;
         }
-        let t = torque.map(sum);
-        let r = rotation(&y[3..7]);
-        let spin = Vector3::new(y[10], y[11], y[12]);
-        let in_body = Vector3::new(
-            r[0][0] * t[0] + r[1][0] * t[1] + r[2][0] * t[2] + w.body_torque[0],
-            r[0][1] * t[0] + r[1][1] * t[1] + r[2][1] * t[2] + w.body_torque[1],
-            r[0][2] * t[0] + r[1][2] * t[1] + r[2][2] * t[2] + w.body_torque[2],
+        let (force, t, r) = (force.map(sum), torque.map(sum), &w.rotation);
+        let in_body = [0, 1, 2].map(|a| r[0][a] * t[0] + r[1][a] * t[1] + r[2][a] * t[2] + w.body_torque[a]);
+        let [wx, wy, wz] = w.spin;
+        let momentum = times(&self.inertia, [wx, wy, wz]);
+        let angular = times(
+            &self.inverse_inertia,
+            [
+                in_body[0] - (wy * momentum[2] - wz * momentum[1]),
+                in_body[1] - (wz * momentum[0] - wx * momentum[2]),
+                in_body[2] - (wx * momentum[1] - wy * momentum[0]),
+            ],
         );
-        let angular = self.inverse_inertia * (in_body - spin.cross(&(self.inertia * spin)));
         let (qx, qy, qz, qw) = (0.5 * y[3], 0.5 * y[4], 0.5 * y[5], 0.5 * y[6]);
         dy[0] = y[7];
         dy[1] = y[8];
         dy[2] = y[9];
-        dy[3] = qw * spin.x + qy * spin.z - qz * spin.y;
-        dy[4] = qw * spin.y + qz * spin.x - qx * spin.z;
-        dy[5] = qw * spin.z + qx * spin.y - qy * spin.x;
-        dy[6] = -(qx * spin.x + qy * spin.y + qz * spin.z);
+        dy[3] = qw * wx + qy * wz - qz * wy;
+        dy[4] = qw * wy + qz * wx - qx * wz;
+        dy[5] = qw * wz + qx * wy - qy * wx;
+        dy[6] = -(qx * wx + qy * wy + qz * wz);
         for a in 0..3 {
-            dy[7 + a] = sum(force[a]) * self.inverse_mass + self.gravity[a];
+            dy[7 + a] = force[a] * self.inverse_mass + self.gravity[a];
             dy[10 + a] = angular[a];
         }
     }
@@ -233,7 +241,7 @@ impl Freedoms for Six {
         let v = Vector3::new(y[7], y[8], y[9]);
         let spin = Vector3::new(y[10], y[11], y[12]);
         let kinetic = 0.5 * (self.mass * v.norm_squared() + spin.dot(&(self.inertia * spin)));
-        [kinetic, -self.mass * self.gravity.dot(&Vector3::new(y[0], y[1], y[2]))]
+        [kinetic, -self.mass * (0..3).map(|a| self.gravity[a] * y[a]).sum::<f64>()]
     }
 }
 

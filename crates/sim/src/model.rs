@@ -13,7 +13,7 @@
 use crate::body::Body;
 use crate::effects;
 use crate::freedoms::{Freedoms, Six};
-use crate::lanes::{self, f64x2, pack, pairs};
+use crate::lanes::{self, LANES, f64x2, pack, pairs};
 use crate::random::{Stream, normal};
 use crate::scene::Scene;
 
@@ -82,43 +82,52 @@ impl Beat {
     }
 }
 
-/// The numbers of one evaluation and of the present segment; pairs of carriers side by side.
+/// The numbers of two carriers in one evaluation, and in the present segment. Padding exerts nothing.
+#[derive(Clone, Copy, Debug)]
+pub struct Pair {
+    /// 1 for a carrier, 0 for padding.
+    pub present: f64x2,
+    /// Resting shoulders, m.
+    pub rest: [f64x2; 3],
+    /// Natural frequency and the segment's noise, rad/s.
+    pub constant_rate: f64x2,
+    /// What multiplies N*: 1 where it acts, 0 on a slack handle.
+    pub contact_gain: f64x2,
+    /// The least that N can be: 0 (slack, or undecided), −∞ (in contact for the whole segment).
+    pub contact_floor: f64x2,
+    /// sin φ
+    pub sin: f64x2,
+    /// cos φ
+    pub cos: f64x2,
+    /// φ̇, rad/s
+    pub rate: f64x2,
+    /// Shoulders b, m.
+    pub base: [f64x2; 3],
+    /// ḃ, m/s
+    pub base_rate: [f64x2; 3],
+    /// Handles relative to the centre of mass, in the world, m.
+    pub arm: [f64x2; 3],
+    /// Shoulder minus handle, m.
+    pub gap: [f64x2; 3],
+    /// Its rate, m/s.
+    pub gap_rate: [f64x2; 3],
+    /// N* before the clamp, N.
+    pub unclamped: f64x2,
+    /// N, N
+    pub normal: f64x2,
+    /// T in x and y, N
+    pub tangential: [f64x2; 2],
+}
+
+/// The numbers of one evaluation and of the present segment.
 #[derive(Clone, Debug)]
 pub struct Workspace {
     /// When the present segment began, s.
     pub segment_s: f64,
-    /// Natural frequency and the segment's noise, rad/s.
-    pub constant_rate: Vec<f64x2>,
-    /// What multiplies N*: 1 where it acts, 0 on a slack handle.
-    pub contact_gain: Vec<f64x2>,
-    /// The least that N can be: 0 (slack, or undecided), −∞ (in contact for the whole segment).
-    pub contact_floor: Vec<f64x2>,
-    /// 1 for a carrier, 0 for padding.
-    pub present: Vec<f64x2>,
-    /// Resting shoulders, m.
-    pub rest: [Vec<f64x2>; 3],
-    /// sin φ
-    pub sin: Vec<f64x2>,
-    /// cos φ
-    pub cos: Vec<f64x2>,
-    /// φ̇, rad/s
-    pub rate: Vec<f64x2>,
-    /// Shoulders b, m.
-    pub base: [Vec<f64x2>; 3],
-    /// ḃ, m/s
-    pub base_rate: [Vec<f64x2>; 3],
-    /// Handles relative to the centre of mass, in the world, m.
-    pub arm: [Vec<f64x2>; 3],
-    /// Shoulder minus handle, m.
-    pub gap: [Vec<f64x2>; 3],
-    /// Its rate, m/s.
-    pub gap_rate: [Vec<f64x2>; 3],
-    /// N* before the clamp, N.
-    pub unclamped: Vec<f64x2>,
-    /// N, N
-    pub normal: Vec<f64x2>,
-    /// T in x and y, N
-    pub tangential: [Vec<f64x2>; 2],
+    /// The carriers, two by two: carrier i is lane i mod 2 of pair i / 2.
+    pub pair: Vec<Pair>,
+    /// Rows of the rotation body → world.
+    pub rotation: [[f64; 3]; 3],
     /// Angular velocity in the body, rad/s.
     pub spin: [f64; 3],
     /// Torque on the body beside that of the handle forces, body axes, N·m.
@@ -126,10 +135,16 @@ pub struct Workspace {
 }
 
 impl Workspace {
-    /// How many pairs hold the carriers.
+    /// A number of carrier `i`.
     #[inline(always)]
-    pub fn pairs(&self) -> usize {
-        self.normal.len()
+    pub fn of(&self, i: usize, pick: impl Fn(&Pair) -> f64x2) -> f64 {
+        pick(&self.pair[i / LANES]).as_array()[i % LANES]
+    }
+
+    /// A number of carrier `i`, to be changed.
+    #[inline(always)]
+    pub fn of_mut(&mut self, i: usize, pick: impl Fn(&mut Pair) -> &mut f64x2) -> &mut f64 {
+        &mut pick(&mut self.pair[i / LANES]).as_mut_array()[i % LANES]
     }
 }
 
@@ -172,8 +187,6 @@ pub struct Model {
     natural_rad_per_s: Vec<f64>,
     initial_phases: Vec<f64>,
     has_phases: bool,
-    /// Axes along which shoulders move; the others stay at rest and cost nothing.
-    moving_axes: [bool; 3],
     terms: [Vec<Box<dyn Term>>; 4],
     switches: Vec<Box<dyn Switch>>,
     accounts: Vec<(&'static str, Box<dyn Account>)>,
@@ -207,7 +220,6 @@ impl Model {
                 })
                 .collect(),
             has_phases: false,
-            moving_axes: [false; 3],
             terms: Default::default(),
             switches: Vec::new(),
             accounts: Vec::new(),
@@ -246,11 +258,6 @@ impl Model {
     /// Asks for phases in the state.
     pub(crate) fn need_phases(&mut self) {
         self.has_phases = true;
-    }
-
-    /// Says that shoulders move along an axis.
-    pub(crate) fn shoulders_move(&mut self, axis: usize) {
-        self.moving_axes[axis] = true;
     }
 
     /// Shifts the natural frequencies, rad/s.
@@ -320,32 +327,40 @@ impl Model {
     /// A workspace for this model; shoulders at rest, contacts undecided.
     pub fn workspace(&self) -> Workspace {
         let n = self.carriers();
-        let zero = || vec![f64x2::ZERO; pairs(n)];
         let handles = &self.scene.carriers.handles_m;
+        let present = pack((0..n).map(|_| 1.0));
         let rest = [
             pack(handles.iter().map(|h| h[0])),
             pack(handles.iter().map(|h| h[1])),
             pack((0..n).map(|i| self.scene.carriers.shoulder_height_m.get(i))),
         ];
-        let present = pack((0..n).map(|_| 1.0));
+        let zero = f64x2::ZERO;
+        let floor = if self.watches_contact { 0.0 } else { f64::NEG_INFINITY };
+        let pair = |p: usize| {
+            let rest = [rest[0][p], rest[1][p], rest[2][p]];
+            Pair {
+                present: present[p],
+                rest,
+                constant_rate: zero,
+                contact_gain: present[p],
+                contact_floor: f64x2::splat(floor),
+                sin: zero,
+                cos: zero,
+                rate: zero,
+                base: rest,
+                base_rate: [zero; 3],
+                arm: [zero; 3],
+                gap: [zero; 3],
+                gap_rate: [zero; 3],
+                unclamped: zero,
+                normal: zero,
+                tangential: [zero; 2],
+            }
+        };
         Workspace {
             segment_s: 0.0,
-            constant_rate: zero(),
-            contact_gain: present.clone(),
-            contact_floor: vec![f64x2::splat(if self.watches_contact { 0.0 } else { f64::NEG_INFINITY }); pairs(n)],
-            present,
-            base: rest.clone(),
-            rest,
-            sin: zero(),
-            cos: zero(),
-            rate: zero(),
-            base_rate: [zero(), zero(), zero()],
-            arm: [zero(), zero(), zero()],
-            gap: [zero(), zero(), zero()],
-            gap_rate: [zero(), zero(), zero()],
-            unclamped: zero(),
-            normal: zero(),
-            tangential: [zero(), zero()],
+            pair: (0..pairs(n)).map(pair).collect(),
+            rotation: [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]],
             spin: [0.0; 3],
             body_torque: [0.0; 3],
         }
@@ -383,8 +398,8 @@ impl Model {
     /// Begins a segment at `t_s`: noise, music and contacts take the values they have just after it.
     pub fn begin_segment(&self, t_s: f64, w: &mut Workspace) {
         w.segment_s = t_s;
-        for (p, w0) in w.constant_rate.iter_mut().zip(pack(self.natural_rad_per_s.iter().copied())) {
-            *p = w0;
+        for (i, rate) in self.natural_rad_per_s.iter().enumerate() {
+            *w.of_mut(i, |p| &mut p.constant_rate) = *rate;
         }
         for switch in &self.switches {
             switch.begin(t_s, w);
@@ -397,7 +412,7 @@ impl Model {
         self.forces(t_s, y, w);
         self.freedoms.accelerate(y, w, dy);
         let phases = self.layout.phase_range();
-        lanes::store(&w.rate, &mut dy[phases]);
+        lanes::store(w.pair.iter().map(|p| p.rate), &mut dy[phases]);
         for ((_, account), out) in self.accounts.iter().zip(dy[self.layout.ledger_range()].chunks_exact_mut(2)) {
             let power = account.power(w);
             out.copy_from_slice(&[power.work_w, power.dissipated_w]);
@@ -422,21 +437,16 @@ impl Model {
 
     #[inline]
     fn phases(&self, t_s: f64, y: &[f64], w: &mut Workspace) {
-        let Workspace { sin, cos, rate, constant_rate, .. } = w;
-        lanes::load(&y[self.layout.phase_range()], rate);
-        for p in 0..rate.len() {
-            (sin[p], cos[p]) = rate[p].sin_cos();
+        for (pair, phase) in w.pair.iter_mut().zip(lanes::load(&y[self.layout.phase_range()])) {
+            (pair.sin, pair.cos) = lanes::sin_cos(phase);
+            pair.rate = pair.constant_rate;
+            for axis in 0..3 {
+                pair.base[axis] = pair.rest[axis];
+                pair.base_rate[axis] = f64x2::ZERO;
+            }
         }
-        rate.copy_from_slice(constant_rate);
         for term in &self.terms[Stage::Phases as usize] {
             term.apply(t_s, w);
-        }
-        for axis in 0..3 {
-            if self.moving_axes[axis] {
-                let Workspace { base, base_rate, rest, .. } = w;
-                base[axis].copy_from_slice(&rest[axis]);
-                base_rate[axis].fill(f64x2::ZERO);
-            }
         }
         for term in &self.terms[Stage::Shoulders as usize] {
             term.apply(t_s, w);

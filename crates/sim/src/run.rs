@@ -2,7 +2,6 @@
 
 use crate::energy::Energy;
 use crate::freedoms::Pose;
-use crate::lanes::lane;
 use crate::model::{Model, Workspace};
 use crate::scene::Scene;
 use crate::solve::{Event, Observer, Settings, Stats, Stopped, method};
@@ -133,12 +132,12 @@ impl Observer for Bridge<'_> {
         s.beat_phase_rad = model.beat().filter(|b| t_s >= b.onset_s).map(|b| b.phase_at(t_s));
         let walked = walk.map(|v| v * t_s);
         for i in 0..model.carriers() {
-            s.normal_n[i] = lane(&w.normal, i);
-            s.tangential_n[i] = [lane(&w.tangential[0], i), lane(&w.tangential[1], i)];
-            s.compression_m[i] = lane(&w.gap[2], i);
+            s.normal_n[i] = w.of(i, |p| p.normal);
+            s.tangential_n[i] = [0, 1].map(|a| w.of(i, |p| p.tangential[a]));
+            s.compression_m[i] = w.of(i, |p| p.gap[2]);
             for a in 0..3 {
-                s.shoulder_m[i][a] = lane(&w.base[a], i) + walked[a];
-                s.handle_m[i][a] = s.pose.position_m[a] + lane(&w.arm[a], i) + walked[a];
+                s.shoulder_m[i][a] = w.of(i, |p| p.base[a]) + walked[a];
+                s.handle_m[i][a] = s.pose.position_m[a] + w.of(i, |p| p.arm[a]) + walked[a];
             }
         }
         s.energy = Energy::of(model, y, w, &mut self.at_start_j);

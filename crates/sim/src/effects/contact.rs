@@ -11,7 +11,7 @@
 //! Source: paper, eq. (unilateral); Brogliato, Nonsmooth Mechanics (1999), ch. 2.
 
 use crate::lanes::{f64x2, pack};
-use crate::model::{Account, Model, Power, Stage, Term, Workspace};
+use crate::model::{Account, Model, Pair, Power, Stage, Term, Workspace};
 use crate::scene::{Checker, PerCarrier, Problem, Scene, problem};
 use serde::{Deserialize, Serialize};
 
@@ -47,10 +47,9 @@ impl Contact {
 
     pub(super) fn build(&self, scene: &Scene, model: &mut Model) {
         let n = scene.carriers.count();
-        let law = SpringDamper {
-            stiffness: pack((0..n).map(|i| self.stiffness_n_per_m.get(i))),
-            damping: pack((0..n).map(|i| self.damping_n_s_per_m.get(i))),
-        };
+        let stiffness = pack((0..n).map(|i| self.stiffness_n_per_m.get(i)));
+        let damping = pack((0..n).map(|i| self.damping_n_s_per_m.get(i)));
+        let law = SpringDampers(stiffness.into_iter().zip(damping).collect());
         model.add(Stage::Handles, law.clone());
         model.add_account("contact", law);
         model.set_contact_springs(self.bilateral, (0..n).map(|i| self.stiffness_n_per_m.get(i)));
@@ -59,40 +58,39 @@ impl Contact {
 
 /// The law for all handles. `gain` and `floor` of the workspace select the branch: see [`Workspace`].
 #[derive(Clone, Debug)]
-struct SpringDamper {
-    stiffness: Vec<f64x2>,
-    damping: Vec<f64x2>,
-}
+struct SpringDampers(Vec<(f64x2, f64x2)>);
 
-impl Term for SpringDamper {
-    #[inline]
+impl Term for SpringDampers {
     fn apply(&self, _t_s: f64, w: &mut Workspace) {
-        for p in 0..w.pairs() {
-            let free = self.stiffness[p] * w.gap[2][p] + self.damping[p] * w.gap_rate[2][p];
-            w.unclamped[p] = free;
-            w.normal[p] = (free * w.contact_gain[p]).fast_max(w.contact_floor[p]);
+        for (p, &(stiffness, damping)) in w.pair.iter_mut().zip(&self.0) {
+            let free = stiffness * p.gap[2] + damping * p.gap_rate[2];
+            p.unclamped = free;
+            p.normal = (free * p.contact_gain).fast_max(p.contact_floor);
         }
     }
 }
 
-impl Account for SpringDamper {
+/// Whether N acts: always in a bilateral contact, else where it pushes.
+fn in_contact(p: &Pair) -> f64x2 {
+    p.normal.simd_gt(f64x2::ZERO) | p.contact_floor.simd_lt(f64x2::ZERO)
+}
+
+impl Account for SpringDampers {
     fn power(&self, w: &Workspace) -> Power {
         let (mut work, mut absorbed) = (f64x2::ZERO, f64x2::ZERO);
-        for p in 0..w.pairs() {
+        for (p, &(stiffness, _)) in w.pair.iter().zip(&self.0) {
             // N δ̇ goes into the spring and the damper; the spring's part returns through `stored_j`.
-            let in_contact = w.normal[p].simd_gt(f64x2::ZERO) | w.contact_floor[p].simd_lt(f64x2::ZERO);
-            let spring = in_contact & (self.stiffness[p] * w.gap[2][p]);
-            work += w.normal[p] * w.base_rate[2][p];
-            absorbed += (w.normal[p] - spring) * w.gap_rate[2][p];
+            let spring = in_contact(p) & (stiffness * p.gap[2]);
+            work += p.normal * p.base_rate[2];
+            absorbed += (p.normal - spring) * p.gap_rate[2];
         }
         Power { work_w: crate::lanes::sum(work), dissipated_w: crate::lanes::sum(absorbed) }
     }
 
     fn stored_j(&self, w: &Workspace) -> f64 {
         let mut stored = f64x2::ZERO;
-        for p in 0..w.pairs() {
-            let in_contact = w.normal[p].simd_gt(f64x2::ZERO) | w.contact_floor[p].simd_lt(f64x2::ZERO);
-            stored += in_contact & (self.stiffness[p] * w.gap[2][p] * w.gap[2][p] * 0.5);
+        for (p, &(stiffness, _)) in w.pair.iter().zip(&self.0) {
+            stored += in_contact(p) & (stiffness * p.gap[2] * p.gap[2] * 0.5);
         }
         crate::lanes::sum(stored)
     }

@@ -44,13 +44,13 @@ struct MeanField {
 impl Term for MeanField {
     fn apply(&self, _t_s: f64, w: &mut Workspace) {
         let (mut s, mut c) = (f64x2::ZERO, f64x2::ZERO);
-        for p in 0..w.pairs() {
-            s += w.sin[p];
-            c += w.cos[p] * w.present[p];
+        for p in &w.pair {
+            s += p.sin;
+            c += p.cos * p.present;
         }
         let (s, c) = (sum(s) * self.gain, sum(c) * self.gain);
-        for p in 0..w.pairs() {
-            w.rate[p] += w.cos[p] * s - w.sin[p] * c;
+        for p in &mut w.pair {
+            p.rate += p.cos * s - p.sin * c;
         }
     }
 }

@@ -71,10 +71,8 @@ struct Limit(Coulomb);
 
 impl Term for Limit {
     fn apply(&self, _t_s: f64, w: &mut Workspace) {
-        for p in 0..w.pairs() {
-            let hold = [w.tangential[0][p], w.tangential[1][p]];
-            let force = self.0.limited(w.normal[p], hold, [w.gap_rate[0][p], w.gap_rate[1][p]]);
-            [w.tangential[0][p], w.tangential[1][p]] = force;
+        for p in &mut w.pair {
+            p.tangential = self.0.limited(p.normal, p.tangential, [p.gap_rate[0], p.gap_rate[1]]);
         }
     }
 }
@@ -84,9 +82,8 @@ struct Alone(Coulomb);
 
 impl Term for Alone {
     fn apply(&self, _t_s: f64, w: &mut Workspace) {
-        for p in 0..w.pairs() {
-            let force = self.0.limited(w.normal[p], [f64x2::ZERO; 2], [w.gap_rate[0][p], w.gap_rate[1][p]]);
-            [w.tangential[0][p], w.tangential[1][p]] = force;
+        for p in &mut w.pair {
+            p.tangential = self.0.limited(p.normal, [f64x2::ZERO; 2], [p.gap_rate[0], p.gap_rate[1]]);
         }
     }
 }
@@ -94,10 +91,10 @@ impl Term for Alone {
 impl Account for Coulomb {
     fn power(&self, w: &Workspace) -> Power {
         let (mut work, mut absorbed) = (f64x2::ZERO, f64x2::ZERO);
-        for axis in 0..2 {
-            for p in 0..w.pairs() {
-                work += w.tangential[axis][p] * w.base_rate[axis][p];
-                absorbed += w.tangential[axis][p] * w.gap_rate[axis][p];
+        for p in &w.pair {
+            for axis in 0..2 {
+                work += p.tangential[axis] * p.base_rate[axis];
+                absorbed += p.tangential[axis] * p.gap_rate[axis];
             }
         }
         Power { work_w: sum(work), dissipated_w: sum(absorbed) }

@@ -8,7 +8,7 @@
 //! Source: paper, eq. (base).
 
 use crate::lanes::{f64x2, pack};
-use crate::model::{Model, Stage, Term, Workspace};
+use crate::model::{Model, Pair, Stage, Term, Workspace};
 use crate::scene::{Checker, PerCarrier, Problem, Scene, problem};
 use serde::{Deserialize, Serialize};
 
@@ -78,7 +78,7 @@ impl Gait {
         let mut add = |axis: usize, order: u32, amplitude: Vec<f64>, phase: f64| {
             if amplitude.iter().any(|a| *a != 0.0) {
                 let part = |f: f64| pack(amplitude.iter().map(|a| a * f));
-                waves.push(Wave { axis, order, sine: part(phase.cos()), cosine: part(phase.sin()) });
+                waves.push(Wave { axis, order, parts: part(phase.cos()).into_iter().zip(part(phase.sin())).collect() });
             }
         };
         let each = |x: &PerCarrier| (0..n).map(|i| x.get(i)).collect::<Vec<f64>>();
@@ -92,12 +92,6 @@ impl Gait {
             }
         }
         let (first, higher): (Vec<Wave>, Vec<Wave>) = waves.into_iter().partition(|w| w.order == 1);
-        for wave in &first {
-            model.shoulders_move(wave.axis);
-        }
-        for wave in &higher {
-            model.shoulders_move(wave.axis);
-        }
         model.add(Stage::Shoulders, First(first));
         if !higher.is_empty() {
             model.add(Stage::Shoulders, Higher(higher));
@@ -105,20 +99,24 @@ impl Gait {
     }
 }
 
-/// A sin(kφ + α) = `sine` sin kφ + `cosine` cos kφ, for all carriers, along one axis.
+/// A sin(kφ + α) = `parts.0` sin kφ + `parts.1` cos kφ, for all carriers, along one axis.
 #[derive(Debug)]
 struct Wave {
     axis: usize,
     order: u32,
-    sine: Vec<f64x2>,
-    cosine: Vec<f64x2>,
+    parts: Vec<(f64x2, f64x2)>,
 }
 
 impl Wave {
+    /// `turn` gives sin kφ and cos kφ.
     #[inline(always)]
-    fn add(&self, p: usize, sin: f64x2, cos: f64x2, rate: f64x2, w: &mut Workspace) {
-        w.base[self.axis][p] += self.sine[p] * sin + self.cosine[p] * cos;
-        w.base_rate[self.axis][p] += rate * (self.sine[p] * cos - self.cosine[p] * sin);
+    fn add(&self, w: &mut Workspace, turn: impl Fn(&Pair) -> (f64x2, f64x2)) {
+        let (axis, order) = (self.axis % 3, f64::from(self.order));
+        for (p, &(sine, cosine)) in w.pair.iter_mut().zip(&self.parts) {
+            let (sin, cos) = turn(p);
+            p.base[axis] += sine * sin + cosine * cos;
+            p.base_rate[axis] += p.rate * order * (sine * cos - cosine * sin);
+        }
     }
 }
 
@@ -128,9 +126,7 @@ struct First(Vec<Wave>);
 impl Term for First {
     fn apply(&self, _t_s: f64, w: &mut Workspace) {
         for wave in &self.0 {
-            for p in 0..w.pairs() {
-                wave.add(p, w.sin[p], w.cos[p], w.rate[p], w);
-            }
+            wave.add(w, |p| (p.sin, p.cos));
         }
     }
 }
@@ -141,15 +137,14 @@ struct Higher(Vec<Wave>);
 impl Term for Higher {
     fn apply(&self, _t_s: f64, w: &mut Workspace) {
         for wave in &self.0 {
-            for p in 0..w.pairs() {
-                // sin and cos of kφ by repeated addition of φ: k − 1 complex products, error of the order of kε.
-                let (s1, c1) = (w.sin[p], w.cos[p]);
-                let (mut s, mut c) = (s1, c1);
+            // sin and cos of kφ by repeated addition of φ: k − 1 complex products, error of the order of kε.
+            wave.add(w, |p| {
+                let (mut s, mut c) = (p.sin, p.cos);
                 for _ in 1..wave.order {
-                    (s, c) = (s * c1 + c * s1, c * c1 - s * s1);
+                    (s, c) = (s * p.cos + c * p.sin, c * p.cos - s * p.sin);
                 }
-                wave.add(p, s, c, w.rate[p] * f64::from(wave.order), w);
-            }
+                (s, c)
+            });
         }
     }
 }

@@ -42,41 +42,35 @@ impl Hold {
 
     pub(super) fn build(&self, scene: &Scene, model: &mut Model) {
         let n = scene.carriers.count();
-        let law = SpringDamper {
-            stiffness: pack((0..n).map(|i| self.stiffness_n_per_m.get(i))),
-            damping: pack((0..n).map(|i| self.damping_n_s_per_m.get(i))),
-        };
+        let stiffness = pack((0..n).map(|i| self.stiffness_n_per_m.get(i)));
+        let damping = pack((0..n).map(|i| self.damping_n_s_per_m.get(i)));
+        let law = SpringDampers(stiffness.into_iter().zip(damping).collect());
         model.add(Stage::Handles, law.clone());
         model.add_account("hold", law);
     }
 }
 
 #[derive(Clone, Debug)]
-struct SpringDamper {
-    stiffness: Vec<f64x2>,
-    damping: Vec<f64x2>,
-}
+struct SpringDampers(Vec<(f64x2, f64x2)>);
 
-impl Term for SpringDamper {
-    #[inline]
+impl Term for SpringDampers {
     fn apply(&self, _t_s: f64, w: &mut Workspace) {
-        for p in 0..w.pairs() {
-            let (k, c) = (self.stiffness[p], self.damping[p]);
-            w.tangential[0][p] = k * w.gap[0][p] + c * w.gap_rate[0][p];
-            w.tangential[1][p] = k * w.gap[1][p] + c * w.gap_rate[1][p];
+        for (p, &(k, c)) in w.pair.iter_mut().zip(&self.0) {
+            p.tangential[0] = k * p.gap[0] + c * p.gap_rate[0];
+            p.tangential[1] = k * p.gap[1] + c * p.gap_rate[1];
         }
     }
 }
 
-impl Account for SpringDamper {
+impl Account for SpringDampers {
     /// Books the whole tangential force, a friction limit on it included: what the cap takes counts as dissipated.
     fn power(&self, w: &Workspace) -> Power {
         let (mut work, mut absorbed) = (f64x2::ZERO, f64x2::ZERO);
-        for axis in 0..2 {
-            for p in 0..w.pairs() {
-                let spring = self.stiffness[p] * w.gap[axis][p];
-                work += w.tangential[axis][p] * w.base_rate[axis][p];
-                absorbed += (w.tangential[axis][p] - spring) * w.gap_rate[axis][p];
+        for (p, &(stiffness, _)) in w.pair.iter().zip(&self.0) {
+            for axis in 0..2 {
+                let spring = stiffness * p.gap[axis];
+                work += p.tangential[axis] * p.base_rate[axis];
+                absorbed += (p.tangential[axis] - spring) * p.gap_rate[axis];
             }
         }
         Power { work_w: crate::lanes::sum(work), dissipated_w: crate::lanes::sum(absorbed) }
@@ -84,9 +78,9 @@ impl Account for SpringDamper {
 
     fn stored_j(&self, w: &Workspace) -> f64 {
         let mut stored = f64x2::ZERO;
-        for axis in 0..2 {
-            for p in 0..w.pairs() {
-                stored += self.stiffness[p] * w.gap[axis][p] * w.gap[axis][p] * 0.5;
+        for (p, &(stiffness, _)) in w.pair.iter().zip(&self.0) {
+            for axis in 0..2 {
+                stored += stiffness * p.gap[axis] * p.gap[axis] * 0.5;
             }
         }
         crate::lanes::sum(stored)

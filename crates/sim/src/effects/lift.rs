@@ -57,10 +57,10 @@ impl Lift {
 
 #[inline(always)]
 fn amplify(w: &mut Workspace, gain: f64, gain_rate: f64) {
-    for p in 0..w.pairs() {
-        let lifted = w.base[2][p] - w.rest[2][p];
-        w.base[2][p] = w.rest[2][p] + lifted * gain;
-        w.base_rate[2][p] = w.base_rate[2][p] * gain + lifted * gain_rate;
+    for p in &mut w.pair {
+        let lifted = p.base[2] - p.rest[2];
+        p.base[2] = p.rest[2] + lifted * gain;
+        p.base_rate[2] = p.base_rate[2] * gain + lifted * gain_rate;
     }
 }
 

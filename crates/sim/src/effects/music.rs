@@ -7,6 +7,7 @@
 //! on. One carrier locks where |2πf_m − ω| < K, at sin(ψ − φ) = (2πf_m − ω)/K; outside it drifts at √(Δω² − K²).
 //! At t₀ with τ = 0 the phase rates jump: an event. Source: paper, eqs. (music), (adler); Adler (1946).
 
+use crate::lanes::{f64x2, sin_cos};
 use crate::model::{Beat, Model, Stage, Switch, Term, Workspace};
 use crate::scene::{Checker, Problem, Scene};
 use serde::{Deserialize, Serialize};
@@ -65,10 +66,10 @@ impl Music {
 #[inline(always)]
 fn pull(w: &mut Workspace, beat: &Beat, t_s: f64, strength: f64) {
     // sin(ψ − φ) from the sines and cosines that are there already.
-    let (sin, cos) = beat.phase_at(t_s).sin_cos();
+    let (sin, cos) = sin_cos(f64x2::splat(beat.phase_at(t_s)));
     let (sin, cos) = (sin * strength, cos * strength);
-    for p in 0..w.pairs() {
-        w.rate[p] += w.cos[p] * sin - w.sin[p] * cos;
+    for p in &mut w.pair {
+        p.rate += p.cos * sin - p.sin * cos;
     }
 }
 

@@ -8,7 +8,6 @@
 //! solver meets exactly. The path is a function of (seed, carrier, time): a smaller step converges to the same motion.
 //! Source: the archive's logs (white, 0.0100 rad/√s at every lag from 0.033 s to 10 s).
 
-use crate::lanes::{lane, set_lane};
 use crate::model::{Model, Switch, Workspace};
 use crate::random::{Stream, normal_pair};
 use crate::scene::{Checker, Problem, Scene};
@@ -75,8 +74,7 @@ impl Switch for Grid {
         for first in (0..self.carriers).step_by(2) {
             let draws = normal_pair(self.seed, Stream::PhaseNoise, (first / 2) as u32, cell);
             for (i, z) in (first..self.carriers.min(first + 2)).zip(draws) {
-                let rate = lane(&w.constant_rate, i) + z * self.rate;
-                set_lane(&mut w.constant_rate, i, rate);
+                *w.of_mut(i, |p| &mut p.constant_rate) += z * self.rate;
             }
         }
     }

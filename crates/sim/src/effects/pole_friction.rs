@@ -53,8 +53,8 @@ impl Rub {
     #[inline(always)]
     fn torque_n_m(&self, w: &Workspace) -> f64 {
         let mut load = f64x2::ZERO;
-        for n in &w.normal {
-            load += n.abs();
+        for p in &w.pair {
+            load += p.normal.abs();
         }
         let rate = w.spin[0];
         -self.arm_m * sum(load) * rate / (rate * rate + self.rate2).sqrt()

@@ -1,7 +1,6 @@
 //! What every method shares: segments between events, contacts, log times, the count of work.
 
 use super::{Observer, Settings, Stats, Stopped};
-use crate::lanes::{lane, set_lane};
 use crate::model::{Model, Workspace};
 
 /// Times closer than this are the same moment, s.
@@ -87,7 +86,7 @@ impl<'m> Course<'m> {
         };
         course.begin_segment();
         for i in 0..n {
-            course.touching[i] = lane(&course.w.normal, i) > 0.0;
+            course.touching[i] = course.w.of(i, |p| p.normal) > 0.0;
         }
         course
     }
@@ -120,8 +119,8 @@ impl<'m> Course<'m> {
         self.next_sample += 1;
         // Within a rounding of an opening, N = N* can be a hair below zero.
         if self.model.watches_contact() {
-            for n in &mut self.w.normal {
-                *n = n.fast_max(crate::lanes::f64x2::ZERO);
+            for p in &mut self.w.pair {
+                p.normal = p.normal.fast_max(crate::lanes::f64x2::ZERO);
             }
         }
         if observer.sample(t_s, y, &self.w) { Ok(()) } else { Err(Stopped::ByObserver { t_s }) }
@@ -139,7 +138,7 @@ impl<'m> Course<'m> {
     pub fn margin_n(&self) -> f64 {
         let mut least = f64::INFINITY;
         for (i, contact) in self.contacts.iter().enumerate() {
-            let free = lane(&self.w.unclamped, i);
+            let free = self.w.of(i, |p| p.unclamped);
             least = least.min(match contact {
                 Contact::Closed => free,
                 Contact::Open => -free,
@@ -195,7 +194,7 @@ impl<'m> Course<'m> {
         self.model.forces(self.t_s, &self.y, &mut self.w);
         self.stats.evaluations += 1;
         for i in 0..self.contacts.len() {
-            let free = lane(&self.w.unclamped, i);
+            let free = self.w.of(i, |p| p.unclamped);
             let (kind, next) = match self.contacts[i] {
                 Contact::Closed if free <= 0.0 => (EventKind::ContactOpened, Contact::Open),
                 Contact::Open if free >= 0.0 => (EventKind::ContactClosed, Contact::Closed),
@@ -211,7 +210,7 @@ impl<'m> Course<'m> {
 
     fn changed(&mut self, handle: usize, kind: EventKind, observer: &mut dyn Observer) {
         self.stats.events += 1;
-        let gap_m = lane(&self.w.gap[2], handle);
+        let gap_m = self.w.of(handle, |p| p.gap[2]);
         self.model.book_contact(handle, kind == EventKind::ContactOpened, gap_m, &mut self.y);
         observer.event(&Event { t_s: self.t_s, handle, kind });
     }
@@ -223,7 +222,7 @@ impl<'m> Course<'m> {
         self.stats.evaluations += 1;
         if self.locate {
             for i in 0..self.contacts.len() {
-                let contact = Self::standing(lane(&self.w.unclamped, i));
+                let contact = Self::standing(self.w.of(i, |p| p.unclamped));
                 self.set_contact(i, contact);
             }
             self.model.forces(self.t_s, &self.y, &mut self.w);
@@ -236,7 +235,7 @@ impl<'m> Course<'m> {
         self.stats.evaluations += 1;
         for i in 0..self.contacts.len() {
             if self.contacts[i] == Contact::Clamped && self.t_s - self.recent[i].0 > 1e-9 {
-                let contact = Self::standing(lane(&self.w.unclamped, i));
+                let contact = Self::standing(self.w.of(i, |p| p.unclamped));
                 self.set_contact(i, contact);
             }
         }
@@ -259,8 +258,8 @@ impl<'m> Course<'m> {
             Contact::Open => (0.0, 0.0),
             Contact::Clamped => (1.0, 0.0),
         };
-        set_lane(&mut self.w.contact_gain, i, gain);
-        set_lane(&mut self.w.contact_floor, i, floor);
+        *self.w.of_mut(i, |p| &mut p.contact_gain) = gain;
+        *self.w.of_mut(i, |p| &mut p.contact_floor) = floor;
     }
 
     fn note_unlocated(&mut self, observer: &mut dyn Observer) {
@@ -269,7 +268,7 @@ impl<'m> Course<'m> {
         }
         self.model.forces(self.t_s, &self.y, &mut self.w);
         for i in 0..self.touching.len() {
-            let now = lane(&self.w.normal, i) > 0.0;
+            let now = self.w.of(i, |p| p.normal) > 0.0;
             if now != self.touching[i] {
                 self.touching[i] = now;
                 self.changed(i, if now { EventKind::ContactClosed } else { EventKind::ContactOpened }, observer);
