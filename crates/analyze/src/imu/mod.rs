@@ -1,0 +1,20 @@
+//! From inertial sensors to motion: orientation, height, and the paper's metrics, without a force sensor or a camera.
+//!
+//! Everything here takes slices of times and samples. The accelerometer reads *specific force* (REP-145: at rest with
+//! z up it reads +g), the gyroscope the angular velocity, both in the sensor's frame.
+//!
+//! | module | gives |
+//! |---|---|
+//! | [`track`] | a clean series of samples out of whatever columns a file had |
+//! | [`orientation`] | sensor → earth (z up), causal and batch |
+//! | [`vertical`] | height by drift-free double integration, with its valid band |
+//! | [`rath`] | the body's motion and every metric that rests on it, with intervals |
+//! | [`truth`] | errors against a recorded truth |
+
+pub mod orientation;
+pub mod rath;
+pub mod track;
+pub mod truth;
+pub mod vertical;
+
+pub use track::Track;

@@ -1,0 +1,521 @@
+//! The paper's metrics from one inertial sensor on what is carried.
+//!
+//! ```text
+//! f_com = f − ( α × r + ω × (ω × r) )        specific force at the centre of mass
+//! s     = (R f_com)_z / g = N_tot / (M g)     the support ratio: T_float counts s ≤ 0.05
+//! a_up  = (R f_com)_z − g                     its double integral is the height
+//! ```
+//! f specific force at the sensor [m/s²], r from the centre of mass to the sensor in the body's axes [m], ω angular velocity [rad/s], α its
+//! derivative [rad/s²], R body → earth, g gravity [m/s²]. Only contact lifts the body, so its specific force *is* the support force over its
+//! mass: no force sensor is needed for T_float. With r unknown (0) the term in brackets stays in, up to r·ω² and r·α.
+//!
+//! What an inertial sensor cannot give: mean height, heading, forces of single handles. Those stay missing, with the reason.
+//!
+//! Intervals: the estimated columns are varied within the [`Budget`] of what the sensor and the method leave uncertain, and sampled
+//! at the paper's 30 Hz with a random phase; the metric's spread over the draws is its standard error, 1.96 of which are given.
+
+use super::orientation::{self, Estimate, Options};
+use super::track::Track;
+use super::vertical;
+use crate::filter::{Band, butter, sosfiltfilt};
+use crate::inputs::{Inputs, Window, interpolate};
+use crate::metrics::{Datum, Metrics, Value, metrics_of};
+use nalgebra::{UnitQuaternion, Vector3};
+
+/// How the sensor's axes lie on the body (x forward along the pole, y left, z up).
+#[derive(Clone, Copy, Debug, PartialEq, Default)]
+pub enum Mounting {
+    /// The sensor's x points forward along the pole, as well as tape allows; up is taken from the mean of gravity over the recording.
+    #[default]
+    Levelled,
+    /// Body from sensor, known; taken as it is.
+    Known(UnitQuaternion<f64>),
+    /// Up from the mean of gravity, forward from the first steps out of standstill.
+    Walking,
+}
+
+/// What the sensor and the method leave uncertain, one standard deviation each.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Budget {
+    /// Roll and pitch: constant part, rad.
+    pub tilt_offset_rad: f64,
+    /// Roll and pitch: part that wanders over seconds, rad.
+    pub tilt_wander_rad: f64,
+    /// Angles: relative (gyroscope's scale).
+    pub angle_scale: f64,
+    /// Height: relative (accelerometer's scale, band).
+    pub height_scale: f64,
+    /// Height: wandering over seconds, m.
+    pub height_wander_m: f64,
+    /// Support ratio: constant part (accelerometer's bias over g).
+    pub support_offset: f64,
+    /// Support ratio: relative.
+    pub support_scale: f64,
+    /// Support ratio: from sample to sample.
+    pub support_noise: f64,
+}
+
+impl Default for Budget {
+    /// A calibrated MEMS sensor; checked against simulated twins (docs/field.md).
+    fn default() -> Self {
+        Self {
+            tilt_offset_rad: 0.05f64.to_radians(),
+            tilt_wander_rad: 0.15f64.to_radians(),
+            angle_scale: 0.003,
+            height_scale: 0.005,
+            height_wander_m: 0.002,
+            support_offset: 0.003,
+            support_scale: 0.002,
+            support_noise: 0.004,
+        }
+    }
+}
+
+/// How a recording is to be read.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Settings {
+    /// Orientation.
+    pub orientation: Options,
+    /// Mounting.
+    pub mounting: Mounting,
+    /// From the centre of mass to the sensor, in the body's axes, m.
+    pub lever_m: [f64; 3],
+    /// Gravity, m/s².
+    pub gravity_m_per_s2: f64,
+    /// Error budget behind the intervals.
+    pub budget: Budget,
+}
+
+impl Default for Settings {
+    /// Levelled, at the centre of mass, standard gravity.
+    fn default() -> Self {
+        Self {
+            orientation: Options::default(),
+            mounting: Mounting::default(),
+            lever_m: [0.0; 3],
+            gravity_m_per_s2: 9.80665,
+            budget: Budget::default(),
+        }
+    }
+}
+
+/// Why there is no motion.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+pub enum MotionError {
+    /// Too short.
+    #[error("{found_s:.1} s of inertial data; orientation and height need at least 5 s")]
+    TooShort {
+        /// Length found, s.
+        found_s: f64,
+    },
+    /// Too slowly sampled.
+    #[error("the sensor was sampled at {found_hz:.1} Hz; the rath's motion needs at least 25 Hz")]
+    TooSlow {
+        /// Rate found, Hz.
+        found_hz: f64,
+    },
+    /// Gravity is not there.
+    #[error(
+        "the mean specific force is {found_m_per_s2:.2} m/s², not gravity: give accelerations with gravity, in m/s² (an app's \"linear acceleration\" has lost it)"
+    )]
+    NoGravity {
+        /// Norm of the mean over the recording, turned to earth, m/s².
+        found_m_per_s2: f64,
+    },
+}
+
+/// The body's motion, as far as an inertial sensor sees it.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Motion {
+    /// Columns for [`crate::metrics()`], all from the sensor: roll, pitch, height about its slow course, support ratio.
+    pub inputs: Inputs,
+    /// Orientation of the body, and what was learnt of the gyroscope; one per time of `inputs.t_s`.
+    pub orientation: Estimate,
+    /// Body from sensor, as used.
+    pub body_from_sensor: UnitQuaternion<f64>,
+    /// The settings used.
+    pub settings: Settings,
+}
+
+/// The body's motion from its sensor.
+///
+/// # Errors
+/// When the recording is too short, too slowly sampled, or gravity has been removed from it.
+pub fn motion(track: &Track, settings: &Settings) -> Result<Motion, MotionError> {
+    let found_s = match (track.t_s.first(), track.t_s.last()) {
+        (Some(first), Some(last)) => last - first,
+        _ => 0.0,
+    };
+    if found_s < 5.0 {
+        return Err(MotionError::TooShort { found_s });
+    }
+    let period_s = track.period_s().unwrap_or(1.0);
+    if period_s > 1.0 / 25.0 {
+        return Err(MotionError::TooSlow { found_hz: 1.0 / period_s });
+    }
+    let track = even(track, period_s);
+    let mut estimate = orientation::batch(&track, settings.orientation);
+    let found = mean_specific_force(&track, &estimate);
+    let g = settings.gravity_m_per_s2;
+    if !(0.8 * g..=1.2 * g).contains(&found) {
+        return Err(MotionError::NoGravity { found_m_per_s2: found });
+    }
+    let body_from_sensor = match settings.mounting {
+        Mounting::Known(rotation) => rotation,
+        Mounting::Levelled => level(&estimate),
+        Mounting::Walking => {
+            let level = level(&estimate);
+            forward(&track, &estimate, &level, g) * level
+        }
+    };
+    let sensor_from_body = body_from_sensor.inverse();
+    for q in &mut estimate.earth_from_sensor {
+        *q *= sensor_from_body;
+    }
+    let body = track.rotated(&body_from_sensor);
+    let force = at_centre_of_mass(&body, &estimate, &body_from_sensor, settings.lever_m, period_s);
+    let n = body.len();
+    let (mut roll_rad, mut pitch_rad) = (Vec::with_capacity(n), Vec::with_capacity(n));
+    let (mut support_ratio, mut accel_up) = (Vec::with_capacity(n), Vec::with_capacity(n));
+    for (q, f) in estimate.earth_from_sensor.iter().zip(&force) {
+        // R = Rz(yaw) Ry(pitch) Rx(roll), REP-103.
+        let (roll, pitch, _) = q.euler_angles();
+        roll_rad.push(roll);
+        pitch_rad.push(pitch);
+        let up = (q * f).z;
+        support_ratio.push(up / g);
+        accel_up.push(up - g);
+    }
+    let mean = accel_up.iter().sum::<f64>() / n as f64;
+    accel_up.iter_mut().for_each(|a| *a -= mean);
+    let height_m = vertical::height(&accel_up, period_s, vertical::CORNER_HZ);
+    let mut inputs = Inputs {
+        t_s: body.t_s.clone(),
+        height_m,
+        roll_rad,
+        pitch_rad,
+        support_ratio,
+        gravity_m_per_s2: g,
+        ..Inputs::default()
+    };
+    inputs.sources.attitude = "imu".into();
+    inputs.sources.height = "imu".into();
+    inputs.sources.forces = "imu".into();
+    Ok(Motion { inputs, orientation: estimate, body_from_sensor, settings: *settings })
+}
+
+/// The same samples on an even grid with the track's own period, straight between samples.
+fn even(track: &Track, period_s: f64) -> Track {
+    let (start, end) = (track.t_s[0], track.t_s[track.len() - 1]);
+    let jitter = track
+        .t_s
+        .iter()
+        .enumerate()
+        .map(|(k, t)| (t - start - k as f64 * period_s).abs())
+        .fold(0.0, f64::max);
+    if jitter < 0.02 * period_s {
+        return track.clone();
+    }
+    // Never more than four times the samples that were there: a wrong stamp far away must not ask for all memory.
+    let n = (((end - start) / period_s) as usize + 1).min(4 * track.len());
+    let grid: Vec<f64> = (0..n).map(|k| start + k as f64 * period_s).collect();
+    let resample = |v: &[[f64; 3]]| -> Vec<[f64; 3]> {
+        let axes: [Vec<f64>; 3] = std::array::from_fn(|a| {
+            let x: Vec<f64> = v.iter().map(|s| s[a]).collect();
+            interpolate(&track.t_s, &x, &grid)
+        });
+        (0..n).map(|k| [axes[0][k], axes[1][k], axes[2][k]]).collect()
+    };
+    Track {
+        gyro_rad_per_s: resample(&track.gyro_rad_per_s),
+        accel_m_per_s2: resample(&track.accel_m_per_s2),
+        dropped: track.dropped,
+        t_s: grid,
+    }
+}
+
+/// Norm of the mean specific force in the earth's frame: g, whatever the motion, when gravity is in it.
+fn mean_specific_force(track: &Track, estimate: &Estimate) -> f64 {
+    let mut sum = Vector3::zeros();
+    for (q, a) in estimate.earth_from_sensor.iter().zip(&track.accel_m_per_s2) {
+        sum += q * Vector3::from(*a);
+    }
+    sum.norm() / track.len() as f64
+}
+
+/// The shortest turn that takes the mean upward direction, as the sensor sees it, to z.
+fn level(estimate: &Estimate) -> UnitQuaternion<f64> {
+    let mut up = Vector3::zeros();
+    for q in &estimate.earth_from_sensor {
+        up += q.inverse() * Vector3::z();
+    }
+    // On its head: half a turn about x; there is no shortest turn.
+    UnitQuaternion::rotation_between(&up, &Vector3::z())
+        .unwrap_or_else(|| UnitQuaternion::from_axis_angle(&Vector3::x_axis(), std::f64::consts::PI))
+}
+
+/// The turn about z that takes the direction of the first walking to x: the mean horizontal acceleration over the two seconds after the
+/// first rest. Identity when they never stood still or never set off.
+fn forward(track: &Track, estimate: &Estimate, level: &UnitQuaternion<f64>, g: f64) -> UnitQuaternion<f64> {
+    let Some(still) = estimate.rest.iter().position(|r| *r) else {
+        return UnitQuaternion::identity();
+    };
+    let Some(off) = estimate.rest[still..].iter().position(|r| !*r).map(|k| still + k) else {
+        return UnitQuaternion::identity();
+    };
+    let end = track.t_s.partition_point(|t| *t < track.t_s[off] + 2.0);
+    let mut push = Vector3::zeros();
+    for i in off..end {
+        let up = estimate.earth_from_sensor[i].inverse() * Vector3::z();
+        push += level * (Vector3::from(track.accel_m_per_s2[i]) - up * g);
+    }
+    if push.x.hypot(push.y) < 1e-9 {
+        return UnitQuaternion::identity();
+    }
+    UnitQuaternion::from_axis_angle(&Vector3::z_axis(), -push.y.atan2(push.x))
+}
+
+/// Specific force at the centre of mass, in the body's axes.
+fn at_centre_of_mass(
+    body: &Track,
+    estimate: &Estimate,
+    body_from_sensor: &UnitQuaternion<f64>,
+    lever_m: [f64; 3],
+    period_s: f64,
+) -> Vec<Vector3<f64>> {
+    let force = body.accel_m_per_s2.iter().map(|a| Vector3::from(*a));
+    if lever_m == [0.0; 3] {
+        return force.collect();
+    }
+    let r = Vector3::from(lever_m);
+    let rates: Vec<Vector3<f64>> = body
+        .gyro_rad_per_s
+        .iter()
+        .zip(&estimate.bias_rad_per_s)
+        .map(|(w, b)| Vector3::from(*w) - body_from_sensor * Vector3::from(*b))
+        .collect();
+    // The body turns below 10 Hz; a derivative of what is above would be noise.
+    let smooth: [Vec<f64>; 3] = std::array::from_fn(|axis| {
+        let x: Vec<f64> = rates.iter().map(|w| w[axis]).collect();
+        butter(2, Band::Low(20.0), 1.0 / period_s)
+            .and_then(|sections| sosfiltfilt(&sections, &x))
+            .unwrap_or(x)
+    });
+    let n = rates.len();
+    force
+        .enumerate()
+        .map(|(i, f)| {
+            let (a, b) = (i.saturating_sub(1), (i + 1).min(n - 1));
+            let dt_s = (b - a) as f64 * period_s;
+            let alpha = Vector3::from_fn(|axis, _| (smooth[axis][b] - smooth[axis][a]) / dt_s);
+            let w = Vector3::from_fn(|axis, _| smooth[axis][i]);
+            f - alpha.cross(&r) - w.cross(&w.cross(&r))
+        })
+        .collect()
+}
+
+/// Number of draws behind an interval.
+const DRAWS: usize = 40;
+/// Seed of the draws: the same recording gives the same interval.
+const SEED: u64 = 0x7261_7468;
+/// Metrics that an inertial sensor cannot give, and why.
+const BEYOND: &[(&str, &str)] = &[
+    ("z_mean_m", "an inertial sensor does not see the mean height"),
+    ("rms_yaw_deg", "heading without a magnetometer drifts"),
+];
+/// Metrics that rest on the motion columns: those that get an interval.
+const FROM_MOTION: &[&str] = &[
+    "rms_roll_deg",
+    "rms_pitch_deg",
+    "onset_time_s",
+    "unstable",
+    "roll_excess_s",
+    "dz_pp_m",
+    "rms_z_m",
+    "z_mean_m",
+    "rms_yaw_deg",
+    "t_float",
+    "peak_hz",
+    "h2_ratio",
+    "roll_peak_hz",
+    "subharmonic_ratio",
+    "growth_ratio",
+    "mechanism",
+];
+
+/// Whether a metric is one of those that [`metrics`] gives.
+pub fn gives(name: &str) -> bool {
+    FROM_MOTION.contains(&name)
+}
+
+/// Every metric that rests on the motion alone, over `window`, each number with its 95 % interval.
+pub fn metrics(motion: &Motion, window: Window) -> Metrics {
+    let mut out = metrics_of(&motion.inputs, window, gives);
+    let draws: Vec<Metrics> = (0..DRAWS)
+        .map(|k| metrics_of(&varied(motion, window, k as u64), Window::ALL, |name| gives(name) && name != "mechanism"))
+        .collect();
+    for (name, value) in &mut out.0 {
+        if let Some((_, why)) = BEYOND.iter().find(|(n, _)| n == name) {
+            *value = Value { unit: value.unit, ..Value::missing(*why).source("imu") };
+            continue;
+        }
+        let Datum::Number(x) = value.datum else { continue };
+        let drawn: Vec<f64> = draws.iter().filter_map(|d| d.number(name)).collect();
+        if drawn.len() < DRAWS / 2 {
+            continue;
+        }
+        let mean = drawn.iter().sum::<f64>() / drawn.len() as f64;
+        // About the estimate, not about the draws' mean: what the draws add on average is theirs.
+        let variance = drawn.iter().map(|d| (d - mean).powi(2)).sum::<f64>() / (drawn.len() - 1) as f64;
+        let half = 1.96 * variance.sqrt();
+        value.ci95 = Some([x - half, x + half]);
+    }
+    out
+}
+
+/// The window's columns as they might have come out of an equally good sensor, at 30 Hz.
+fn varied(motion: &Motion, window: Window, draw: u64) -> Inputs {
+    let budget = &motion.settings.budget;
+    let mut random = Random(SEED ^ (draw.wrapping_add(1)).wrapping_mul(0x9e37_79b9_7f4a_7c15));
+    let inputs = &motion.inputs;
+    let range = window.range(&inputs.t_s);
+    let (Some(first), Some(last)) = (inputs.t_s[range.clone()].first(), inputs.t_s[range.clone()].last()) else {
+        return Inputs { gravity_m_per_s2: inputs.gravity_m_per_s2, ..Inputs::default() };
+    };
+    let step_s = 0.033;
+    let phase = random.uniform() * step_s;
+    let n = ((last - first - phase) / step_s).max(0.0) as usize + 1;
+    let t_s: Vec<f64> = (0..n.min(range.len())).map(|k| first + phase + k as f64 * step_s).collect();
+    let pick = |x: &[f64]| interpolate(&inputs.t_s[range.clone()], &x[range.clone()], &t_s);
+    let mut angle = |x: &[f64], random: &mut Random| -> Vec<f64> {
+        let (offset, scale) = (budget.tilt_offset_rad * random.normal(), 1.0 + budget.angle_scale * random.normal());
+        let wander = random.wander(t_s.len(), step_s, budget.tilt_wander_rad);
+        pick(x).iter().zip(wander).map(|(x, w)| scale * x + offset + w).collect()
+    };
+    let roll_rad = angle(&inputs.roll_rad, &mut random);
+    let pitch_rad = angle(&inputs.pitch_rad, &mut random);
+    let scale = 1.0 + budget.height_scale * random.normal();
+    let wander = random.wander(t_s.len(), step_s, budget.height_wander_m);
+    let height_m = pick(&inputs.height_m).iter().zip(wander).map(|(z, w)| scale * z + w).collect();
+    let (offset, scale) = (budget.support_offset * random.normal(), 1.0 + budget.support_scale * random.normal());
+    let support_ratio = pick(&inputs.support_ratio)
+        .iter()
+        .map(|s| scale * s + offset + budget.support_noise * random.normal())
+        .collect();
+    Inputs {
+        t_s,
+        height_m,
+        roll_rad,
+        pitch_rad,
+        support_ratio,
+        gravity_m_per_s2: inputs.gravity_m_per_s2,
+        ..Inputs::default()
+    }
+}
+
+/// SplitMix64.
+struct Random(u64);
+
+impl Random {
+    fn uniform(&mut self) -> f64 {
+        self.0 = self.0.wrapping_add(0x9e37_79b9_7f4a_7c15);
+        let mut z = self.0;
+        z = (z ^ (z >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
+        z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
+        ((z ^ (z >> 31)) >> 11) as f64 / (1u64 << 53) as f64
+    }
+
+    /// Standard normal (Box and Muller).
+    fn normal(&mut self) -> f64 {
+        let (u, v) = (1.0 - self.uniform(), self.uniform());
+        (-2.0 * u.ln()).sqrt() * (std::f64::consts::TAU * v).cos()
+    }
+
+    /// Ornstein–Uhlenbeck path with standard deviation `sd` and correlation time 3 s.
+    fn wander(&mut self, n: usize, step_s: f64, sd: f64) -> Vec<f64> {
+        let keep = (-step_s / 3.0).exp();
+        let kick = sd * (1.0 - keep * keep).sqrt();
+        let mut x = sd * self.normal();
+        (0..n)
+            .map(|_| {
+                let now = x;
+                x = keep * x + kick * self.normal();
+                now
+            })
+            .collect()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use std::f64::consts::TAU;
+
+    /// A body that rolls and heaves, seen by a sensor `lever` off its centre, turned by `mount`.
+    fn twin(lever: [f64; 3], mount: UnitQuaternion<f64>) -> (Track, Vec<f64>, Vec<f64>, Vec<f64>) {
+        let (dt, n) = (0.005, 8000);
+        let (f, g) = (1.07, 9.80665);
+        let (amplitude, swing) = (0.3, 0.06);
+        let mut track = Track::default();
+        let (mut roll, mut height, mut support) = (vec![], vec![], vec![]);
+        for k in 0..n {
+            let t = k as f64 * dt;
+            let w = TAU * f;
+            let phi = amplitude * (w * t).sin();
+            let rate = Vector3::new(amplitude * w * (w * t).cos(), 0.0, 0.0);
+            let alpha = Vector3::new(-amplitude * w * w * (w * t).sin(), 0.0, 0.0);
+            let z = swing * (2.0 * w * t).sin();
+            let up = -swing * 4.0 * w * w * (2.0 * w * t).sin() + g;
+            let earth_from_body = UnitQuaternion::from_axis_angle(&Vector3::x_axis(), phi);
+            let r = Vector3::from(lever);
+            let force = earth_from_body.inverse() * Vector3::new(0.0, 0.0, up) + alpha.cross(&r) + rate.cross(&rate.cross(&r));
+            track.t_s.push(t);
+            track.gyro_rad_per_s.push((mount.inverse() * rate + Vector3::new(0.004, -0.003, 0.002)).into());
+            track.accel_m_per_s2.push((mount.inverse() * force).into());
+            roll.push(phi);
+            height.push(z);
+            support.push(up / g);
+        }
+        (track, roll, height, support)
+    }
+
+    fn rms(x: impl Iterator<Item = f64>) -> f64 {
+        let v: Vec<f64> = x.collect();
+        (v.iter().map(|x| x * x).sum::<f64>() / v.len() as f64).sqrt()
+    }
+
+    #[test]
+    fn a_swinging_body_comes_back_from_a_sensor_off_its_centre() {
+        let lever = [0.4, 0.05, 0.25];
+        // About one axis: levelling by gravity cannot see a turn about the vertical.
+        let mount = UnitQuaternion::from_euler_angles(0.1, 0.0, 0.0);
+        let (track, roll, height, support) = twin(lever, mount);
+        let settings = Settings { lever_m: lever, orientation: Options::without_latency(), ..Settings::default() };
+        let found = motion(&track, &settings).unwrap();
+        let inner = 2000..6000;
+        let error = |a: &[f64], b: &[f64]| rms(inner.clone().map(|i| a[i] - b[i]));
+        assert!(error(&found.inputs.roll_rad, &roll).to_degrees() < 0.2, "{}", error(&found.inputs.roll_rad, &roll).to_degrees());
+        let lost = error(&found.inputs.height_m, &height) / rms(height.iter().copied());
+        assert!(lost < 0.01, "{lost}");
+        assert!(error(&found.inputs.support_ratio, &support) < 0.02);
+        let m = metrics(&found, Window { start_s: 10.0, end_s: 30.0 });
+        let value = m.get("rms_roll_deg").unwrap();
+        let true_deg = rms(roll[2000..6000].iter().copied()).to_degrees();
+        assert!((value.as_f64().unwrap() - true_deg).abs() < 0.1, "{value:?}");
+        assert_eq!(value.source, "imu");
+        let [low, high] = value.ci95.unwrap();
+        assert!(low < true_deg && true_deg < high);
+        assert!(m.get("z_mean_m").unwrap().reason.is_some());
+    }
+
+    #[test]
+    fn removed_gravity_is_said() {
+        let (mut track, ..) = twin([0.0; 3], UnitQuaternion::identity());
+        for a in &mut track.accel_m_per_s2 {
+            a[2] -= 9.8;
+        }
+        let error = motion(&track, &Settings::default()).unwrap_err();
+        assert!(matches!(error, MotionError::NoGravity { .. }), "{error}");
+        assert!(matches!(motion(&Track::default(), &Settings::default()), Err(MotionError::TooShort { .. })));
+    }
+}
