@@ -432,6 +432,8 @@ impl Walk<'_> {
                         }
                     }
                 }
+                // What is left of a chunk that is cut off has no checksum that could vouch for it.
+                None if self.cut_chunk(at) => None,
                 None => self.resync(at + 1),
             };
             let Some(next) = next else {
@@ -458,6 +460,21 @@ impl Walk<'_> {
         } else {
             self.closing(at);
         }
+    }
+
+    /// Whether a chunk begins at `at` that goes on beyond the end of the file: both its lengths say so.
+    fn cut_chunk(&self, at: usize) -> bool {
+        let lengths = || {
+            let mut fields = Fields::new(&self.bytes[at..]);
+            let (opcode, outer) = (fields.array::<1>()?, fields.u64()?);
+            fields.take(8 + 8 + 8 + 4)?;
+            let compression = u64::from(fields.u32()?);
+            fields.take(compression)?;
+            Some(
+                opcode == [op::CHUNK] && fields.u64()?.checked_add(40 + compression) == Some(outer),
+            )
+        };
+        lengths() == Some(true)
     }
 
     /// The file stops at `at`, before its closing records.

@@ -1,0 +1,527 @@
+//! Damaged files: cut anywhere, with flipped bits, with lies in them. Nothing panics or hangs, whole chunks are used, losses are said.
+
+use std::{collections::BTreeMap, path::PathBuf, time::Instant};
+
+use recording::{
+    Finding, Kind,
+    read::{ReadError, ReadOptions, Recording},
+};
+
+fn data(name: &str) -> Vec<u8> {
+    std::fs::read(
+        PathBuf::from(env!("CARGO_MANIFEST_DIR"))
+            .join("tests/data")
+            .join(name),
+    )
+    .expect("test data")
+}
+
+fn options() -> ReadOptions {
+    ReadOptions {
+        threads: 1,
+        ..ReadOptions::default()
+    }
+}
+
+/// Every message that a file gives: topic and log time to the bits of its numbers.
+type Content = BTreeMap<(String, i64), Vec<(String, u64)>>;
+
+struct Read {
+    content: Content,
+    findings: Vec<Finding>,
+    skipped: u64,
+}
+
+fn read(bytes: Vec<u8>) -> Result<Read, ReadError> {
+    let recording = Recording::from_bytes(bytes, &options())?;
+    let mut content = Content::new();
+    let findings = recording.stream(&|_| true, &mut |batch| {
+        for t_ns in batch.times_ns {
+            content.entry((batch.topic.to_owned(), *t_ns)).or_default();
+        }
+        for column in batch.columns {
+            for (position, value) in column.values.iter().enumerate() {
+                let row = column.rows.map_or(position, |rows| rows[position] as usize);
+                let message = content
+                    .entry((batch.topic.to_owned(), batch.times_ns[row]))
+                    .or_default();
+                message.push((column.path.to_owned(), value.to_bits()));
+            }
+        }
+    })?;
+    for message in content.values_mut() {
+        message.sort();
+    }
+    Ok(Read {
+        content,
+        findings,
+        skipped: recording.skipped_messages(),
+    })
+}
+
+/// Where the chunks are.
+fn chunks(bytes: &[u8]) -> Vec<std::ops::Range<usize>> {
+    let mut chunks = Vec::new();
+    let mut at = 8;
+    while at + 9 < bytes.len() - 8 {
+        let length =
+            u64::from_le_bytes(bytes[at + 1..at + 9].try_into().expect("eight bytes")) as usize;
+        if bytes[at] == 0x06 {
+            chunks.push(at..at + 9 + length);
+        }
+        at += 9 + length;
+    }
+    chunks
+}
+
+/// What a damaged file gives must be among what the whole one gives, number by number; if less, that must be said.
+fn part_of(whole: &Content, damaged: &Read, what: &str) {
+    for (key, message) in &damaged.content {
+        assert_eq!(
+            whole.get(key),
+            Some(message),
+            "{what}: {key:?} is not what was written"
+        );
+    }
+    if damaged.content.len() < whole.len() {
+        assert!(
+            damaged
+                .findings
+                .iter()
+                .any(|finding| finding.kind.is_loss()),
+            "{what}: a loss is not said: {:?}",
+            damaged.findings
+        );
+    }
+}
+
+/// The same numbers on every machine: a 64-bit linear congruence (Knuth's MMIX).
+struct Random(u64);
+
+impl Random {
+    fn below(&mut self, bound: usize) -> usize {
+        self.0 = self
+            .0
+            .wrapping_mul(6364136223846793005)
+            .wrapping_add(1442695040888963407);
+        (self.0 >> 33) as usize % bound
+    }
+}
+
+#[test]
+fn cut_at_every_byte() {
+    for name in ["zstd.mcap", "none.mcap", "unchunked.mcap"] {
+        let bytes = data(name);
+        let whole = read(bytes.clone()).expect("reads").content;
+        // Optimised builds try every byte of the last 64 KB, others some.
+        let step = if cfg!(debug_assertions) { 101 } else { 1 };
+        let first = bytes.len().saturating_sub(64 << 10);
+        let mut most = 0;
+        for length in (first..bytes.len()).step_by(step) {
+            let what = format!("{name} cut to {length} bytes");
+            match read(bytes[..length].to_vec()) {
+                Ok(damaged) => {
+                    part_of(&whole, &damaged, &what);
+                    assert!(
+                        damaged
+                            .findings
+                            .iter()
+                            .any(|finding| finding.kind.is_loss()),
+                        "{what}: the cut is not said"
+                    );
+                    assert!(
+                        damaged.content.len() >= most,
+                        "{what}: fewer messages than with fewer bytes"
+                    );
+                    most = damaged.content.len();
+                }
+                Err(ReadError::Empty { .. } | ReadError::NotMcap { .. }) => {
+                    assert!(length < 40, "{what}")
+                }
+                Err(error) => panic!("{what}: {error}"),
+            }
+        }
+        assert_eq!(
+            most,
+            whole.len(),
+            "{name}: with only the tail missing all messages are there"
+        );
+    }
+}
+
+#[test]
+fn cut_at_random_places() {
+    let bytes = data("tiny_chunks.mcap");
+    let whole = read(bytes.clone()).expect("reads").content;
+    let mut random = Random(1);
+    for _ in 0..1000 / if cfg!(debug_assertions) { 10 } else { 1 } {
+        let length = 40 + random.below(bytes.len() - 40);
+        let damaged = read(bytes[..length].to_vec()).expect("opens");
+        part_of(&whole, &damaged, &format!("cut to {length} bytes"));
+    }
+}
+
+#[test]
+fn single_flipped_bits() {
+    let mut random = Random(2);
+    for name in [
+        "zstd.mcap",
+        "lz4.mcap",
+        "none.mcap",
+        "tiny_chunks.mcap",
+        "unchunked.mcap",
+        "no_index.mcap",
+    ] {
+        let bytes = data(name);
+        let whole = read(bytes.clone()).expect("reads").content;
+        for _ in 0..1000 / if cfg!(debug_assertions) { 10 } else { 1 } {
+            let (at, bit) = (random.below(bytes.len()), random.below(8));
+            let mut flipped = bytes.clone();
+            flipped[at] ^= 1 << bit;
+            let what = format!("{name} with bit {bit} of byte {at} flipped");
+            let damaged = match read(flipped) {
+                Ok(damaged) => damaged,
+                Err(error) => panic!("{what}: {error}"),
+            };
+            // Outside chunks only the checksum over all data protects numbers: they may be wrong, but not in silence.
+            let warned = damaged.findings.iter().any(|finding| {
+                (finding.kind == Kind::BadCrc && finding.text.contains("may be wrong"))
+                    || finding.kind.is_loss()
+                    || finding.kind == Kind::BadSchema
+            });
+            let unprotected = name == "unchunked.mcap";
+            if !(unprotected && warned) {
+                part_of(&whole, &damaged, &what);
+            }
+        }
+    }
+}
+
+#[test]
+fn one_bad_chunk_costs_one_chunk() {
+    let bytes = data("zstd.mcap");
+    let whole = read(bytes.clone()).expect("reads").content;
+    let mut broken = bytes.clone();
+    // The second chunk, in its middle.
+    let chunks = chunks(&bytes);
+    let at = chunks[1].start + chunks[1].len() / 2;
+    broken[at] ^= 0x55;
+    let damaged = read(broken).expect("reads");
+    part_of(&whole, &damaged, "a broken chunk");
+    let losses: Vec<&Finding> = damaged
+        .findings
+        .iter()
+        .filter(|finding| finding.kind.is_loss())
+        .collect();
+    assert_eq!(losses.len(), 1, "{losses:?}");
+    assert!(
+        matches!(losses[0].kind, Kind::BadCrc | Kind::BadChunk),
+        "{losses:?}"
+    );
+    assert_eq!(
+        damaged.skipped as usize,
+        whole.len() - damaged.content.len()
+    );
+    assert!(damaged.skipped > 0 && damaged.content.len() > whole.len() / 2);
+}
+
+/// Puts a record together.
+fn record(opcode: u8, body: &[u8]) -> Vec<u8> {
+    let mut record = vec![opcode];
+    record.extend_from_slice(&(body.len() as u64).to_le_bytes());
+    record.extend_from_slice(body);
+    record
+}
+
+fn text(value: &str) -> Vec<u8> {
+    let mut bytes = (value.len() as u32).to_le_bytes().to_vec();
+    bytes.extend_from_slice(value.as_bytes());
+    bytes
+}
+
+const MAGIC: &[u8] = b"\x89MCAP0\r\n";
+
+/// A file with one JSON channel and the records given, without a summary.
+fn file(records: &[Vec<u8>]) -> Vec<u8> {
+    let mut bytes = MAGIC.to_vec();
+    bytes.extend(record(1, &[text(""), text("test")].concat()));
+    for record in records {
+        bytes.extend(record);
+    }
+    bytes.extend(record(15, &[0; 4]));
+    bytes.extend(record(2, &[0; 20]));
+    bytes.extend_from_slice(MAGIC);
+    bytes
+}
+
+fn channel(id: u16, encoding: &str) -> Vec<u8> {
+    record(
+        4,
+        &[
+            &id.to_le_bytes()[..],
+            &[0, 0],
+            &text("/a"),
+            &text(encoding),
+            &[0; 4],
+        ]
+        .concat(),
+    )
+}
+
+fn message(id: u16, time: u64, data: &[u8]) -> Vec<u8> {
+    record(
+        5,
+        &[
+            &id.to_le_bytes()[..],
+            &[0; 4],
+            &time.to_le_bytes(),
+            &time.to_le_bytes(),
+            data,
+        ]
+        .concat(),
+    )
+}
+
+fn chunk(compression: &str, uncompressed: u64, crc: u32, records: &[u8]) -> Vec<u8> {
+    let length = (records.len() as u64).to_le_bytes();
+    record(
+        6,
+        &[
+            &[0; 16][..],
+            &uncompressed.to_le_bytes(),
+            &crc.to_le_bytes(),
+            &text(compression),
+            &length,
+            records,
+        ]
+        .concat(),
+    )
+}
+
+fn lines(bytes: Vec<u8>) -> (usize, Vec<String>) {
+    let read = read(bytes).expect("opens");
+    (
+        read.content.len(),
+        read.findings
+            .iter()
+            .map(|finding| format!("{} {finding}", finding.kind))
+            .collect(),
+    )
+}
+
+#[test]
+fn a_chunk_that_claims_a_terabyte_is_refused_at_once() {
+    let started = Instant::now();
+    let records = zstd::bulk::compress(&vec![0; 1 << 20], 1).expect("compresses");
+    let (messages, lines) = lines(file(&[
+        channel(1, "json"),
+        chunk("zstd", 1 << 40, 0, &records),
+        message(1, 7, b"1"),
+    ]));
+    assert_eq!(messages, 1);
+    assert_eq!(
+        lines,
+        [
+            "too_large the chunk at byte 60 claims 1099511627776 bytes unpacked; the limit max_chunk_bytes is 4294967296; it was left out"
+        ]
+    );
+    assert!(started.elapsed().as_secs() < 2);
+}
+
+#[test]
+fn what_is_wrong_is_named() {
+    let inner = message(1, 5, b"{\"x\": 1}");
+    let good = chunk("", inner.len() as u64, crc32fast::hash(&inner), &inner);
+    for (records, messages, expected) in [
+        (
+            vec![
+                channel(1, "json"),
+                chunk("zsdt", 10, 0, b"abc"),
+                good.clone(),
+            ],
+            1,
+            vec![
+                "bad_chunk the chunk at byte 60 is compressed with \"zsdt\"; zstd, lz4 and none can be read; it was left out",
+            ],
+        ),
+        (
+            vec![
+                channel(1, "json"),
+                chunk("", inner.len() as u64, 1, &inner),
+                good.clone(),
+            ],
+            1,
+            vec![
+                "bad_crc the chunk at byte 60 does not match its checksum (00000001 expected, CRC found); it was left out",
+            ],
+        ),
+        (
+            vec![
+                channel(1, "h264"),
+                message(1, 5, b"abc"),
+                message(1, 6, b"abc"),
+            ],
+            0,
+            vec![
+                "no_decoder /a: skipped 2 messages: encoding \"h264\" with schema encoding \"\" has no decoder",
+            ],
+        ),
+        (
+            vec![channel(1, "json"), message(2, 5, b"1"), message(1, 6, b"1")],
+            1,
+            vec![
+                "unknown_channel skipped 1 messages: messages of channel 2, which nothing defines",
+            ],
+        ),
+        (
+            vec![
+                channel(1, "json"),
+                message(1, 5, b"{\"x\": "),
+                message(1, 6, b"1"),
+                message(1, 7, b"NaN"),
+            ],
+            1,
+            vec![
+                "undecodable /a: 2 messages could not be decoded; the first: JSON message of 6 bytes: EOF while parsing a value at line 1 column 6",
+            ],
+        ),
+        (
+            vec![
+                channel(1, "json"),
+                record(0x33, b"abc"),
+                message(1, 6, b"1"),
+                record(0x91, b"private"),
+            ],
+            1,
+            vec!["bad_record 1 records of the unknown kind 0x33 were stepped over"],
+        ),
+        (
+            vec![
+                channel(1, "json"),
+                message(1, u64::MAX, b"1"),
+                message(1, 6, b"1"),
+            ],
+            1,
+            vec![
+                "time_out_of_range /a: log times beyond the year 2262 cannot be held in nanoseconds",
+            ],
+        ),
+    ] {
+        let crc = format!("{:08x}", crc32fast::hash(&inner));
+        let expected: Vec<String> = expected
+            .iter()
+            .map(|line| line.replace("CRC", &crc))
+            .collect();
+        assert_eq!(lines(file(&records)), (messages, expected));
+    }
+}
+
+#[test]
+fn several_frames_and_spare_bytes() {
+    let first = message(1, 5, b"{\"x\": 1}");
+    let second = message(1, 6, b"{\"x\": 2}");
+    let all = [first.clone(), second.clone()].concat();
+    let zstd = [
+        zstd::bulk::compress(&first, 3),
+        zstd::bulk::compress(&second, 3),
+    ]
+    .map(|frame| frame.expect("compresses"))
+    .concat();
+    let lz4 = [&first, &second]
+        .map(|bytes| {
+            let mut frame = lz4_flex::frame::FrameEncoder::new(Vec::new());
+            std::io::Write::write_all(&mut frame, bytes).expect("compresses");
+            frame.finish().expect("compresses")
+        })
+        .concat();
+    let crc = crc32fast::hash(&all);
+    let mut long = chunk("", all.len() as u64, crc, &all);
+    // Bytes after the last field of a record are allowed.
+    long.extend_from_slice(b"spare");
+    let length = (long.len() - 9) as u64;
+    long[1..9].copy_from_slice(&length.to_le_bytes());
+    for chunk in [
+        chunk("zstd", all.len() as u64, crc, &zstd),
+        chunk("lz4", all.len() as u64, crc, &lz4),
+        long,
+    ] {
+        assert_eq!(lines(file(&[channel(1, "json"), chunk])), (2, vec![]));
+    }
+}
+
+#[test]
+fn a_large_chunk_is_read_in_pieces() {
+    // 40 MB of messages in one chunk: more than is unpacked in one go.
+    let mut records = Vec::new();
+    for i in 0..1_000_000u64 {
+        records.extend(message(1, i, b"{\"x\": 1}"));
+    }
+    let long = [b"\"".as_slice(), &vec![b'x'; 5 << 20], b"\""].concat();
+    records.extend(message(1, 1_000_000, &long));
+    records.extend(message(1, 1_000_001, b"{\"x\": 3}"));
+    let packed = zstd::bulk::compress(&records, 1).expect("compresses");
+    let crc = crc32fast::hash(&records);
+    let bytes = file(&[
+        channel(1, "json"),
+        chunk("zstd", records.len() as u64, crc, &packed),
+    ]);
+    let recording = Recording::from_bytes(bytes.clone(), &options()).expect("opens");
+    let (signals, findings) = recording.signals(&|_| true).expect("reads");
+    assert_eq!(findings, []);
+    assert_eq!(recording.info().messages, 1_000_002);
+    assert_eq!(
+        (signals[0].values.len(), signals[0].values.last()),
+        (1_000_001, Some(&3.0))
+    );
+
+    let options = ReadOptions {
+        max_message_bytes: 4 << 20,
+        ..options()
+    };
+    let recording = Recording::from_bytes(bytes, &options).expect("opens");
+    let (signals, findings) = recording.signals(&|_| true).expect("reads");
+    assert_eq!(signals[0].values.len(), 1_000_001);
+    assert_eq!(
+        findings[0].text,
+        "1 messages are longer than the limit max_message_bytes of 4194304"
+    );
+
+    let wrong = file(&[
+        channel(1, "json"),
+        chunk("zstd", records.len() as u64, crc ^ 1, &packed),
+    ]);
+    let recording = Recording::from_bytes(wrong, &self::options()).expect("opens");
+    let (signals, findings) = recording.signals(&|_| true).expect("reads");
+    assert!(
+        signals.is_empty() && findings[0].kind == Kind::BadCrc,
+        "{findings:?}"
+    );
+}
+
+#[test]
+fn what_is_no_recording_is_refused_in_a_sentence() {
+    let error = |bytes: &[u8]| {
+        Recording::from_bytes(bytes.to_vec(), &options())
+            .expect_err("refused")
+            .to_string()
+    };
+    assert_eq!(
+        error(b""),
+        "standard input: is empty; expected an MCAP recording"
+    );
+    assert_eq!(
+        error(b"t,x,y\n1,2,3\n"),
+        "standard input: is not an MCAP recording (it begins with \"t,x,y\\n1,\"); logs of other formats can be ingested"
+    );
+    let error = Recording::open(std::path::Path::new("no/such.mcap"), &options())
+        .expect_err("refused")
+        .to_string();
+    assert!(
+        error.starts_with("no/such.mcap: cannot be read: No such file"),
+        "{error}"
+    );
+    let error = Recording::open(std::path::Path::new("."), &options())
+        .expect_err("refused")
+        .to_string();
+    assert_eq!(error, ".: cannot be read: it is a folder");
+}
