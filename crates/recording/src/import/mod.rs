@@ -1,10 +1,24 @@
 //! Other people's logs turned into recordings: NumPy archives, phone apps, inertial sensors, any CSV.
+//!
+//! [`ingest`] finds out what each file is. Inertial logs become `sensor_msgs/msg/Imu` in the convention of REP-145, several devices in
+//! one recording, in the order of time.
 
+mod imu;
+pub mod layout;
 pub mod npz;
+mod phyphox;
+mod sensor_logger;
+mod table;
+mod xsens;
 
-use std::io;
+use std::{
+    collections::BTreeMap,
+    fs, io,
+    io::Read,
+    path::{Path, PathBuf},
+};
 
-use crate::write::WriteError;
+use crate::write::{RecordingWriter, WriteError};
 
 /// Why a log could not be turned into a recording. Nothing is left half-written.
 #[derive(Debug, thiserror::Error)]
@@ -29,4 +43,243 @@ pub enum ImportError {
     /// The recording cannot be written.
     #[error(transparent)]
     Write(#[from] WriteError),
+}
+
+/// What came of an ingestion.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Ingested {
+    /// Topics and how many messages each got.
+    pub topics: Vec<(String, u64)>,
+    /// What was decided on the way (units, signs, gravity, clocks), one line each, with the file's name.
+    pub notes: Vec<String>,
+}
+
+/// Texts larger than this, unpacked, are refused.
+const MAX_TEXT_BYTES: u64 = 2 << 30;
+
+/// The files of a log: one, or those of a folder or zip.
+struct Files {
+    name: String,
+    texts: Vec<(String, String)>,
+}
+
+impl Files {
+    fn texts(&self) -> impl Iterator<Item = (&str, &str)> {
+        self.texts
+            .iter()
+            .map(|(name, text)| (name.as_str(), text.as_str()))
+    }
+
+    fn ending_with(&self, end: &str) -> Option<(&str, &str)> {
+        self.texts().find(|(name, _)| name.ends_with(end))
+    }
+
+    /// The file of a name, in whatever folder.
+    fn named(&self, file: &str) -> Option<(&str, &str)> {
+        self.texts()
+            .find(|(name, _)| name.rsplit(['/', '\\']).next() == Some(file))
+    }
+}
+
+/// Turns logs into one recording; `writer` has had no message yet, and the caller finishes it.
+///
+/// A `.npz` is a log of the published archive and stands alone. `layout` names a built-in [`layout`] or a TOML file, and is then used for
+/// every CSV; without it the format is found out.
+///
+/// # Errors
+/// Says in one sentence which file, what was found and what was expected.
+pub fn ingest(
+    paths: &[PathBuf],
+    layout: Option<&str>,
+    writer: &mut RecordingWriter,
+) -> Result<Ingested, ImportError> {
+    if let [path] = paths
+        && path
+            .extension()
+            .is_some_and(|extension| extension.eq_ignore_ascii_case("npz"))
+    {
+        let messages = npz::ingest(path, writer)?;
+        let topics = [
+            crate::topics::STATE,
+            crate::topics::PHASES,
+            crate::topics::FORCES,
+            crate::topics::TF,
+        ];
+        return Ok(Ingested {
+            topics: topics.map(|topic| (topic.to_owned(), messages / 4)).into(),
+            notes: vec!["the archive's axes were turned: (x, y, z) became (x, -z, y); its pitch is yaw here".to_owned()],
+        });
+    }
+    let layout = layout.map(layout::find).transpose()?;
+    let mut logs = Vec::new();
+    for path in paths {
+        let files = open(path)?;
+        logs.push(read(&files, layout.as_ref())?);
+    }
+    let mut metadata: BTreeMap<String, String> = [
+        ("version".to_owned(), env!("CARGO_PKG_VERSION").to_owned()),
+        ("source".to_owned(), "field".to_owned()),
+    ]
+    .into();
+    let mut notes = Vec::new();
+    for (log, path) in logs.iter().zip(paths) {
+        if log.samples.is_empty() {
+            let problem = "has a header but no rows; expected at least one sample".to_owned();
+            return Err(ImportError::Content {
+                name: path.display().to_string(),
+                problem,
+            });
+        }
+        notes.extend(
+            log.notes
+                .iter()
+                .map(|note| format!("{}: {note}", path.display())),
+        );
+        if !log.notes.is_empty() {
+            metadata.insert(format!("notes.{}", log.name), log.notes.join("; "));
+        }
+    }
+    writer.metadata("rath", &metadata)?;
+    let topics = imu::write(&logs, writer)?;
+    Ok(Ingested { topics, notes })
+}
+
+fn read(files: &Files, layout: Option<&layout::Layout>) -> Result<imu::Log, ImportError> {
+    let has = |is_header: fn(&str) -> bool| {
+        files
+            .texts()
+            .any(|(_, text)| text.lines().take(50).any(is_header))
+    };
+    let one = || files.texts().next().unwrap_or(("", ""));
+    if let Some(layout) = layout {
+        let (_, text) = one();
+        return layout::read(layout, &files.name, text);
+    }
+    if has(sensor_logger::is_header) {
+        sensor_logger::read(files)
+    } else if has(phyphox::is_header) {
+        phyphox::read(files)
+    } else if has(xsens::is_header) {
+        let found = files
+            .texts()
+            .find(|(_, text)| text.lines().take(50).any(xsens::is_header));
+        xsens::read(&files.name, found.unwrap_or(one()).1)
+    } else {
+        let heads: Vec<String> = files
+            .texts()
+            .take(8)
+            .map(|(_, text)| {
+                format!(
+                    "{:?}",
+                    text.lines()
+                        .next()
+                        .unwrap_or_default()
+                        .chars()
+                        .take(120)
+                        .collect::<String>()
+                )
+            })
+            .collect();
+        Err(ImportError::Content {
+            name: files.name.clone(),
+            problem: format!(
+                "is no log of phyphox, Sensor Logger or Movella DOT / Xsens, and no layout is given; found {}",
+                if heads.is_empty() {
+                    "no CSV".to_owned()
+                } else {
+                    heads.join(", ")
+                }
+            ),
+        })
+    }
+}
+
+/// Reads the texts of a file, folder or zip.
+fn open(path: &Path) -> Result<Files, ImportError> {
+    let name = path.display().to_string();
+    let io = |source| ImportError::Io {
+        name: name.clone(),
+        source,
+    };
+    let mut texts = Vec::new();
+    if path.is_dir() {
+        // Apps put at most one level of folders (`meta`) beside their tables.
+        for folder in [path.to_owned(), path.join("meta")] {
+            if !folder.is_dir() {
+                continue;
+            }
+            let mut entries = fs::read_dir(&folder)
+                .map_err(io)?
+                .collect::<Result<Vec<_>, _>>()
+                .map_err(io)?;
+            entries.sort_by_key(fs::DirEntry::file_name);
+            for entry in entries
+                .iter()
+                .filter(|entry| is_text(&entry.file_name().to_string_lossy()))
+            {
+                let text = fs::read(entry.path()).map_err(io)?;
+                texts.push((
+                    entry.path().display().to_string(),
+                    String::from_utf8_lossy(&text).into_owned(),
+                ));
+            }
+        }
+        return Ok(Files { name, texts });
+    }
+    let mut file = fs::File::open(path).map_err(io)?;
+    let mut head = [0; 4];
+    let read = file.read(&mut head).map_err(io)?;
+    io::Seek::rewind(&mut file).map_err(io)?;
+    if &head[..read] == b"PK\x03\x04" {
+        let content = |problem: String| ImportError::Content {
+            name: name.clone(),
+            problem,
+        };
+        let mut zip = zip::ZipArchive::new(io::BufReader::new(file))
+            .map_err(|error| content(format!("is no zip: {error}")))?;
+        let mut left = MAX_TEXT_BYTES;
+        for position in 0..zip.len() {
+            let mut entry = zip
+                .by_index(position)
+                .map_err(|error| content(format!("cannot be unpacked: {error}")))?;
+            let entry_name = entry.name().to_owned();
+            if !is_text(&entry_name) {
+                continue;
+            }
+            let mut bytes = Vec::new();
+            entry
+                .by_ref()
+                .take(left + 1)
+                .read_to_end(&mut bytes)
+                .map_err(|error| content(format!("{entry_name} cannot be unpacked: {error}")))?;
+            left = left.checked_sub(bytes.len() as u64).ok_or_else(|| {
+                content(format!(
+                    "holds more than {MAX_TEXT_BYTES} bytes of text, the limit"
+                ))
+            })?;
+            texts.push((entry_name, String::from_utf8_lossy(&bytes).into_owned()));
+        }
+        return Ok(Files { name, texts });
+    }
+    let mut bytes = Vec::new();
+    file.take(MAX_TEXT_BYTES + 1)
+        .read_to_end(&mut bytes)
+        .map_err(io)?;
+    if bytes.len() as u64 > MAX_TEXT_BYTES {
+        let problem = format!("holds more than {MAX_TEXT_BYTES} bytes, the limit for texts");
+        return Err(ImportError::Content { name, problem });
+    }
+    if bytes.iter().all(u8::is_ascii_whitespace) {
+        return Err(ImportError::Content {
+            name,
+            problem: "is empty; expected a log".to_owned(),
+        });
+    }
+    texts.push((name.clone(), String::from_utf8_lossy(&bytes).into_owned()));
+    Ok(Files { name, texts })
+}
+
+fn is_text(name: &str) -> bool {
+    let name = name.to_lowercase();
+    name.ends_with(".csv") || name.ends_with(".txt")
 }

@@ -1,0 +1,206 @@
+//! Inertial logs on their way to `sensor_msgs/msg/Imu` in the convention of REP-145: specific force in m/s² (+g on the axis that
+//! points up at rest), angular velocity in rad/s, covariance −1 for what is not given.
+
+use super::ImportError;
+use crate::{
+    cdr::{self, Quaternion},
+    topics::MessageKind,
+    write::RecordingWriter,
+};
+
+/// Standard gravity, m/s² (3rd General Conference on Weights and Measures, 1901).
+pub(super) const STANDARD_GRAVITY: f64 = 9.80665;
+
+/// One sample of a device.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub(super) struct Sample {
+    pub t_ns: i64,
+    pub force: Option<[f64; 3]>,
+    pub rate: Option<[f64; 3]>,
+    /// x, y, z, w; sensor in the world.
+    pub orientation: Option<[f64; 4]>,
+}
+
+/// What one device logged.
+#[derive(Clone, Debug, Default)]
+pub(super) struct Log {
+    /// Name of the device: topic `/imu/NAME`, frame `NAME`.
+    pub name: String,
+    pub samples: Vec<Sample>,
+    /// What was decided on the way, for people and for the metadata.
+    pub notes: Vec<String>,
+}
+
+/// A triple of numbers over time.
+pub(super) type Track = Vec<(i64, [f64; 3])>;
+
+impl Log {
+    /// Puts a force and a rate track together. Where their times differ, the rate is interpolated linearly at the force's times; where
+    /// it has a hole of more than three usual intervals, or none on one side, it is not given.
+    pub fn join(name: String, force: Track, rate: Track, mut notes: Vec<String>) -> Self {
+        let sample = |t_ns, force, rate| Sample {
+            t_ns,
+            force,
+            rate,
+            orientation: None,
+        };
+        let samples = if force.is_empty() {
+            rate.iter()
+                .map(|&(t_ns, rate)| sample(t_ns, None, Some(rate)))
+                .collect()
+        } else if rate.is_empty() {
+            force
+                .iter()
+                .map(|&(t_ns, force)| sample(t_ns, Some(force), None))
+                .collect()
+        } else if force
+            .iter()
+            .map(|row| row.0)
+            .eq(rate.iter().map(|row| row.0))
+        {
+            force
+                .iter()
+                .zip(&rate)
+                .map(|(&(t_ns, force), &(_, rate))| sample(t_ns, Some(force), Some(rate)))
+                .collect()
+        } else {
+            notes.push(
+                "the angular velocity was interpolated linearly at the times of the acceleration"
+                    .to_owned(),
+            );
+            let hole = usual_interval(&rate).saturating_mul(3);
+            force
+                .iter()
+                .map(|&(t_ns, force)| sample(t_ns, Some(force), interpolate(&rate, t_ns, hole)))
+                .collect()
+        };
+        Log {
+            name,
+            samples,
+            notes,
+        }
+    }
+}
+
+/// The median interval of a track, ns.
+fn usual_interval(track: &Track) -> i64 {
+    let mut intervals: Vec<i64> = track.windows(2).map(|pair| pair[1].0 - pair[0].0).collect();
+    intervals.sort_unstable();
+    intervals.get(intervals.len() / 2).copied().unwrap_or(0)
+}
+
+/// The track's value at a time: exact on a sample, linear between two that are no more than `hole` apart.
+pub(super) fn interpolate(track: &Track, t_ns: i64, hole: i64) -> Option<[f64; 3]> {
+    let after = track.partition_point(|row| row.0 < t_ns);
+    let (t1, v1) = *track.get(after)?;
+    if t1 == t_ns {
+        return Some(v1);
+    }
+    let (t0, v0) = *track.get(after.checked_sub(1)?)?;
+    if t1 - t0 > hole {
+        return None;
+    }
+    let share = (t_ns - t0) as f64 / (t1 - t0) as f64;
+    Some(std::array::from_fn(|axis| {
+        v0[axis] + share * (v1[axis] - v0[axis])
+    }))
+}
+
+/// The interpolation's hole for a track: three usual intervals.
+pub(super) fn hole(track: &Track) -> i64 {
+    usual_interval(track).saturating_mul(3)
+}
+
+/// The median length of a track's vectors.
+pub(super) fn usual_length(track: &Track) -> Option<f64> {
+    let mut lengths: Vec<f64> = track
+        .iter()
+        .map(|(_, [x, y, z])| (x * x + y * y + z * z).sqrt())
+        .filter(|length| length.is_finite())
+        .collect();
+    lengths.sort_by(f64::total_cmp);
+    lengths.get(lengths.len() / 2).copied()
+}
+
+/// Seconds as nanoseconds, rounded; `None` for what does not fit.
+pub(super) fn nanoseconds(t_s: f64) -> Option<i64> {
+    let t_ns = (t_s * 1e9).round();
+    // OK because the range was checked.
+    (0.0..9.2e18).contains(&t_ns).then_some(t_ns as i64)
+}
+
+/// Writes logs as one recording, in the order of time. Returns topics and how many messages each got.
+pub(super) fn write(
+    logs: &[Log],
+    writer: &mut RecordingWriter,
+) -> Result<Vec<(String, u64)>, ImportError> {
+    let mut topics = Vec::new();
+    let mut channels = Vec::new();
+    for log in logs {
+        // Two devices of one name stay two.
+        let mut topic = format!("/imu/{}", log.name);
+        let mut number = 2;
+        while topics.iter().any(|(known, _)| *known == topic) {
+            topic = format!("/imu/{}_{number}", log.name);
+            number += 1;
+        }
+        channels.push(writer.channel(&topic, MessageKind::Imu)?);
+        topics.push((topic, log.samples.len() as u64));
+    }
+    let mut order: Vec<(i64, usize, usize)> = logs
+        .iter()
+        .enumerate()
+        .flat_map(|(device, log)| {
+            log.samples
+                .iter()
+                .enumerate()
+                .map(move |(row, sample)| (sample.t_ns, device, row))
+        })
+        .collect();
+    order.sort_unstable();
+    for (t_ns, device, row) in order {
+        let sample = &logs[device].samples[row];
+        let frame = topics[device].0.strip_prefix("/imu/").unwrap_or_default();
+        let mut message = cdr::Imu::raw(
+            t_ns,
+            frame,
+            sample.rate.unwrap_or_default(),
+            sample.force.unwrap_or_default(),
+        );
+        if sample.rate.is_none() {
+            message = message.without_angular_velocity();
+        }
+        if sample.force.is_none() {
+            message = message.without_linear_acceleration();
+        }
+        if let Some(orientation) = sample.orientation {
+            message = message.with_orientation(Quaternion::from(orientation));
+        }
+        writer.message(channels[device], t_ns, &message)?;
+    }
+    Ok(topics)
+}
+
+/// A device's name out of a file's: letters, digits, `_` and `-`.
+pub(super) fn device_name(file: &str) -> String {
+    let stem = std::path::Path::new(file)
+        .file_stem()
+        .and_then(|stem| stem.to_str())
+        .unwrap_or("device");
+    let name: String = stem
+        .chars()
+        .map(|c| {
+            if c.is_ascii_alphanumeric() || c == '-' {
+                c
+            } else {
+                '_'
+            }
+        })
+        .collect();
+    let name = name.trim_matches('_');
+    if name.is_empty() {
+        "device".to_owned()
+    } else {
+        name.to_owned()
+    }
+}

@@ -1,0 +1,121 @@
+//! phyphox exports: a zip of one CSV per sensor with `meta/time.csv`, or one such CSV, in any of the five forms that the app
+//! offers (comma, tab or semicolon with a decimal point; tab or semicolon with a decimal comma).
+//!
+//! Times restart at 0; the only absolute clock is `meta/time.csv`, whose START and PAUSE events pair experiment time with UNIX
+//! time. `Acceleration` includes gravity, as REP-145 asks; `Linear Acceleration` does not and is used only where nothing else is there.
+
+use super::{
+    Files, ImportError,
+    imu::{self, Log, Track},
+    table::Table,
+};
+
+/// Whether a line is the header of a phyphox table.
+pub(super) fn is_header(line: &str) -> bool {
+    line.trim_start_matches('\u{feff}')
+        .trim_start_matches('"')
+        .starts_with("Time (s)")
+        && line.contains(" x (")
+}
+
+const SENSORS: &[(&str, &str)] = &[
+    ("Acceleration", "m/s^2"),
+    ("Linear Acceleration", "m/s^2"),
+    ("Gyroscope", "rad/s"),
+];
+
+pub(super) fn read(files: &Files) -> Result<Log, ImportError> {
+    let starts = match files.ending_with("meta/time.csv") {
+        Some((name, text)) => starts(name, text)?,
+        None => Vec::new(),
+    };
+    let mut tracks: [Track; 3] = Default::default();
+    let mut seen = Vec::new();
+    for (name, text) in files.texts() {
+        if name.contains("meta/") || !text.lines().next().is_some_and(is_header) {
+            continue;
+        }
+        let table = Table::parse(name, text, is_header)?;
+        seen.extend(table.columns.iter().cloned());
+        for ((sensor, unit), track) in SENSORS.iter().zip(&mut tracks) {
+            let names = ["x", "y", "z"].map(|axis| format!("{sensor} {axis} ({unit})"));
+            if track.is_empty() && table.find(&names[0]).is_some() {
+                *track = read_track(&table, [&names[0], &names[1], &names[2]], &starts)?;
+            }
+        }
+    }
+    let [with_gravity, without, rate] = tracks;
+    let mut notes = Vec::new();
+    if starts.is_empty() {
+        notes.push("there is no meta/time.csv: times begin at 0, not at a date".to_owned());
+    }
+    let force = if with_gravity.is_empty() {
+        if !without.is_empty() {
+            notes.push(
+                "only the acceleration without gravity was logged: it is no specific force"
+                    .to_owned(),
+            );
+        }
+        without
+    } else {
+        with_gravity
+    };
+    if force.is_empty() && rate.is_empty() {
+        let problem = format!(
+            "has no acceleration and no gyroscope columns; found {}",
+            seen.join(", ")
+        );
+        return Err(ImportError::Content {
+            name: files.name.clone(),
+            problem,
+        });
+    }
+    Ok(Log::join(imu::device_name(&files.name), force, rate, notes))
+}
+
+/// Experiment and UNIX time of every START, s.
+fn starts(name: &str, text: &str) -> Result<Vec<(f64, f64)>, ImportError> {
+    let table = Table::parse(name, text, |line| line.contains("experiment time"))?;
+    let [event, experiment, system] =
+        table.find_all(["event", "experiment time", "system time"])?;
+    let mut starts = Vec::new();
+    for row in 0..table.len() {
+        if table.text(row, event).eq_ignore_ascii_case("START") {
+            starts.push((table.number(row, experiment)?, table.number(row, system)?));
+        }
+    }
+    Ok(starts)
+}
+
+fn read_track(
+    table: &Table,
+    names: [&str; 3],
+    starts: &[(f64, f64)],
+) -> Result<Track, ImportError> {
+    let time = table.find_all(["Time (s)"])?[0];
+    let axes = table.find_all(names)?;
+    let mut track = Track::new();
+    for row in 0..table.len() {
+        let t_s = table.number(row, time)?;
+        // The last START before the sample; a sample a hair before the first belongs to it.
+        let start = starts
+            .iter()
+            .rev()
+            .find(|(experiment, _)| *experiment <= t_s)
+            .or_else(|| starts.first());
+        let t_ns = match start {
+            // The parts are rounded one by one: a UNIX time in seconds has no digits left for nanoseconds.
+            Some((experiment, system)) => imu::nanoseconds(*system)
+                .map(|base| base + ((t_s - experiment) * 1e9).round() as i64),
+            None => imu::nanoseconds(t_s),
+        };
+        let Some(t_ns) = t_ns else {
+            return Err(table.problem(format!(
+                "has the time {t_s} s in row {}; expected seconds from 0 on",
+                row + 1
+            )));
+        };
+        track.push((t_ns, table.vector(row, axes)?));
+    }
+    Ok(track)
+}

@@ -1,0 +1,129 @@
+//! Sensor Logger exports: a folder or zip of `Accelerometer.csv`, `Gravity.csv`, `TotalAcceleration.csv`, `Gyroscope.csv`, `Metadata.csv`.
+//!
+//! Columns are found by name (`time` in ns since 1970, `x`, `y`, `z`). `Accelerometer.csv` has gravity removed; the specific force is
+//! `TotalAcceleration`, or else accelerometer plus gravity. iOS without the app's 'standardisation' has the opposite sign on all axes, and
+//! counts uncalibrated accelerations in g.
+
+use super::{
+    Files, ImportError,
+    imu::{self, Log, STANDARD_GRAVITY, Track},
+    table::Table,
+};
+
+/// Whether a line is the header of a Sensor Logger table.
+pub(super) fn is_header(line: &str) -> bool {
+    line.contains("seconds_elapsed")
+}
+
+pub(super) fn read(files: &Files) -> Result<Log, ImportError> {
+    let mut notes = Vec::new();
+    let flipped = flipped(files, &mut notes)?;
+    let track = |sensor: &str| match files.named(sensor) {
+        Some((name, text)) => read_track(name, text),
+        None => Ok(Track::new()),
+    };
+    let (total, plain, gravity) = (
+        track("TotalAcceleration.csv")?,
+        track("Accelerometer.csv")?,
+        track("Gravity.csv")?,
+    );
+    let mut force = if !total.is_empty() {
+        total
+    } else if !plain.is_empty() && !gravity.is_empty() {
+        let hole = imu::hole(&gravity);
+        notes.push("the specific force is Accelerometer plus Gravity".to_owned());
+        plain
+            .iter()
+            .filter_map(|&(t_ns, a)| {
+                let g = imu::interpolate(&gravity, t_ns, hole)?;
+                Some((t_ns, std::array::from_fn(|axis| a[axis] + g[axis])))
+            })
+            .collect()
+    } else if !plain.is_empty() {
+        notes.push(
+            "only the acceleration without gravity was logged: it is no specific force".to_owned(),
+        );
+        plain
+    } else {
+        track("AccelerometerUncalibrated.csv")?
+    };
+    // At rest a force of 1 is one g, a force of 9.8 is metres per second squared.
+    if imu::usual_length(&force).is_some_and(|length| (0.8..1.3).contains(&length))
+        && files.named("Accelerometer.csv").is_none()
+    {
+        notes.push("accelerations were in g".to_owned());
+        for (_, value) in &mut force {
+            *value = value.map(|component| component * STANDARD_GRAVITY);
+        }
+    }
+    if flipped {
+        for (_, value) in &mut force {
+            *value = value.map(|component| -component);
+        }
+    }
+    let mut rate = track("Gyroscope.csv")?;
+    if rate.is_empty() {
+        rate = track("GyroscopeUncalibrated.csv")?;
+    }
+    if force.is_empty() && rate.is_empty() {
+        let names: Vec<&str> = files.texts().map(|(name, _)| name).collect();
+        let problem = format!(
+            "has no Accelerometer.csv, TotalAcceleration.csv or Gyroscope.csv with rows; found {}",
+            names.join(", ")
+        );
+        return Err(ImportError::Content {
+            name: files.name.clone(),
+            problem,
+        });
+    }
+    Ok(Log::join(imu::device_name(&files.name), force, rate, notes))
+}
+
+/// Whether the signs must be turned: iOS without standardisation.
+fn flipped(files: &Files, notes: &mut Vec<String>) -> Result<bool, ImportError> {
+    let Some((name, text)) = files.named("Metadata.csv") else {
+        notes.push("there is no Metadata.csv: signs are taken to be Android's".to_owned());
+        return Ok(false);
+    };
+    let table = Table::parse(name, text, |line| {
+        line.contains("version") || line.contains("device")
+    })?;
+    let cell = |column: &str| {
+        table
+            .find(column)
+            .map(|column| table.text(0, column).to_lowercase())
+            .unwrap_or_default()
+    };
+    let ios = cell("platform").contains("ios")
+        || cell("device name").contains("iphone")
+        || cell("device name").contains("ipad");
+    let standard = matches!(cell("standardisation").as_str(), "true" | "1" | "yes");
+    if ios && !standard {
+        notes.push(
+            "iOS signs without standardisation: accelerations were turned to +g up at rest"
+                .to_owned(),
+        );
+    }
+    Ok(ios && !standard)
+}
+
+fn read_track(name: &str, text: &str) -> Result<Track, ImportError> {
+    let table = Table::parse(name, text, is_header)?;
+    let [time, x, y, z] = table.find_all(["time", "x", "y", "z"])?;
+    let mut track = Track::new();
+    for row in 0..table.len() {
+        // Nanoseconds since 1970 have more digits than a double holds.
+        let t_ns = match table.text(row, time).parse::<i64>() {
+            Ok(t_ns) => t_ns,
+            Err(_) => table.number(row, time)? as i64,
+        };
+        if t_ns < 0 {
+            return Err(table.problem(format!(
+                "has the time {t_ns} in row {}; expected nanoseconds since 1970",
+                row + 1
+            )));
+        }
+        track.push((t_ns, table.vector(row, [x, y, z])?));
+    }
+    Ok(track)
+}

@@ -1,0 +1,182 @@
+//! Delimited text as a table: separator and decimal sign found out, columns by name, a sentence for every number that is none.
+
+use super::ImportError;
+
+/// A table of text cells.
+pub(super) struct Table {
+    /// The file, for messages.
+    pub name: String,
+    /// The header's names.
+    pub columns: Vec<String>,
+    rows: Vec<csv::StringRecord>,
+    decimal_comma: bool,
+    /// Line of the header in the file, from 1.
+    header_line: usize,
+}
+
+impl Table {
+    /// Reads a table whose header is the first line of `text` for which `is_header` holds.
+    pub fn parse(
+        name: &str,
+        text: &str,
+        is_header: impl Fn(&str) -> bool,
+    ) -> Result<Self, ImportError> {
+        let problem = |problem: String| ImportError::Content {
+            name: name.to_owned(),
+            problem,
+        };
+        let text = text.trim_start_matches('\u{feff}');
+        let mut offset = 0;
+        let mut found = None;
+        for (number, line) in text.split_inclusive('\n').enumerate() {
+            if is_header(line.trim_end()) {
+                found = Some((number + 1, offset, line));
+                break;
+            }
+            offset += line.len();
+        }
+        let Some((header_line, offset, header)) = found else {
+            let first: String = text
+                .lines()
+                .next()
+                .unwrap_or_default()
+                .chars()
+                .take(80)
+                .collect();
+            return Err(problem(format!(
+                "has no header line that is known; it begins with {first:?}"
+            )));
+        };
+        let separator = separator(header);
+        let mut reader = csv::ReaderBuilder::new()
+            .delimiter(separator)
+            .flexible(true)
+            .trim(csv::Trim::All)
+            .from_reader(&text.as_bytes()[offset..]);
+        let columns = reader
+            .headers()
+            .map_err(|error| problem(format!("its header cannot be read: {error}")))?;
+        let columns = columns.iter().map(str::to_owned).collect();
+        let mut rows = Vec::new();
+        for row in reader.records() {
+            let row = row.map_err(|error| problem(format!("cannot be read: {error}")))?;
+            if row.iter().any(|cell| !cell.is_empty()) {
+                rows.push(row);
+            }
+        }
+        // With another separator a comma can only be the decimal sign.
+        let decimal_comma = separator != b','
+            && rows
+                .iter()
+                .take(100)
+                .any(|row| row.iter().any(|cell| cell.contains(',')));
+        Ok(Table {
+            name: name.to_owned(),
+            columns,
+            rows,
+            decimal_comma,
+            header_line,
+        })
+    }
+
+    /// The number of rows.
+    pub fn len(&self) -> usize {
+        self.rows.len()
+    }
+
+    /// The position of a column; names are compared without regard to case, spaces, underscores and the way ² is written.
+    pub fn find(&self, name: &str) -> Option<usize> {
+        let wanted = plain(name);
+        self.columns
+            .iter()
+            .position(|column| plain(column) == wanted)
+    }
+
+    /// The positions of columns that must all be there.
+    pub fn find_all<const N: usize>(&self, names: [&str; N]) -> Result<[usize; N], ImportError> {
+        let missing: Vec<&str> = names
+            .into_iter()
+            .filter(|name| self.find(name).is_none())
+            .collect();
+        if !missing.is_empty() {
+            return Err(self.problem(format!(
+                "lacks the column{} {}; found {}",
+                if missing.len() == 1 { "" } else { "s" },
+                missing.join(", "),
+                self.columns.join(", ")
+            )));
+        }
+        Ok(names.map(|name| self.find(name).unwrap_or(0)))
+    }
+
+    /// An error about this table.
+    pub fn problem(&self, problem: String) -> ImportError {
+        ImportError::Content {
+            name: self.name.clone(),
+            problem,
+        }
+    }
+
+    /// A cell's text.
+    pub fn text(&self, row: usize, column: usize) -> &str {
+        self.rows
+            .get(row)
+            .and_then(|cells| cells.get(column))
+            .unwrap_or_default()
+    }
+
+    /// A cell's number; an empty cell is NaN.
+    pub fn number(&self, row: usize, column: usize) -> Result<f64, ImportError> {
+        let cell = self.text(row, column);
+        if cell.is_empty() {
+            return Ok(f64::NAN);
+        }
+        let parsed = if self.decimal_comma {
+            cell.replace(',', ".").parse()
+        } else {
+            cell.parse()
+        };
+        parsed.map_err(|_| {
+            let cell: String = cell.chars().take(40).collect();
+            self.problem(format!(
+                "line {}, column {:?}: found {cell:?}, expected a number",
+                self.header_line + 1 + row,
+                self.columns.get(column).map_or("", String::as_str)
+            ))
+        })
+    }
+
+    /// Three numbers of a row.
+    pub fn vector(&self, row: usize, columns: [usize; 3]) -> Result<[f64; 3], ImportError> {
+        Ok([
+            self.number(row, columns[0])?,
+            self.number(row, columns[1])?,
+            self.number(row, columns[2])?,
+        ])
+    }
+}
+
+/// The sign that separates the header's names: the commonest of tab, semicolon, comma outside quotes.
+fn separator(header: &str) -> u8 {
+    let mut counts = [(b'\t', 0), (b';', 0), (b',', 0)];
+    let mut quoted = false;
+    for byte in header.bytes() {
+        quoted ^= byte == b'"';
+        if let Some((_, count)) = counts.iter_mut().find(|(sign, _)| *sign == byte && !quoted) {
+            *count += 1;
+        }
+    }
+    counts
+        .iter()
+        .copied()
+        .max_by_key(|&(_, count)| count)
+        .map_or(b',', |(sign, _)| sign)
+}
+
+fn plain(name: &str) -> String {
+    name.replace('²', "^2")
+        .chars()
+        .filter(|c| !matches!(c, ' ' | '_' | '"'))
+        .flat_map(char::to_lowercase)
+        .collect()
+}

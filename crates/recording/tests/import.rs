@@ -1,0 +1,318 @@
+//! Logs of phones and inertial sensors become REP-145 messages: right units, signs, gravity and times, or a sentence that says why not.
+
+use std::{
+    fs,
+    io::Write as _,
+    path::{Path, PathBuf},
+};
+
+use recording::{
+    Signal,
+    import::{self, ImportError, Ingested},
+    read::{ReadOptions, Recording},
+    write::{RecordingWriter, WriterOptions},
+};
+
+struct Imported {
+    ingested: Ingested,
+    recording: Recording,
+    signals: Vec<Signal>,
+}
+
+impl Imported {
+    fn values(&self, path: &str) -> &[f64] {
+        &self
+            .signals
+            .iter()
+            .find(|signal| signal.path == path)
+            .unwrap_or_else(|| panic!("{path}"))
+            .values
+    }
+
+    fn times(&self, topic: &str) -> &[i64] {
+        let start = format!("{topic}.linear");
+        &self
+            .signals
+            .iter()
+            .find(|signal| signal.path.starts_with(&start))
+            .expect("a signal")
+            .times_ns
+    }
+}
+
+fn ingest(folder: &Path, paths: &[PathBuf], layout: Option<&str>) -> Result<Imported, ImportError> {
+    let out = folder.join("out.mcap");
+    let mut writer = RecordingWriter::create(&out, &WriterOptions::default())?;
+    let ingested = import::ingest(paths, layout, &mut writer)?;
+    writer.finish()?;
+    let recording = Recording::open(&out, &ReadOptions::default()).expect("opens");
+    let (signals, _) = recording.signals(&|_| true).expect("reads");
+    Ok(Imported {
+        ingested,
+        recording,
+        signals,
+    })
+}
+
+fn folder() -> tempfile::TempDir {
+    tempfile::tempdir().expect("a folder")
+}
+
+fn file(folder: &Path, name: &str, text: &str) -> PathBuf {
+    let path = folder.join(name);
+    fs::create_dir_all(path.parent().expect("a parent")).expect("makes a folder");
+    fs::write(&path, text).expect("writes");
+    path
+}
+
+fn zipped(folder: &Path, name: &str, files: &[(&str, String)]) -> PathBuf {
+    let path = folder.join(name);
+    let mut zip = zip::ZipWriter::new(fs::File::create(&path).expect("creates"));
+    for (name, text) in files {
+        zip.start_file(*name, zip::write::SimpleFileOptions::default())
+            .expect("starts");
+        zip.write_all(text.as_bytes()).expect("writes");
+    }
+    zip.finish().expect("finishes");
+    path
+}
+
+#[test]
+fn phyphox_in_its_five_forms() {
+    // As the app writes them: quoted names, numbers like 1.234567890E-2.
+    let form = |text: &str, separator: &str, comma: bool| {
+        let text = text.replace(';', separator);
+        if comma { text.replace('.', ",") } else { text }
+    };
+    let accelerometer = "\"Time (s)\";\"Acceleration x (m/s^2)\";\"Acceleration y (m/s^2)\";\"Acceleration z (m/s^2)\"\n\
+        1.000000000E-2;1.0E-1;-2.0E-1;9.810000000E0\n2.000000000E-2;2.0E-1;-2.5E-1;9.820000000E0\n\
+        5.010000000E0;3.0E-1;-3.0E-1;9.830000000E0\n";
+    let gyroscope = "\"Time (s)\";\"Gyroscope x (rad/s)\";\"Gyroscope y (rad/s)\";\"Gyroscope z (rad/s)\"\n\
+        0.000000000E0;0.0E0;1.0E0;2.0E0\n2.000000000E-2;2.0E-1;1.0E0;2.0E0\n4.000000000E-2;4.0E-1;1.0E0;2.0E0\n";
+    let time = "\"event\";\"experiment time\";\"system time\";\"system time text\"\n\
+        \"START\";0.000000000E0;1700000000.500;\"2023-11-14 22:13:20.500 UTC\"\n\
+        \"PAUSE\";1.000000000E0;1700000001.500;\"x\"\n\"START\";5.000000000E0;1700000100.000;\"y\"\n";
+    for (separator, comma) in [
+        (",", false),
+        ("\t", false),
+        (";", false),
+        ("\t", true),
+        (";", true),
+    ] {
+        let folder = folder();
+        let path = zipped(
+            folder.path(),
+            "run 1.zip",
+            &[
+                ("Accelerometer.csv", form(accelerometer, separator, comma)),
+                ("Gyroscope.csv", form(gyroscope, separator, comma)),
+                ("meta/time.csv", form(time, separator, comma)),
+                (
+                    "meta/device.csv",
+                    form(
+                        "\"property\";\"value\"\n\"version\";\"1.1.0\"\n",
+                        separator,
+                        comma,
+                    ),
+                ),
+            ],
+        );
+        let got = ingest(folder.path(), &[path], None).expect("ingests");
+        assert_eq!(got.ingested.topics, [("/imu/run_1".to_owned(), 3)]);
+        assert_eq!(
+            got.values("/imu/run_1.linear_acceleration.z"),
+            [9.81, 9.82, 9.83]
+        );
+        assert_eq!(
+            got.values("/imu/run_1.linear_acceleration.y"),
+            [-0.2, -0.25, -0.3]
+        );
+        // Between the gyroscope's samples, on one, and far from any.
+        assert_eq!(got.values("/imu/run_1.angular_velocity.x"), [0.1, 0.2, 0.0]);
+        assert_eq!(
+            got.values("/imu/run_1.angular_velocity_covariance[0]"),
+            [0.0, 0.0, -1.0]
+        );
+        assert_eq!(
+            got.values("/imu/run_1.orientation_covariance[0]"),
+            [-1.0; 3]
+        );
+        // Each sample counts from the START before it.
+        let times = [
+            1_700_000_000_510_000_000,
+            1_700_000_000_520_000_000,
+            1_700_000_100_010_000_000,
+        ];
+        assert!(
+            got.times("/imu/run_1")
+                .iter()
+                .zip(times)
+                .all(|(found, wanted)| (found - wanted).abs() < 1000),
+            "{separator:?}"
+        );
+        assert!(
+            got.ingested.notes[0].contains("interpolated linearly"),
+            "{:?}",
+            got.ingested.notes
+        );
+    }
+}
+
+#[test]
+fn sensor_logger_signs_and_gravity() {
+    let head = "time,seconds_elapsed,z,y,x\n";
+    let rows = |z: f64| {
+        format!("{head}1700000000000000001,0.1,{z},0.2,0.1\n1700000000010000001,0.11,{z},0.2,0.1\n")
+    };
+    let metadata = |platform: &str, standard: &str| {
+        format!("version,device name,platform,standardisation\n3,phone,{platform},{standard}\n")
+    };
+    for (platform, standard, sign) in [
+        ("android", "false", 1.0),
+        ("ios", "false", -1.0),
+        ("ios", "true", 1.0),
+    ] {
+        let folder = folder();
+        let path = folder.path().join("walk");
+        file(&path, "Accelerometer.csv", &rows(0.5));
+        file(&path, "Gravity.csv", &rows(9.0));
+        file(&path, "Gyroscope.csv", &rows(0.3));
+        file(&path, "Metadata.csv", &metadata(platform, standard));
+        let got = ingest(folder.path(), &[path], None).expect("ingests");
+        assert_eq!(
+            got.values("/imu/walk.linear_acceleration.z"),
+            [9.5 * sign; 2],
+            "{platform} {standard}"
+        );
+        assert_eq!(got.values("/imu/walk.angular_velocity.z"), [0.3; 2]);
+        // All digits of the nanoseconds are kept.
+        assert_eq!(got.times("/imu/walk")[0], 1_700_000_000_000_000_001);
+    }
+    let folder = folder();
+    let files = [
+        ("AccelerometerUncalibrated.csv", rows(-1.0)),
+        ("Metadata.csv", metadata("ios", "false")),
+    ];
+    let got = ingest(
+        folder.path(),
+        &[zipped(folder.path(), "g.zip", &files)],
+        None,
+    )
+    .expect("ingests");
+    assert!((got.values("/imu/g.linear_acceleration.z")[0] - 9.80665).abs() < 1e-12);
+}
+
+#[test]
+fn movella_dot_wraps_and_turns_free_acceleration() {
+    let folder = folder();
+    // Upside down: a half turn about x; in free fall minus gravity, at rest, and moving up with 1 m/s².
+    let text = "DeviceTag:,left\nFirmwareVersion:,2.0.0\n\nPacketCounter,SampleTimeFine,Quat_W,Quat_X,Quat_Y,Quat_Z,FreeAcc_X,FreeAcc_Y,FreeAcc_Z,Gyr_X,Gyr_Y,Gyr_Z\n\
+        1,4294950629,0,1,0,0,0,0,0,180,0,0\n2,0,0,1,0,0,0,0,1,90,0,0\n3,16667,0.7071067811865476,0,0.7071067811865476,0,0,0,0,0,0,0\n";
+    let got = ingest(
+        folder.path(),
+        &[file(folder.path(), "left.csv", text)],
+        None,
+    )
+    .expect("ingests");
+    assert_eq!(
+        got.times("/imu/left"),
+        [4_294_950_629_000, 4_294_967_296_000, 4_294_983_963_000]
+    );
+    let z = got.values("/imu/left.linear_acceleration.z");
+    assert!(
+        (z[0] + 9.80665).abs() < 1e-12 && (z[1] + 10.80665).abs() < 1e-12 && z[2].abs() < 1e-12,
+        "{z:?}"
+    );
+    // A quarter turn about y takes the sensor's x down: up is −x.
+    assert!((got.values("/imu/left.linear_acceleration.x")[2] + 9.80665).abs() < 1e-12);
+    assert!((got.values("/imu/left.angular_velocity.x")[0] - std::f64::consts::PI).abs() < 1e-15);
+    assert_eq!(got.values("/imu/left.orientation.x"), [1.0, 1.0, 0.0]);
+    assert_eq!(
+        got.ingested
+            .notes
+            .iter()
+            .map(|note| note.rsplit(": ").next().unwrap_or_default())
+            .collect::<Vec<_>>(),
+        [
+            "angular velocities were in deg/s",
+            "the specific force was computed from FreeAcc and the orientation",
+            "SampleTimeFine wrapped 1 times"
+        ]
+    );
+}
+
+#[test]
+fn several_devices_by_layout() {
+    let folder = folder();
+    let text = "Time (s),Gyroscope X (deg/s),Gyroscope Y (deg/s),Gyroscope Z (deg/s),Accelerometer X (g),Accelerometer Y (g),Accelerometer Z (g)\n\
+        0.5,90,0,0,0,0,1\n1.0,0,0,0,0,0,1\n";
+    let paths = [
+        file(folder.path(), "a/imu.csv", text),
+        file(folder.path(), "b/imu.csv", text),
+    ];
+    let got = ingest(folder.path(), &paths, Some("x-io")).expect("ingests");
+    assert_eq!(got.values("/imu/imu.linear_acceleration.z"), [9.80665; 2]);
+    assert!(
+        (got.values("/imu/imu_2.angular_velocity.x")[0] - std::f64::consts::FRAC_PI_2).abs()
+            < 1e-15
+    );
+    assert_eq!(got.recording.info().metadata["rath"]["source"], "field");
+
+    let layout = "device = \"belt\"\n[time]\ncolumn = \"t\"\nunit = \"us\"\nstart_s = 100\n\
+        [acceleration]\ncolumns = [\"ax\", \"ay\", \"az\"]\nunit = \"m/s^2\"\nsign = -1\n";
+    let layout = file(folder.path(), "layout.toml", layout);
+    let log = file(folder.path(), "log.csv", "t;ax;ay;az\n1000;1,5;2;-9,81\n");
+    let got = ingest(folder.path(), &[log], layout.to_str()).expect("ingests");
+    assert_eq!(got.times("/imu/belt"), [100_001_000_000]);
+    assert_eq!(got.values("/imu/belt.linear_acceleration.z"), [9.81]);
+}
+
+#[test]
+fn what_is_missing_or_odd_is_named() {
+    let folder = folder();
+    let error = |name: &str, text: &str, layout: Option<&str>| {
+        let path = file(folder.path(), name, text);
+        let error = ingest(folder.path(), &[path], layout)
+            .err()
+            .expect("refused")
+            .to_string();
+        assert!(
+            !folder.path().join("out.mcap").exists(),
+            "nothing is left half-written"
+        );
+        error.replace(&format!("{}/", folder.path().display()), "")
+    };
+    assert_eq!(
+        error("a.csv", "foo,bar\n1,2\n", None),
+        "a.csv: is no log of phyphox, Sensor Logger or Movella DOT / Xsens, and no layout is given; found \"foo,bar\""
+    );
+    assert_eq!(
+        error("b.csv", "Time (s),gyro\n1,2\n", Some("x-io")),
+        "b.csv: lacks the columns Accelerometer X (g), Accelerometer Y (g), Accelerometer Z (g); found Time (s), gyro"
+    );
+    assert_eq!(
+        error(
+            "c.csv",
+            "PacketCounter,SampleTimeFine,Acc_X,Acc_Y,Acc_Z\n1,0,0,x,9.8\n",
+            None
+        ),
+        "c.csv: line 2, column \"Acc_Y\": found \"x\", expected a number"
+    );
+    assert_eq!(error("d.csv", "", None), "d.csv: is empty; expected a log");
+    assert_eq!(
+        error("e.csv", "a\n1\n", Some("nothing")),
+        "nothing: is neither a file nor a built-in layout; built in are x-io, physics-toolbox"
+    );
+    assert_eq!(
+        error(
+            "f.csv",
+            "PacketCounter,SampleTimeFine,Acc_X,Acc_Y,Acc_Z\n",
+            None
+        ),
+        "f.csv: has a header but no rows; expected at least one sample"
+    );
+    assert!(
+        error("g.npz", "PK\u{3}\u{4}nonsense", None)
+            .starts_with("g.npz: is not a NumPy archive (.npz): ")
+    );
+}

@@ -1,0 +1,229 @@
+//! What the writer promises: the same bytes for the same content, the whole file or none, a killed program's chunks readable.
+
+use std::{
+    collections::BTreeMap,
+    fs,
+    io::{self, Write},
+    path::Path,
+    process::{Command, Stdio},
+    sync::{Arc, Mutex},
+    time::Duration,
+};
+
+use recording::{
+    cdr,
+    read::{ReadOptions, Recording},
+    schema::rath,
+    topics::{self, MessageKind},
+    write::{RecordingWriter, WriteError, WriterOptions},
+};
+
+fn fill(writer: &mut RecordingWriter, messages: i64) -> Result<(), WriteError> {
+    writer.metadata(
+        "rath",
+        &BTreeMap::from([("scene".to_owned(), "test".to_owned())]),
+    )?;
+    writer.attachment("scene.toml", "application/toml", b"x = 1")?;
+    let state = writer.channel(topics::STATE, MessageKind::RathState)?;
+    let imu = writer.channel(topics::IMU_RATH, MessageKind::Imu)?;
+    for i in 0..messages {
+        let t_ns = i * 33_000_000;
+        let x = i as f64;
+        let message = rath::State {
+            time_s: x,
+            position_m: Some(rath::Vector3 { x, y: -x, z: 0.0 }),
+            ..rath::State::default()
+        };
+        writer.message(state, t_ns, &message)?;
+        writer.message(
+            imu,
+            t_ns,
+            &cdr::Imu::raw(t_ns, "rath", [x, 0.0, 0.0], [0.0, 0.0, 9.81]),
+        )?;
+    }
+    Ok(())
+}
+
+/// A stream whose bytes can be looked at afterwards.
+#[derive(Clone, Default)]
+struct Shared(Arc<Mutex<Vec<u8>>>);
+
+impl Write for Shared {
+    fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
+        self.0.lock().expect("unpoisoned").extend_from_slice(bytes);
+        Ok(bytes.len())
+    }
+
+    fn flush(&mut self) -> io::Result<()> {
+        Ok(())
+    }
+}
+
+#[test]
+fn the_same_content_gives_the_same_bytes_to_a_file_and_to_a_stream() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let path = folder.path().join("a.mcap");
+    let mut writer = RecordingWriter::create(&path, &WriterOptions::default()).expect("begins");
+    fill(&mut writer, 5000).expect("writes");
+    assert!(!path.exists(), "the name appears only at the end");
+    writer.finish().expect("finishes");
+    let shared = Shared::default();
+    let mut writer =
+        RecordingWriter::to_stream(shared.clone(), &WriterOptions::default()).expect("begins");
+    fill(&mut writer, 5000).expect("writes");
+    writer.finish().expect("finishes");
+    let bytes = fs::read(&path).expect("reads");
+    assert!(bytes == *shared.0.lock().expect("unpoisoned"));
+    assert_eq!(fs::read_dir(folder.path()).expect("lists").count(), 1);
+
+    let recording = Recording::open(&path, &ReadOptions::default()).expect("opens");
+    let (signals, findings) = recording.signals(&|_| true).expect("reads");
+    assert_eq!(
+        findings.iter().map(ToString::to_string).collect::<Vec<_>>(),
+        ["/imu/rath: orientation is declared as not given (covariance -1)"]
+    );
+    let info = recording.info();
+    assert_eq!(
+        (
+            info.profile.as_str(),
+            info.library.starts_with("rath "),
+            info.messages
+        ),
+        ("", true, 10_000)
+    );
+    assert_eq!(
+        recording.attachment("scene.toml").as_deref(),
+        Some(b"x = 1".as_slice())
+    );
+    let y = signals
+        .iter()
+        .find(|signal| signal.path == "/rath/state.position_m.y")
+        .expect("a signal");
+    assert!(y.values.iter().enumerate().all(|(i, y)| *y == -(i as f64)));
+    assert_eq!(y.unit, "m");
+    // The official library reads it too.
+    let read = mcap::MessageStream::new(&bytes)
+        .expect("opens")
+        .map(|message| message.expect("a message"))
+        .count();
+    assert_eq!(read, 10_000);
+}
+
+#[test]
+fn nothing_is_left_when_it_fails_or_is_given_up() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let path = folder.path().join("a.mcap");
+    fs::write(&path, "old").expect("writes");
+    let mut writer = RecordingWriter::create(&path, &WriterOptions::default()).expect("begins");
+    fill(&mut writer, 100).expect("writes");
+    drop(writer);
+    assert_eq!(fs::read_dir(folder.path()).expect("lists").count(), 1);
+    assert_eq!(
+        fs::read(&path).expect("reads"),
+        b"old",
+        "what was there stays"
+    );
+
+    let error = RecordingWriter::create(
+        Path::new("no/such/folder/a.mcap"),
+        &WriterOptions::default(),
+    )
+    .err()
+    .expect("refused");
+    let text = error.to_string();
+    assert!(
+        text.starts_with("no/such/folder/a.mcap: cannot be written: No such file or directory"),
+        "{text}"
+    );
+    let error = RecordingWriter::create(folder.path(), &WriterOptions::default())
+        .err()
+        .expect("refused")
+        .to_string();
+    assert!(error.contains("it is a folder"), "{error}");
+}
+
+#[cfg(target_os = "linux")]
+#[test]
+fn a_full_disk_is_said() {
+    let result = RecordingWriter::create(Path::new("/dev/full"), &WriterOptions::default())
+        .and_then(|mut writer| {
+            fill(&mut writer, 5000)?;
+            writer.finish()
+        });
+    let error = result.expect_err("there is no room").to_string();
+    assert!(
+        error.starts_with("/dev/full: cannot be written: No space left on device"),
+        "{error}"
+    );
+}
+
+#[test]
+fn a_time_before_zero_is_refused() {
+    let mut writer =
+        RecordingWriter::to_stream(io::sink(), &WriterOptions::default()).expect("begins");
+    let beat = writer
+        .channel(topics::BEAT, MessageKind::Beat)
+        .expect("opens");
+    let error = writer
+        .message(beat, -1, &rath::Beat::default())
+        .expect_err("refused")
+        .to_string();
+    assert_eq!(
+        error,
+        "standard output: a message on /beat has the time -1 ns; times must not be negative"
+    );
+}
+
+/// The child of the next test: writes without end.
+#[test]
+fn child_that_is_killed() {
+    let Ok(path) = std::env::var("RATH_TEST_KILLED") else {
+        return;
+    };
+    let mut writer =
+        RecordingWriter::create(Path::new(&path), &WriterOptions::default()).expect("begins");
+    fill(&mut writer, i64::from(u32::MAX)).expect("writes");
+}
+
+#[test]
+fn a_killed_writer_leaves_whole_messages_under_another_name() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let rounds = if cfg!(debug_assertions) { 10 } else { 100 };
+    let mut salvaged = 0;
+    for round in 0..rounds {
+        let path = folder.path().join("a.mcap");
+        let mut child = Command::new(std::env::current_exe().expect("this test"))
+            .args(["child_that_is_killed", "--exact"])
+            .env("RATH_TEST_KILLED", &path)
+            .stdout(Stdio::null())
+            .stderr(Stdio::null())
+            .spawn()
+            .expect("starts");
+        std::thread::sleep(Duration::from_millis(3 + 7 * round % 97));
+        child.kill().expect("kills");
+        child.wait().expect("ends");
+        assert!(!path.exists(), "nothing under the final name");
+        for entry in fs::read_dir(folder.path()).expect("lists") {
+            let part = entry.expect("an entry").path();
+            let length = fs::metadata(&part).expect("is there").len();
+            if length > 0 {
+                let recording = Recording::open(&part, &ReadOptions::default()).expect("opens");
+                let (signals, _) = recording
+                    .signals(&|path| path.ends_with("position_m.y"))
+                    .expect("reads");
+                for signal in &signals {
+                    assert!(
+                        signal
+                            .values
+                            .iter()
+                            .enumerate()
+                            .all(|(i, y)| *y == -(i as f64))
+                    );
+                    salvaged += signal.values.len();
+                }
+            }
+            fs::remove_file(part).expect("removes");
+        }
+    }
+    assert!(salvaged > 0, "some message was salvaged in {rounds} rounds");
+}
