@@ -1,5 +1,9 @@
 //! The body's coordinates: how a state places the handles, and what forces do to it.
 
+mod reduced;
+
+pub use reduced::{Pinned, Reduced, choose};
+
 use crate::body::Body;
 use crate::lanes::{f64x2, pack, sum};
 use crate::model::Workspace;
@@ -44,7 +48,7 @@ pub trait Freedoms: Send + Sync {
     /// How many states it needs.
     fn size(&self) -> usize;
     /// Their names, with units.
-    fn names(&self) -> &'static [&'static str];
+    fn names(&self) -> &[&'static str];
     /// How many of them, from the front, are positions rather than velocities.
     fn positions(&self) -> usize;
     /// Puts the body where a scene starts.
@@ -55,6 +59,8 @@ pub trait Freedoms: Send + Sync {
     fn accelerate(&self, y: &[f64], w: &mut Workspace, dy: &mut [f64]);
     /// The pose at a state.
     fn pose(&self, y: &[f64]) -> Pose;
+    /// From a state and its rates: acceleration of the centre of mass in the world [m/s²], angular acceleration in the body [rad/s²].
+    fn acceleration(&self, y: &[f64], dy: &[f64]) -> [[f64; 3]; 2];
     /// Puts a state back on its manifold after a step.
     fn project(&self, y: &mut [f64]);
     /// Moves the positions by `h_s` with the velocities in `y` held (the drift of a splitting method).
@@ -62,7 +68,7 @@ pub trait Freedoms: Send + Sync {
     /// Kinetic energy and potential energy in the field of gravity, J.
     fn energy_j(&self, y: &[f64]) -> [f64; 2];
     /// What counts as one unit of each state in an error norm.
-    fn scales(&self) -> &'static [f64];
+    fn scales(&self) -> &[f64];
 }
 
 /// All six freedoms: r (world), q = (x, y, z, w) body → world, v (world), ω (body); 13 states.
@@ -121,7 +127,7 @@ impl Freedoms for Six {
         13
     }
 
-    fn names(&self) -> &'static [&'static str] {
+    fn names(&self) -> &[&'static str] {
         &[
             "x_m", "y_m", "z_m", "qx", "qy", "qz", "qw", "vx_m_per_s", "vy_m_per_s", "vz_m_per_s", "wx_rad_per_s",
             "wy_rad_per_s", "wz_rad_per_s",
@@ -132,7 +138,7 @@ impl Freedoms for Six {
         7
     }
 
-    fn scales(&self) -> &'static [f64] {
+    fn scales(&self) -> &[f64] {
         &[0.1, 0.1, 0.1, 0.1, 0.1, 0.1, 0.1, 1.0, 1.0, 1.0, 1.0, 1.0, 1.0]
     }
 
@@ -220,6 +226,10 @@ impl Freedoms for Six {
             velocity_m_per_s: [y[7], y[8], y[9]],
             spin_rad_per_s: [y[10], y[11], y[12]],
         }
+    }
+
+    fn acceleration(&self, _y: &[f64], dy: &[f64]) -> [[f64; 3]; 2] {
+        [[dy[7], dy[8], dy[9]], [dy[10], dy[11], dy[12]]]
     }
 
     #[inline]

@@ -11,4 +11,5 @@ pub mod random;
 pub mod record;
 pub mod run;
 pub mod scene;
+pub mod sensors;
 pub mod solve;

@@ -12,10 +12,13 @@
 
 use crate::body::Body;
 use crate::effects;
-use crate::freedoms::{Freedoms, Six};
+pub use crate::effects::music::Beat;
+use crate::effects::flexure::Bending;
+use crate::freedoms::{Freedoms, Six, choose};
 use crate::lanes::{self, LANES, f64x2, pack, pairs};
 use crate::random::{Stream, normal};
 use crate::scene::Scene;
+use crate::sensors::{Clock, Imu};
 
 /// A part of the right-hand side.
 pub trait Term: Send + Sync {
@@ -30,6 +33,8 @@ pub enum Stage {
     Phases,
     /// Moves the shoulders.
     Shoulders,
+    /// Moves the party as a whole, shoulders and all.
+    Party,
     /// Sets forces at the handles.
     Handles,
     /// Adds torque on the body.
@@ -60,25 +65,6 @@ pub trait Account: Send + Sync {
     /// Energy stored in the effect's springs, J.
     fn stored_j(&self, _w: &Workspace) -> f64 {
         0.0
-    }
-}
-
-/// The beat of the music.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Beat {
-    /// When it begins, s.
-    pub onset_s: f64,
-    /// ψ̇, rad/s.
-    pub rate_rad_per_s: f64,
-    /// ψ at t = 0, rad.
-    pub phase_rad: f64,
-}
-
-impl Beat {
-    /// ψ(t), rad.
-    #[inline(always)]
-    pub fn phase_at(&self, t_s: f64) -> f64 {
-        self.phase_rad + self.rate_rad_per_s * t_s
     }
 }
 
@@ -132,6 +118,10 @@ pub struct Workspace {
     pub spin: [f64; 3],
     /// Torque on the body beside that of the handle forces, body axes, N·m.
     pub body_torque: [f64; 3],
+    /// States of the effects' own.
+    pub extra: Vec<f64>,
+    /// Their rates.
+    pub extra_rate: Vec<f64>,
 }
 
 impl Workspace {
@@ -155,6 +145,8 @@ pub struct Layout {
     pub body: usize,
     /// Then the phases.
     pub phases: usize,
+    /// Then the effects' own states.
+    pub extra: usize,
     /// Then work and dissipation of each account.
     pub ledger: usize,
 }
@@ -162,7 +154,7 @@ pub struct Layout {
 impl Layout {
     /// Length of the state vector.
     pub fn size(&self) -> usize {
-        self.body + self.phases + self.ledger
+        self.body + self.phases + self.extra + self.ledger
     }
 
     /// Where the phases are.
@@ -170,9 +162,15 @@ impl Layout {
         self.body..self.body + self.phases
     }
 
+    /// Where the effects' own states are.
+    pub fn extra_range(&self) -> std::ops::Range<usize> {
+        let first = self.body + self.phases;
+        first..first + self.extra
+    }
+
     /// Where the ledger is.
     pub fn ledger_range(&self) -> std::ops::Range<usize> {
-        self.body + self.phases..self.size()
+        self.extra_range().end..self.size()
     }
 }
 
@@ -187,12 +185,21 @@ pub struct Model {
     natural_rad_per_s: Vec<f64>,
     initial_phases: Vec<f64>,
     has_phases: bool,
-    terms: [Vec<Box<dyn Term>>; 4],
+    terms: [Vec<Box<dyn Term>>; 5],
+    /// Whose each term is, in the same order.
+    owners: [Vec<&'static str>; 5],
+    building: &'static str,
+    /// Names and first values of the effects' own states.
+    extra: Vec<(String, f64)>,
+    flexure: Option<Bending>,
     switches: Vec<Box<dyn Switch>>,
     accounts: Vec<(&'static str, Box<dyn Account>)>,
     beat: Option<Beat>,
     contact_stiffness: Vec<f64>,
+    contact_exponent: f64,
     watches_contact: bool,
+    sensor_clocks: Vec<Clock>,
+    imus: Vec<Imu>,
 }
 
 impl Model {
@@ -201,12 +208,15 @@ impl Model {
     /// # Panics
     /// When the scene does not pass [`crate::scene::check`].
     pub fn new(scene: &Scene) -> Self {
-        let body = Body::new(&scene.body).expect("a checked scene has a possible inertia");
+        let mut body = Body::new(&scene.body).expect("a checked scene has a possible inertia");
+        if let Some(path) = &scene.effects.path {
+            body.gravity_m_per_s2 = path.lean(scene.body.gravity_m_per_s2).into();
+        }
         let n = scene.carriers.count();
         let freedoms = Box::new(Six::new(&body, &scene.carriers.handles_m));
         let mut model = Self {
             scene: scene.clone(),
-            layout: Layout { body: freedoms.size(), phases: 0, ledger: 0 },
+            layout: Layout { body: freedoms.size(), phases: 0, extra: 0, ledger: 0 },
             freedoms,
             body,
             natural_rad_per_s: (0..n).map(|i| std::f64::consts::TAU * scene.carriers.frequency_hz.get(i)).collect(),
@@ -221,19 +231,33 @@ impl Model {
                 .collect(),
             has_phases: false,
             terms: Default::default(),
+            owners: Default::default(),
+            building: "",
             switches: Vec::new(),
             accounts: Vec::new(),
             beat: None,
             contact_stiffness: Vec::new(),
+            contact_exponent: 1.0,
+            extra: Vec::new(),
+            flexure: None,
             watches_contact: false,
+            sensor_clocks: Vec::new(),
+            imus: Vec::new(),
         };
         for effect in effects::TABLE {
+            model.building = effect.name;
             (effect.build)(scene, &mut model);
         }
         if !scene.solver.energy {
             model.accounts.clear();
         }
+        if scene.freedom.len() < 6 {
+            let height_m = scene.start.height_m.unwrap_or_else(|| model.resting_height_m());
+            model.freedoms = choose(&model.body, &scene.carriers.handles_m, &scene.freedom, &scene.start, height_m);
+            model.layout.body = model.freedoms.size();
+        }
         model.layout.phases = if model.has_phases { n } else { 0 };
+        model.layout.extra = model.extra.len();
         model.layout.ledger = 2 * model.accounts.len();
         model
     }
@@ -242,7 +266,19 @@ impl Model {
 
     /// Adds a term to a stage.
     pub(crate) fn add(&mut self, stage: Stage, term: impl Term + 'static) {
+        self.owners[stage as usize].push(self.building);
         self.terms[stage as usize].push(Box::new(term));
+    }
+
+    /// Adds states of an effect's own, by name and first value; returns the place of the first in [`Workspace::extra`].
+    pub(crate) fn add_states(&mut self, states: impl IntoIterator<Item = (String, f64)>) -> usize {
+        let first = self.extra.len();
+        self.extra.extend(states);
+        first
+    }
+
+    pub(crate) fn set_flexure(&mut self, poles: Bending) {
+        self.flexure = Some(poles);
     }
 
     /// Adds moments at which the right-hand side may jump.
@@ -271,12 +307,36 @@ impl Model {
         self.beat = Some(beat);
     }
 
-    pub(crate) fn set_contact_springs(&mut self, bilateral: bool, stiffness: impl Iterator<Item = f64>) {
+    pub(crate) fn set_contact_springs(&mut self, bilateral: bool, stiffness: impl Iterator<Item = f64>, exponent: f64) {
+        self.contact_exponent = exponent;
         self.contact_stiffness = stiffness.collect();
         self.watches_contact = !bilateral;
     }
 
+    /// The clock that ticks at `rate_hz`; sensors of one rate share it.
+    pub(crate) fn sensor_clock(&mut self, rate_hz: f64) -> usize {
+        let clock = Clock { rate_hz };
+        self.sensor_clocks.iter().position(|c| *c == clock).unwrap_or_else(|| {
+            self.sensor_clocks.push(clock);
+            self.sensor_clocks.len() - 1
+        })
+    }
+
+    pub(crate) fn add_imu(&mut self, imu: Imu) {
+        self.imus.push(imu);
+    }
+
     // What everybody else asks.
+
+    /// The clocks on which sensors sample, beside the log's.
+    pub fn sensor_clocks(&self) -> &[Clock] {
+        &self.sensor_clocks
+    }
+
+    /// Every inertial sensor.
+    pub fn imus(&self) -> &[Imu] {
+        &self.imus
+    }
 
     /// How many carriers there are.
     pub fn carriers(&self) -> usize {
@@ -299,8 +359,8 @@ impl Model {
     }
 
     /// The music's beat.
-    pub fn beat(&self) -> Option<Beat> {
-        self.beat
+    pub fn beat(&self) -> Option<&Beat> {
+        self.beat.as_ref()
     }
 
     /// Whether contacts can open and close.
@@ -317,6 +377,7 @@ impl Model {
     pub fn state_names(&self) -> Vec<String> {
         let mut names: Vec<String> = self.freedoms.names().iter().map(|n| (*n).to_string()).collect();
         names.extend((1..=self.layout.phases).map(|i| format!("phase_{i}_rad")));
+        names.extend(self.extra.iter().map(|(name, _)| name.clone()));
         for (name, _) in &self.accounts {
             names.push(format!("{name}_work_j"));
             names.push(format!("{name}_dissipated_j"));
@@ -363,6 +424,8 @@ impl Model {
             rotation: [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]],
             spin: [0.0; 3],
             body_torque: [0.0; 3],
+            extra: self.extra.iter().map(|(_, first)| *first).collect(),
+            extra_rate: vec![0.0; self.extra.len()],
         }
     }
 
@@ -373,6 +436,9 @@ impl Model {
         let mut y = vec![0.0; self.layout.size()];
         self.freedoms.place(start, height, &mut y);
         y[self.layout.phase_range()].copy_from_slice(&self.initial_phases[..self.layout.phases]);
+        for (y, (_, first)) in y[self.layout.extra_range()].iter_mut().zip(&self.extra) {
+            *y = *first;
+        }
         y
     }
 
@@ -382,7 +448,24 @@ impl Model {
         let n = self.carriers();
         let stiffness: f64 = self.contact_stiffness.iter().sum();
         let above = |i: usize| carriers.shoulder_height_m.get(i) - carriers.handles_m[i][2];
-        if stiffness > 0.0 {
+        if stiffness > 0.0 && self.contact_exponent != 1.0 {
+            // Σ k δ^p falls as the body rises: halve the interval where it meets the weight.
+            let weight = -self.body.mass_kg * self.body.gravity_m_per_s2.z;
+            let push = |z: f64| {
+                let of = |i: usize| self.contact_stiffness[i] * (above(i) - z).max(0.0).powf(self.contact_exponent);
+                (0..n).map(of).sum::<f64>()
+            };
+            let mut high = (0..n).map(above).fold(f64::NEG_INFINITY, f64::max);
+            let mut low = high - 1.0;
+            while push(low) < weight {
+                low -= high - low;
+            }
+            for _ in 0..200 {
+                let middle = 0.5 * (low + high);
+                if push(middle) < weight { high = middle } else { low = middle }
+            }
+            0.5 * (low + high)
+        } else if stiffness > 0.0 {
             let level: f64 = (0..n).map(|i| self.contact_stiffness[i] * above(i)).sum::<f64>() / stiffness;
             level + self.body.mass_kg * self.body.gravity_m_per_s2.z / stiffness
         } else {
@@ -413,6 +496,7 @@ impl Model {
         self.freedoms.accelerate(y, w, dy);
         let phases = self.layout.phase_range();
         lanes::store(w.pair.iter().map(|p| p.rate), &mut dy[phases]);
+        dy[self.layout.extra_range()].copy_from_slice(&w.extra_rate);
         for ((_, account), out) in self.accounts.iter().zip(dy[self.layout.ledger_range()].chunks_exact_mut(2)) {
             let power = account.power(w);
             out.copy_from_slice(&[power.work_w, power.dissipated_w]);
@@ -422,10 +506,17 @@ impl Model {
     /// Everything up to the forces; what the accelerations need.
     #[inline]
     pub fn forces(&self, t_s: f64, y: &[f64], w: &mut Workspace) {
+        w.extra.copy_from_slice(&y[self.layout.extra_range()]);
         if self.has_phases {
             self.phases(t_s, y, w);
         }
+        if !self.terms[Stage::Party as usize].is_empty() {
+            self.party(t_s, w);
+        }
         self.freedoms.gaps(y, w);
+        if let Some(poles) = &self.flexure {
+            poles.bend(w);
+        }
         for term in &self.terms[Stage::Handles as usize] {
             term.apply(t_s, w);
         }
@@ -453,6 +544,27 @@ impl Model {
         }
     }
 
+    #[cold]
+    fn party(&self, t_s: f64, w: &mut Workspace) {
+        if !self.has_phases {
+            for pair in &mut w.pair {
+                (pair.base, pair.base_rate) = (pair.rest, [f64x2::ZERO; 3]);
+            }
+        }
+        for term in &self.terms[Stage::Party as usize] {
+            term.apply(t_s, w);
+        }
+    }
+
+    /// Applies the terms of one effect alone to an evaluated workspace, stage by stage.
+    pub fn apply_only(&self, effect: &str, t_s: f64, w: &mut Workspace) {
+        for (terms, owners) in self.terms.iter().zip(&self.owners) {
+            for (term, _) in terms.iter().zip(owners).filter(|(_, owner)| **owner == effect) {
+                term.apply(t_s, w);
+            }
+        }
+    }
+
     /// Energy in the springs at the evaluated state, J.
     pub fn stored_j(&self, w: &Workspace) -> f64 {
         self.accounts.iter().map(|(_, a)| a.stored_j(w)).sum()
@@ -463,7 +575,9 @@ impl Model {
     /// Books what the contact spring of a handle loses when it opens, or is given when it closes, at `gap_m` ≠ 0.
     pub(crate) fn book_contact(&self, handle: usize, opened: bool, gap_m: f64, y: &mut [f64]) {
         if let Some(page) = self.accounts.iter().position(|(name, _)| *name == "contact") {
-            let spring_j = 0.5 * self.contact_stiffness[handle] * gap_m * gap_m;
+            // ∫ k δ^p dδ; for δ < 0 a linear spring that is frozen in contact holds ½kδ² too.
+            let p = self.contact_exponent;
+            let spring_j = self.contact_stiffness[handle] * gap_m.abs().powf(p + 1.0) / (p + 1.0);
             y[self.layout.ledger_range().start + 2 * page + 1] += if opened { spring_j } else { -spring_j };
         }
     }

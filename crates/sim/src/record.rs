@@ -1,10 +1,12 @@
 //! Samples → a recording: every topic of the contract, from one sample at a time.
 
+use crate::effects::music::Stroke;
 use crate::model::Model;
 use crate::run::{Listener, Sample};
 use crate::scene::{Scene, to_toml};
+use crate::sensors::Reading;
 use recording::cdr::{
-    Header, Quaternion, StringMessage, TfMessage, Time, Transform, TransformStamped, Vector3,
+    Header, Imu, Quaternion, StringMessage, TfMessage, Time, Transform, TransformStamped, Vector3,
 };
 use recording::schema::{foxglove, rath};
 use recording::topics::{self, MessageKind};
@@ -26,9 +28,11 @@ pub struct Recorder<'m> {
     tf: ChannelId,
     scene: ChannelId,
     beat: Option<ChannelId>,
-    next_beat: u64,
+    /// One for each virtual sensor, by topic.
+    imus: BTreeMap<String, ChannelId>,
+    strokes: Vec<Stroke>,
+    next_beat: usize,
     frames: Vec<String>,
-    natural: Vec<f64>,
     weight_n: f64,
     failed: Option<WriteError>,
 }
@@ -69,6 +73,11 @@ impl<'m> Recorder<'m> {
             topics::BEAT,
             MessageKind::Beat,
         )?;
+        let imus = model
+            .imus()
+            .iter()
+            .map(|imu| Ok((imu.topic.clone(), writer.channel(&imu.topic, MessageKind::Imu)?)))
+            .collect::<Result<_, WriteError>>()?;
         let description =
             writer.channel(topics::ROBOT_DESCRIPTION, MessageKind::RobotDescription)?;
         writer.message(description, epoch_ns, &StringMessage { data: urdf(scene) })?;
@@ -83,11 +92,12 @@ impl<'m> Recorder<'m> {
             tf,
             scene: arrows,
             beat,
+            imus,
+            strokes: model.beat().map_or_else(Vec::new, |b| b.strokes(scene.duration_s)),
             next_beat: 0,
             frames: (1..=model.carriers())
                 .map(|i| format!("carrier_{i}"))
                 .collect(),
-            natural: model.natural_rad_per_s().to_vec(),
             weight_n: model.body.mass_kg * model.body.gravity_m_per_s2.norm(),
             failed: None,
         })
@@ -132,7 +142,7 @@ impl<'m> Recorder<'m> {
             let message = rath::Phases {
                 time_s: s.t_s,
                 phase_rad: s.phase_rad.clone(),
-                natural_frequency_rad_per_s: self.natural.clone(),
+                natural_frequency_rad_per_s: self.model.natural_rad_per_s().to_vec(),
                 beat_phase_rad: s.beat_phase_rad,
                 beat_present: s.beat_phase_rad.is_some(),
                 order_parameter: s.order_parameter().unwrap_or(0.0),
@@ -172,30 +182,31 @@ impl<'m> Recorder<'m> {
 
     /// Every beat up to and including `until_s`, at its own time.
     fn write_beats(&mut self, until_s: f64) -> Result<(), WriteError> {
-        let (Some(channel), Some(beat)) = (self.beat, self.model.beat()) else {
+        let Some(channel) = self.beat else {
             return Ok(());
         };
-        if beat.rate_rad_per_s <= 0.0 {
-            return Ok(());
-        }
-        // Beats are where ψ passes a whole number of turns, once the music has begun.
-        let first = (beat.phase_at(beat.onset_s) / std::f64::consts::TAU - 1e-9).ceil();
-        loop {
-            let turn = first + self.next_beat as f64;
-            let time_s = (turn * std::f64::consts::TAU - beat.phase_rad) / beat.rate_rad_per_s;
-            if time_s > until_s {
-                return Ok(());
-            }
-            let tempo_hz = beat.rate_rad_per_s / std::f64::consts::TAU;
+        while let Some(stroke) = self.strokes.get(self.next_beat).filter(|s| s.t_s <= until_s) {
             let message = rath::Beat {
-                number: self.next_beat,
-                time_s,
-                tempo_hz,
+                number: self.next_beat as u64,
+                time_s: stroke.t_s,
+                tempo_hz: stroke.tempo_hz,
             };
-            self.writer
-                .message(channel, self.stamp_ns(time_s.max(0.0)), &message)?;
+            self.writer.message(channel, self.epoch_ns + (stroke.t_s * 1e9).round() as i64, &message)?;
             self.next_beat += 1;
         }
+        Ok(())
+    }
+
+    /// A sensor's sample, stamped by the sensor's own clock.
+    fn write_reading(&mut self, r: &Reading<'_>) -> Result<(), WriteError> {
+        let t_ns = self.stamp_ns(r.stamp_s);
+        let mut message =
+            Imu::raw(t_ns, r.frame, r.angular_velocity_rad_per_s, r.specific_force_m_per_s2);
+        for axis in [0, 4, 8] {
+            message.angular_velocity_covariance[axis] = r.angular_velocity_variance;
+            message.linear_acceleration_covariance[axis] = r.specific_force_variance;
+        }
+        self.writer.message(self.imus[r.topic], t_ns, &message)
     }
 
     fn transforms(&self, s: &Sample, t_ns: i64) -> TfMessage {
@@ -284,11 +295,22 @@ impl<'m> Recorder<'m> {
 
 impl Listener for Recorder<'_> {
     fn sample(&mut self, sample: &Sample) -> bool {
+        if self.failed.is_some() {
+            return false;
+        }
         if let Err(error) = self.write(sample) {
             self.failed = Some(error);
             return false;
         }
         true
+    }
+
+    fn reading(&mut self, reading: &Reading<'_>) {
+        if self.failed.is_none()
+            && let Err(error) = self.write_reading(reading)
+        {
+            self.failed = Some(error);
+        }
     }
 }
 

@@ -4,6 +4,7 @@ use crate::energy::Energy;
 use crate::freedoms::Pose;
 use crate::model::{Model, Workspace};
 use crate::scene::Scene;
+use crate::sensors::{Reading, Sensors};
 use crate::solve::{Event, Observer, Settings, Stats, Stopped, method};
 
 /// Everything that is logged at one moment. Carriers and handles in the order of the scene.
@@ -48,6 +49,8 @@ impl Sample {
 pub trait Listener {
     /// Called at every log time. Returning `false` stops the run.
     fn sample(&mut self, sample: &Sample) -> bool;
+    /// Called with every sample of every virtual sensor.
+    fn reading(&mut self, _reading: &Reading<'_>) {}
     /// Called when a contact changes.
     fn event(&mut self, _event: &Event) {}
 }
@@ -88,7 +91,7 @@ pub fn run_model(
     settings: &Settings,
     listener: &mut dyn Listener,
 ) -> (Stats, Result<(), Stopped>) {
-    let mut bridge = Bridge { model, listener, sample: blank(model), at_start_j: None };
+    let mut bridge = Bridge { model, listener, sample: blank(model), at_start_j: None, sensors: Sensors::new(model) };
     (method.run)(model, settings, &mut bridge)
 }
 
@@ -97,6 +100,7 @@ struct Bridge<'a> {
     listener: &'a mut dyn Listener,
     sample: Sample,
     at_start_j: Option<f64>,
+    sensors: Sensors<'a>,
 }
 
 fn blank(model: &Model) -> Sample {
@@ -129,7 +133,7 @@ impl Observer for Bridge<'_> {
         s.pose = model.freedoms().pose(y);
         s.roll_pitch_yaw_rad = s.pose.roll_pitch_yaw_rad();
         s.phase_rad.copy_from_slice(&y[model.layout().phase_range()]);
-        s.beat_phase_rad = model.beat().filter(|b| t_s >= b.onset_s).map(|b| b.phase_at(t_s));
+        s.beat_phase_rad = model.beat().filter(|b| b.sounds(t_s)).map(|b| b.phase_at(t_s));
         let walked = walk.map(|v| v * t_s);
         for i in 0..model.carriers() {
             s.normal_n[i] = w.of(i, |p| p.normal);
@@ -146,6 +150,11 @@ impl Observer for Bridge<'_> {
             s.pose.velocity_m_per_s[a] += walk[a];
         }
         self.listener.sample(s)
+    }
+
+    fn tick(&mut self, clock: usize, tick: u64, t_s: f64, y: &[f64], w: &mut Workspace) {
+        let listener = &mut self.listener;
+        self.sensors.read(clock, tick, t_s, y, w, |reading| listener.reading(reading));
     }
 
     fn event(&mut self, event: &Event) {

@@ -8,15 +8,20 @@
 //! both ways. With c > 0 it opens before δ = 0, and a fast approach pushes before the surfaces meet: the law's known
 //! price. Energy: the spring stores ½kδ² while in contact; what is left in it at lift-off is lost in the damper, what
 //! it is given at a touch-down with δ ≠ 0 is taken back from it (both are booked, see [`crate::energy`]).
+//!
+//! Alternative law, `hunt-crossley`: N* = k δ^p (1 + d δ̇), d = c/k, p exponent [1]; k then in N/m^p. Its damping vanishes with δ, so
+//! the force starts from zero at touch-down and never jumps; it is unilateral. For δ < 0 N* = −k|δ|^p max(1 + d δ̇, 0.01) only marks
+//! the sign. With p = 1 it is smooth through the zero. Source: Hunt & Crossley, J. Appl. Mech. 42 (1975), 440–445.
 //! Source: paper, eq. (unilateral); Brogliato, Nonsmooth Mechanics (1999), ch. 2.
 
 use crate::lanes::{f64x2, pack};
 use crate::model::{Account, Model, Pair, Power, Stage, Term, Workspace};
 use crate::scene::{Checker, PerCarrier, Problem, Scene, problem};
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 /// `[effects.contact]`
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(default, deny_unknown_fields)]
 pub struct Contact {
     /// k, N/m. Measured in the paper's logs: about 3000.
@@ -25,11 +30,26 @@ pub struct Contact {
     pub damping_n_s_per_m: PerCarrier,
     /// Whether handles are tied to the shoulders: the force may pull.
     pub bilateral: bool,
+    /// Which law.
+    pub law: Law,
+    /// p of `hunt-crossley`, 1.
+    pub exponent: f64,
+}
+
+/// How the force depends on compression.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "kebab-case")]
+pub enum Law {
+    /// N* = k δ + c δ̇
+    #[default]
+    SpringDamper,
+    /// N* = k δ^p (1 + (c/k) δ̇)
+    HuntCrossley,
 }
 
 impl Default for Contact {
     fn default() -> Self {
-        Self { stiffness_n_per_m: 3000.0.into(), damping_n_s_per_m: 450.0.into(), bilateral: false }
+        Self { stiffness_n_per_m: 3000.0.into(), damping_n_s_per_m: 450.0.into(), bilateral: false, law: Law::SpringDamper, exponent: 1.0 }
     }
 }
 
@@ -41,6 +61,16 @@ impl Contact {
         Checker::per_carrier(c, &self.damping_n_s_per_m, n)?;
         self.stiffness_n_per_m.values().iter().try_for_each(|&x| Checker::not_negative(k, x))?;
         self.damping_n_s_per_m.values().iter().try_for_each(|&x| Checker::not_negative(c, x))?;
+        Checker::positive("effects.contact.exponent", self.exponent)?;
+        if self.law == Law::HuntCrossley {
+            if self.bilateral {
+                return Err(problem("effects.contact.law", "hunt-crossley cannot pull; leave `bilateral` out"));
+            }
+            if !(1.0..=3.0).contains(&self.exponent) {
+                return Err(problem("effects.contact.exponent", format!("found {}, expected 1 to 3", self.exponent)));
+            }
+            return self.stiffness_n_per_m.values().iter().try_for_each(|&x| Checker::positive(k, x));
+        }
         let pushes = (0..n).all(|i| self.stiffness_n_per_m.get(i) > 0.0 || self.damping_n_s_per_m.get(i) > 0.0);
         if pushes { Ok(()) } else { Err(problem(k, "stiffness and damping are both zero; leave the effect out instead")) }
     }
@@ -48,11 +78,79 @@ impl Contact {
     pub(super) fn build(&self, scene: &Scene, model: &mut Model) {
         let n = scene.carriers.count();
         let stiffness = pack((0..n).map(|i| self.stiffness_n_per_m.get(i)));
-        let damping = pack((0..n).map(|i| self.damping_n_s_per_m.get(i)));
-        let law = SpringDampers(stiffness.into_iter().zip(damping).collect());
-        model.add(Stage::Handles, law.clone());
-        model.add_account("contact", law);
-        model.set_contact_springs(self.bilateral, (0..n).map(|i| self.stiffness_n_per_m.get(i)));
+        let exponent = match self.law {
+            Law::SpringDamper => {
+                let damping = pack((0..n).map(|i| self.damping_n_s_per_m.get(i)));
+                let law = SpringDampers(stiffness.into_iter().zip(damping).collect());
+                model.add(Stage::Handles, law.clone());
+                model.add_account("contact", law);
+                1.0
+            }
+            Law::HuntCrossley => {
+                let per_rate = (0..n).map(|i| self.damping_n_s_per_m.get(i) / self.stiffness_n_per_m.get(i));
+                let law = HuntCrossley { stiffness, per_rate: pack(per_rate), exponent: self.exponent };
+                model.add(Stage::Handles, law.clone());
+                model.add_account("contact", law);
+                self.exponent
+            }
+        };
+        model.set_contact_springs(self.bilateral, (0..n).map(|i| self.stiffness_n_per_m.get(i)), exponent);
+    }
+}
+
+#[derive(Clone, Debug)]
+struct HuntCrossley {
+    stiffness: Vec<f64x2>,
+    /// d = c/k, s/m
+    per_rate: Vec<f64x2>,
+    exponent: f64,
+}
+
+impl HuntCrossley {
+    /// k |δ|^p with the sign of δ.
+    #[inline(always)]
+    fn spring(&self, p: usize, gap: f64x2) -> f64x2 {
+        let bent = if self.exponent == 1.0 {
+            gap
+        } else {
+            f64x2::new(gap.to_array().map(|d| d.abs().powf(self.exponent).copysign(d)))
+        };
+        self.stiffness[p] * bent
+    }
+}
+
+impl Term for HuntCrossley {
+    fn apply(&self, _t_s: f64, w: &mut Workspace) {
+        for p in 0..w.pair.len() {
+            let spring = self.spring(p, w.pair[p].gap[2]);
+            let factor = self.per_rate[p] * w.pair[p].gap_rate[2] + 1.0;
+            let apart = spring.simd_lt(f64x2::ZERO);
+            let free = spring * apart.select(factor.fast_max(f64x2::splat(0.01)), factor);
+            w.pair[p].unclamped = free;
+            w.pair[p].normal = (free * w.pair[p].contact_gain).fast_max(w.pair[p].contact_floor);
+        }
+    }
+}
+
+impl Account for HuntCrossley {
+    fn power(&self, w: &Workspace) -> Power {
+        let (mut work, mut absorbed) = (f64x2::ZERO, f64x2::ZERO);
+        for p in 0..w.pair.len() {
+            let in_contact = in_contact(&w.pair[p]);
+            let spring = in_contact & self.spring(p, w.pair[p].gap[2]);
+            work += w.pair[p].normal * w.pair[p].base_rate[2];
+            absorbed += (w.pair[p].normal - spring) * w.pair[p].gap_rate[2];
+        }
+        Power { work_w: crate::lanes::sum(work), dissipated_w: crate::lanes::sum(absorbed) }
+    }
+
+    fn stored_j(&self, w: &Workspace) -> f64 {
+        let mut stored = f64x2::ZERO;
+        for p in 0..w.pair.len() {
+            let in_contact = in_contact(&w.pair[p]);
+            stored += in_contact & (self.spring(p, w.pair[p].gap[2]) * w.pair[p].gap[2] * (1.0 / (self.exponent + 1.0)));
+        }
+        crate::lanes::sum(stored)
     }
 }
 

@@ -3,36 +3,114 @@
 //! ```text
 //! φ̇_i += (K_c/N) Σ_j sin(φ_j − φ_i) = K_c (S cos φ_i − C sin φ_i),   S = (1/N) Σ sin φ_j,  C = (1/N) Σ cos φ_j
 //! ```
-//! K_c strength [rad/s]; φ phases [rad]. The mean-field form is the same sum in O(N). For N = 2, δ = φ₂ − φ₁ locks where
+//! On a graph: φ̇_i += K_c/(d_i + 1) Σ_{j next to i} sin(φ_j − φ_i), d_i the number of neighbours [1]; where everybody is next to
+//! everybody that is the sum above. `chain` joins neighbours along each pole (handles with the same y, in the order of x).
+//!
+//! K_c strength [rad/s]; φ phases [rad]. The mean-field form is the same sum in O(N); a graph costs O(edges). For N = 2, δ = φ₂ − φ₁ locks where
 //! |Δω| < K_c, at sin δ* = Δω/K_c. Source: paper, eq. (kuramoto); Kuramoto (1975), Strogatz (2000).
 
 use crate::lanes::{f64x2, sum};
 use crate::model::{Model, Stage, Term, Workspace};
-use crate::scene::{Checker, Problem, Scene};
+use crate::scene::{Checker, Problem, Scene, problem};
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 /// `[effects.coupling]`
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(default, deny_unknown_fields)]
 pub struct Coupling {
     /// K_c, rad/s. Measured in the paper's baseline logs: 0.001 ± 0.003, that is none.
     pub strength_rad_per_s: f64,
+    /// Who minds whom.
+    pub graph: Graph,
+}
+
+/// Who minds whom.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "kebab-case")]
+pub enum Graph {
+    /// Everybody minds everybody: the mean field.
+    #[default]
+    All,
+    /// Neighbours along each pole mind each other.
+    Chain,
+    /// Pairs of carriers (numbers from 0) that mind each other.
+    Edges(Vec<[usize; 2]>),
+}
+
+impl Graph {
+    /// The pairs, each once; `None` for all-to-all.
+    fn pairs(&self, handles: &[[f64; 3]]) -> Option<Vec<[usize; 2]>> {
+        match self {
+            Self::All => None,
+            Self::Edges(list) => Some(list.clone()),
+            Self::Chain => {
+                let mut order: Vec<usize> = (0..handles.len()).collect();
+                let key = |i: usize| (handles[i][1], handles[i][0]);
+                order.sort_by(|&a, &b| key(a).0.total_cmp(&key(b).0).then(key(a).1.total_cmp(&key(b).1)));
+                Some(order.windows(2).filter(|w| key(w[0]).0 == key(w[1]).0).map(|w| [w[0], w[1]]).collect())
+            }
+        }
+    }
 }
 
 impl Default for Coupling {
     fn default() -> Self {
-        Self { strength_rad_per_s: 0.5 }
+        Self { strength_rad_per_s: 0.5, graph: Graph::All }
     }
 }
 
 impl Coupling {
-    pub(super) fn check(&self, _scene: &Scene) -> Result<(), Problem> {
-        Checker::finite("effects.coupling.strength_rad_per_s", self.strength_rad_per_s)
+    pub(super) fn check(&self, scene: &Scene) -> Result<(), Problem> {
+        Checker::finite("effects.coupling.strength_rad_per_s", self.strength_rad_per_s)?;
+        let (key, n) = ("effects.coupling.graph", scene.carriers.count());
+        if let Graph::Edges(list) = &self.graph {
+            for (k, [a, b]) in list.iter().enumerate() {
+                if a == b {
+                    return Err(problem(key, format!("found the pair [{a}, {b}], expected two different carriers")));
+                }
+                if let Some(i) = [a, b].into_iter().find(|&&i| i >= n) {
+                    return Err(problem(key, format!("found carrier {i}, but there are {n}, numbered from 0")));
+                }
+                if list[..k].iter().any(|e| e == &[*a, *b] || e == &[*b, *a]) {
+                    return Err(problem(key, format!("the pair [{a}, {b}] stands there twice")));
+                }
+            }
+        }
+        Ok(())
     }
 
     pub(super) fn build(&self, scene: &Scene, model: &mut Model) {
         model.need_phases();
-        model.add(Stage::Phases, MeanField { gain: self.strength_rad_per_s / scene.carriers.count() as f64 });
+        let n = scene.carriers.count();
+        match self.graph.pairs(&scene.carriers.handles_m) {
+            None => model.add(Stage::Phases, MeanField { gain: self.strength_rad_per_s / n as f64 }),
+            Some(edges) => {
+                let mut gain = vec![1.0; n];
+                edges.iter().flatten().for_each(|&i| gain[i] += 1.0);
+                gain.iter_mut().for_each(|g| *g = self.strength_rad_per_s / *g);
+                model.add(Stage::Phases, Network { edges, gain });
+            }
+        }
+    }
+}
+
+#[derive(Debug)]
+struct Network {
+    edges: Vec<[usize; 2]>,
+    /// K_c/(d_i + 1)
+    gain: Vec<f64>,
+}
+
+impl Term for Network {
+    fn apply(&self, _t_s: f64, w: &mut Workspace) {
+        for &[a, b] in &self.edges {
+            // sin(φ_b − φ_a) from the sines and cosines that are there already.
+            let pull = w.of(b, |p| p.sin) * w.of(a, |p| p.cos) - w.of(b, |p| p.cos) * w.of(a, |p| p.sin);
+            let (to_a, to_b) = (w.of(a, |p| p.rate) + self.gain[a] * pull, w.of(b, |p| p.rate) - self.gain[b] * pull);
+            *w.of_mut(a, |p| &mut p.rate) = to_a;
+            *w.of_mut(b, |p| &mut p.rate) = to_b;
+        }
     }
 }
 

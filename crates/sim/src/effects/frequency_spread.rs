@@ -5,10 +5,11 @@
 use crate::model::Model;
 use crate::random::{Stream, normal};
 use crate::scene::{Checker, Problem, Scene};
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 /// `[effects.frequency_spread]`
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(default, deny_unknown_fields)]
 pub struct FrequencySpread {
     /// s, Hz.

@@ -7,36 +7,94 @@
 //! shoulder minus handle, in the plane [m/s]; v_s regularising velocity [m/s]. As v_s → 0 with no hold it is Coulomb's
 //! law; |T*| ≪ μN and v_s → ∞ leave the hold as it is. With N → 0 the force vanishes like μN. Smooth everywhere, so
 //! sticking and sliding are no events; it creeps at |T|/(μN)·v_s where true dry friction would stick.
+//!
+//! Alternative law, `bristle`: the cloth bends before it slips. Its own state z, two for each carrier, instead of `hold`:
+//!
+//! ```text
+//! ż = ḋ − (σ₀/μ) |ḋ| z        T = N (σ₀ z + σ₁ ż)
+//! ```
+//! z bristle deflection [m]; σ₀ stiffness per load [1/m]; σ₁ damping per load [s/m]. In steady sliding T = μN along ḋ; under
+//! μN it sticks: a spring of N σ₀ with no creep. |z| ≤ μ/σ₀ for ever if it is so once. On a slack handle T = 0 and z keeps
+//! following ḋ. |ḋ| has a kink at ḋ = 0, which costs the solver a few short steps. What the bristles hold counts as dissipated
+//! until they give it back. Source: Dahl (1968); load-scaled LuGre: Canudas de Wit & Tsiotras, CDC 1999, without its Stribeck curve.
+//!
 //! Source: paper, section 3.3 ("regularized friction"); Stewart & Trinkle (1996) for what is regularised.
 
 use crate::lanes::{f64x2, sum};
 use crate::model::{Account, Model, Power, Stage, Term, Workspace};
-use crate::scene::{Checker, Problem, Scene};
+use crate::scene::{Checker, Problem, Scene, problem};
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 /// `[effects.friction]`
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(default, deny_unknown_fields)]
 pub struct Friction {
     /// μ, 1. Wood on cloth: 0.3 to 0.6.
     pub coefficient: f64,
     /// v_s, m/s.
     pub regularising_velocity_m_per_s: f64,
+    /// Which law.
+    pub law: Law,
+    /// σ₀ of `bristle`, 1/m.
+    pub bristle_stiffness_per_m: f64,
+    /// σ₁ of `bristle`, s/m.
+    pub bristle_damping_s_per_m: f64,
+}
+
+/// How sticking is told from sliding.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "kebab-case")]
+pub enum Law {
+    /// Smooth in the sliding velocity: it creeps where dry friction sticks.
+    #[default]
+    Regularised,
+    /// Bristles with states of their own: it sticks.
+    Bristle,
 }
 
 impl Default for Friction {
     fn default() -> Self {
-        Self { coefficient: 0.5, regularising_velocity_m_per_s: 0.1 }
+        Self {
+            coefficient: 0.5,
+            regularising_velocity_m_per_s: 0.1,
+            law: Law::Regularised,
+            bristle_stiffness_per_m: 10.0,
+            bristle_damping_s_per_m: 0.5,
+        }
     }
 }
 
 impl Friction {
-    pub(super) fn check(&self, _scene: &Scene) -> Result<(), Problem> {
+    pub(super) fn check(&self, scene: &Scene) -> Result<(), Problem> {
+        Checker::positive("effects.friction.bristle_stiffness_per_m", self.bristle_stiffness_per_m)?;
+        Checker::not_negative("effects.friction.bristle_damping_s_per_m", self.bristle_damping_s_per_m)?;
+        if self.law == Law::Bristle {
+            if scene.effects.hold.is_some() {
+                return Err(problem("effects.friction.law", "bristles are an elastic hold already; leave `effects.hold` out"));
+            }
+            Checker::positive("effects.friction.coefficient", self.coefficient)?;
+        }
         Checker::not_negative("effects.friction.coefficient", self.coefficient)?;
         Checker::positive("effects.friction.regularising_velocity_m_per_s", self.regularising_velocity_m_per_s)
     }
 
     pub(super) fn build(&self, scene: &Scene, model: &mut Model) {
+        if self.law == Law::Bristle {
+            let n = scene.carriers.count();
+            let names = (1..=n).flat_map(|i| ["x", "y"].map(|axis| (format!("bristle_{i}_{axis}_m"), 0.0)));
+            let first = model.add_states(names);
+            let law = Bristles {
+                first,
+                carriers: n,
+                stiffness: self.bristle_stiffness_per_m,
+                damping: self.bristle_damping_s_per_m,
+                per_length: self.bristle_stiffness_per_m / self.coefficient,
+            };
+            model.add(Stage::Handles, law.clone());
+            model.add_account("friction", Coulomb { mu: 0.0, per_velocity: 0.0 });
+            return;
+        }
         let law = Coulomb { mu: self.coefficient, per_velocity: 1.0 / self.regularising_velocity_m_per_s };
         if scene.effects.hold.is_some() {
             // The hold's account books the limited force.
@@ -63,6 +121,33 @@ impl Coulomb {
         let tiny = f64x2::splat(f64::MIN_POSITIVE);
         let length = (most * most + wanted[0] * wanted[0] + wanted[1] * wanted[1]).fast_max(tiny).sqrt();
         wanted.map(|e| e * (most / length))
+    }
+}
+
+#[derive(Clone, Debug)]
+struct Bristles {
+    first: usize,
+    carriers: usize,
+    stiffness: f64,
+    damping: f64,
+    /// σ₀/μ, 1/m
+    per_length: f64,
+}
+
+impl Term for Bristles {
+    fn apply(&self, _t_s: f64, w: &mut Workspace) {
+        for i in 0..self.carriers {
+            let slide = [0, 1].map(|a| w.of(i, |p| p.gap_rate[a]));
+            let speed = slide[0].hypot(slide[1]);
+            let load = w.of(i, |p| p.normal).max(0.0);
+            for axis in 0..2 {
+                let at = self.first + 2 * i + axis;
+                let bent = w.extra[at];
+                let rate = slide[axis] - self.per_length * speed * bent;
+                w.extra_rate[at] = rate;
+                *w.of_mut(i, |p| &mut p.tangential[axis]) = load * (self.stiffness * bent + self.damping * rate);
+            }
+        }
     }
 }
 

@@ -10,10 +10,11 @@
 use crate::lanes::{f64x2, pack};
 use crate::model::{Model, Pair, Stage, Term, Workspace};
 use crate::scene::{Checker, PerCarrier, Problem, Scene, problem};
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 /// `[effects.gait]`
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(default, deny_unknown_fields)]
 pub struct Gait {
     /// Vertical amplitude of the first harmonic, m.
@@ -27,7 +28,7 @@ pub struct Gait {
 }
 
 /// One more Fourier component of the shoulders' motion.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Harmonic {
     /// k, a whole number from 1.

@@ -10,10 +10,11 @@
 use crate::lanes::{f64x2, pack};
 use crate::model::{Account, Model, Power, Stage, Term, Workspace};
 use crate::scene::{Checker, PerCarrier, Problem, Scene};
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 /// `[effects.hold]`
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(default, deny_unknown_fields)]
 pub struct Hold {
     /// k_t, N/m.

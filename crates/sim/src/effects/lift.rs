@@ -8,10 +8,11 @@
 
 use crate::model::{Model, Stage, Switch, Term, Workspace};
 use crate::scene::{Checker, Problem, Scene, problem};
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 /// `[effects.lift]`
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(default, deny_unknown_fields)]
 pub struct Lift {
     /// g, 1. Inferred from the paper's music logs: 1.1 to 1.25.

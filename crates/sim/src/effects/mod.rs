@@ -6,21 +6,26 @@
 
 pub mod contact;
 pub mod coupling;
+pub mod feedback;
+pub mod flexure;
 pub mod frequency_spread;
 pub mod friction;
 pub mod gait;
 pub mod hold;
+pub mod imu;
 pub mod lift;
 pub mod music;
 pub mod noise;
+pub mod path;
 pub mod pole_friction;
 
 use crate::model::Model;
 use crate::scene::Scene;
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 /// The `[effects.NAME]` tables of a scene; absent means off.
-#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 #[allow(missing_docs)]
 pub struct Effects {
@@ -34,6 +39,10 @@ pub struct Effects {
     pub coupling: Option<coupling::Coupling>,
     pub music: Option<music::Music>,
     pub noise: Option<noise::Noise>,
+    pub feedback: Option<feedback::Feedback>,
+    pub path: Option<path::Path>,
+    pub flexure: Option<flexure::Flexure>,
+    pub imu: Option<imu::Imu>,
 }
 
 /// One line of the table of effects.
@@ -81,6 +90,10 @@ pub const TABLE: &[Entry] = &[
     entry!(hold, "hands hold the handles sideways: spring and damper"),
     entry!(friction, "sideways force at a handle is limited by Coulomb friction"),
     entry!(pole_friction, "turning about the pole rubs on the shoulders, saturating"),
+    entry!(feedback, "the load that a carrier feels shifts the gait's phase"),
+    entry!(path, "the way slopes and turns"),
+    entry!(flexure, "poles bend: their first mode"),
+    entry!(imu, "virtual inertial sensors on body and carriers"),
 ];
 
 /// Checks the parameters of every effect that is on.

@@ -11,10 +11,11 @@
 use crate::model::{Model, Switch, Workspace};
 use crate::random::{Stream, normal_pair};
 use crate::scene::{Checker, Problem, Scene};
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 /// `[effects.noise]`
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(default, deny_unknown_fields)]
 pub struct Noise {
     /// σ, rad/√s. Measured in the paper's logs: 0.0100.

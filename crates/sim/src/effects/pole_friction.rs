@@ -12,10 +12,11 @@
 use crate::lanes::{f64x2, sum};
 use crate::model::{Account, Model, Power, Stage, Term, Workspace};
 use crate::scene::{Checker, Problem, Scene};
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 /// `[effects.pole_friction]`
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(default, deny_unknown_fields)]
 pub struct PoleFriction {
     /// ρ, m.

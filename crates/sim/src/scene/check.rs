@@ -72,6 +72,20 @@ pub fn check(scene: &Scene) -> Result<(), Problem> {
         return Err(problem("seed", format!("found {}, expected a number below 2^56", scene.seed)));
     }
 
+    if scene.freedom.is_empty() {
+        return Err(problem("freedom", "the list is empty; name at least one of x, y, height, roll, tilt, yaw"));
+    }
+    if let Some((i, f)) = scene.freedom.iter().enumerate().find(|(i, f)| scene.freedom[..*i].contains(f)) {
+        return Err(problem("freedom", format!("entry {} names {} twice", i + 1, format!("{f:?}").to_lowercase())));
+    }
+    {
+        use super::Freedom::{Roll, Tilt, Yaw};
+        let has = |f| scene.freedom.contains(&f);
+        let level = scene.start.roll_pitch_yaw_deg[1].to_radians().cos().abs();
+        if has(Roll) && has(Yaw) && !has(Tilt) && level < 0.01 {
+            return Err(problem("freedom", "roll and yaw are the same turn while the pole is held upright; free the tilt too"));
+        }
+    }
     Checker::positive("body.mass_kg", scene.body.mass_kg)?;
     Checker::all_finite("body.gravity_m_per_s2", &scene.body.gravity_m_per_s2)?;
     Body::new(&scene.body).map_err(|message| problem("body.inertia_kg_m2", message))?;

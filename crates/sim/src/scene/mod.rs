@@ -13,10 +13,11 @@ pub(crate) use check::{Checker, problem};
 pub use parse::{SceneError, load, nearest, parse, to_toml};
 
 use crate::effects::Effects;
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 /// A scene, complete and checked when it comes from [`load`] or [`parse`].
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Scene {
     /// Name, as written into recordings.
@@ -39,6 +40,9 @@ pub struct Scene {
     /// Time stamp of t = 0, s since 1970; only stamps see it.
     #[serde(default)]
     pub epoch_s: f64,
+    /// Which coordinates of the body may move; the others are held, and cost nothing.
+    #[serde(default = "default::freedom")]
+    pub freedom: Vec<Freedom>,
     /// The carried body.
     #[serde(default)]
     pub body: BodySpec,
@@ -56,8 +60,31 @@ pub struct Scene {
     pub effects: Effects,
 }
 
+/// A coordinate of the body.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "kebab-case")]
+pub enum Freedom {
+    /// Along the walk.
+    X,
+    /// To the left.
+    Y,
+    /// Up.
+    Height,
+    /// About the pole.
+    Roll,
+    /// Of the pole, about the sideways axis.
+    Tilt,
+    /// About the vertical.
+    Yaw,
+}
+
+impl Freedom {
+    /// All six, in the order of the state.
+    pub const ALL: [Self; 6] = [Self::X, Self::Y, Self::Height, Self::Roll, Self::Tilt, Self::Yaw];
+}
+
 /// The rigid body: a rath with its pole.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(default, deny_unknown_fields)]
 pub struct BodySpec {
     /// Mass, kg.
@@ -76,7 +103,7 @@ impl Default for BodySpec {
 }
 
 /// Symmetric inertia tensor. The products are the tensor's own off-diagonal elements: I_xy = −∫ x y dm.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 #[allow(missing_docs)]
 pub struct Inertia {
@@ -98,7 +125,7 @@ impl Default for Inertia {
 }
 
 /// One number for all carriers, or one for each.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(untagged)]
 pub enum PerCarrier {
     /// The same for all.
@@ -132,9 +159,12 @@ impl From<f64> for PerCarrier {
 }
 
 /// The carriers: where they hold the body, and how they walk.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(default, deny_unknown_fields)]
 pub struct Carriers {
+    /// Places many carriers along straight poles, and replaces `handles_m`.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub along_poles: Option<AlongPoles>,
     /// Handles p_i in body coordinates, m. One carrier stands under each, at the same x and y.
     pub handles_m: Vec<[f64; 3]>,
     /// Height of the resting shoulders above the ground, m.
@@ -153,6 +183,7 @@ impl Default for Carriers {
     /// The paper's pair: 4.9 m of pole, handles 0.1 m above the centre of mass.
     fn default() -> Self {
         Self {
+            along_poles: None,
             handles_m: vec![[2.45, 0.0, 0.1], [-2.45, 0.0, 0.1]],
             shoulder_height_m: 1.0.into(),
             frequency_hz: 2.0.into(),
@@ -160,6 +191,71 @@ impl Default for Carriers {
             initial_phase_sd_rad: 0.0,
             walk_m_per_s: [0.0; 3],
         }
+    }
+}
+
+/// Carriers at equal distances along equal, parallel poles, numbered pole by pole from right to left, front first.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(default, deny_unknown_fields)]
+pub struct AlongPoles {
+    /// How many carriers there are on all poles together.
+    pub count: usize,
+    /// How many poles.
+    pub poles: usize,
+    /// From the first handle of a pole to the last, m.
+    pub length_m: f64,
+    /// From pole to pole, m.
+    pub spacing_m: f64,
+    /// Handles above the centre of mass, m.
+    pub height_m: f64,
+}
+
+impl Default for AlongPoles {
+    fn default() -> Self {
+        Self { count: 8, poles: 2, length_m: 4.9, spacing_m: 0.7, height_m: 0.1 }
+    }
+}
+
+impl AlongPoles {
+    /// The handles; the first poles take one more where the carriers cannot be shared out evenly.
+    pub fn handles_m(&self) -> Vec<[f64; 3]> {
+        let mut handles = Vec::with_capacity(self.count);
+        for pole in 0..self.poles {
+            let here = self.count / self.poles + usize::from(pole < self.count % self.poles);
+            let y = (pole as f64 - (self.poles - 1) as f64 / 2.0) * self.spacing_m;
+            for i in 0..here {
+                let from_front = if here > 1 { i as f64 / (here - 1) as f64 } else { 0.5 };
+                handles.push([self.length_m * (0.5 - from_front), y, self.height_m]);
+            }
+        }
+        handles
+    }
+
+    fn check(&self) -> Result<(), Problem> {
+        let key = |name: &str| format!("carriers.along_poles.{name}");
+        if !(1..=MOST_CARRIERS).contains(&self.count) {
+            return Err(problem(&key("count"), format!("found {}, expected 1 to {MOST_CARRIERS} carriers", self.count)));
+        }
+        if !(1..=self.count).contains(&self.poles) {
+            return Err(problem(&key("poles"), format!("found {}, expected 1 to {}, one carrier each", self.poles, self.count)));
+        }
+        Checker::not_negative(&key("length_m"), self.length_m)?;
+        Checker::not_negative(&key("spacing_m"), self.spacing_m)?;
+        Checker::finite(&key("height_m"), self.height_m)
+    }
+}
+
+/// More people than this no pole can take.
+pub(crate) const MOST_CARRIERS: usize = 1_000_000;
+
+impl Scene {
+    /// Works out what a scene says in short: the handles along poles.
+    pub(crate) fn expand(&mut self) -> Result<(), Problem> {
+        if let Some(poles) = &self.carriers.along_poles {
+            poles.check()?;
+            self.carriers.handles_m = poles.handles_m();
+        }
+        Ok(())
     }
 }
 
@@ -171,7 +267,7 @@ impl Carriers {
 }
 
 /// The state at t = 0.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(default, deny_unknown_fields)]
 pub struct Start {
     /// Height of the centre of mass, m. Without it the body starts where its weight rests on the springs.
@@ -199,7 +295,7 @@ impl Default for Start {
 }
 
 /// How the scene is integrated.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(default, deny_unknown_fields)]
 pub struct Solver {
     /// Name in the table of methods ([`crate::solve::METHODS`]).
@@ -224,6 +320,9 @@ mod default {
     }
     pub fn log_rate_hz() -> f64 {
         30.0
+    }
+    pub fn freedom() -> Vec<super::Freedom> {
+        super::Freedom::ALL.to_vec()
     }
     pub fn seed() -> u64 {
         1001

@@ -61,8 +61,8 @@ pub fn load(name_or_path: &str, settings: &[String]) -> Result<Scene, SceneError
 /// As [`load`].
 pub fn parse(origin: &str, text: &str, settings: &[String]) -> Result<Scene, SceneError> {
     let scene: Scene = toml::from_str(text).map_err(|e| located(origin, text, e.span(), &readable(e.message())))?;
-    let scene = if settings.is_empty() { scene } else { apply(scene, settings)? };
-    check(&scene).map_err(|problem| {
+    let mut scene = if settings.is_empty() { scene } else { apply(scene, settings)? };
+    scene.expand().and_then(|()| check(&scene)).map_err(|problem| {
         let was_set = settings.iter().any(|s| s.split('=').next().is_some_and(|k| problem.key.starts_with(k.trim())));
         let message = format!("{}: {}", problem.key, problem.message);
         match find(text, &problem.key) {
@@ -172,16 +172,21 @@ fn located(origin: &str, text: &str, span: Option<std::ops::Range<usize>>, messa
 
 /// Where in `text` the value of a dotted key stands; the deepest part of the key that the text has.
 fn find(text: &str, key: &str) -> Option<std::ops::Range<usize>> {
+    use toml::de::DeValue;
     let document = toml::de::DeTable::parse(text).ok()?;
-    let mut table = document.get_ref();
-    let mut found = None;
-    for part in key.split('.') {
-        let (_, value) = table.iter().find(|(k, _)| k.get_ref() == part)?;
-        found = Some(value.span());
-        match value.get_ref() {
-            toml::de::DeValue::Table(inner) => table = inner,
-            _ => break,
+    let mut parts = key.split('.');
+    let first = parts.next()?;
+    let (_, mut value) = document.get_ref().iter().find(|(k, _)| k.get_ref() == first)?;
+    for part in parts {
+        let next = match value.get_ref() {
+            DeValue::Table(inner) => inner.iter().find(|(k, _)| k.get_ref() == part).map(|(_, v)| v),
+            DeValue::Array(items) => part.parse().ok().and_then(|i: usize| items.get(i)),
+            _ => None,
+        };
+        match next {
+            Some(v) => value = v,
+            None => break,
         }
     }
-    found
+    Some(value.span())
 }

@@ -37,6 +37,30 @@ enum Contact {
     Clamped,
 }
 
+/// Ticks at k/rate, k = 0, 1, … up to the end of the run.
+struct Ticker {
+    rate_hz: f64,
+    next: u64,
+    last: u64,
+    /// When the next tick is, or infinity.
+    due_s: f64,
+}
+
+impl Ticker {
+    fn new(rate_hz: f64, duration_s: f64) -> Self {
+        // A last tick that the duration misses by rounding alone is still taken.
+        Self { rate_hz, next: 0, last: (duration_s * rate_hz * (1.0 + 1e-12)).floor() as u64, due_s: 0.0 }
+    }
+
+    /// Takes the tick that is due; returns its number.
+    fn advance(&mut self) -> u64 {
+        let tick = self.next;
+        self.next += 1;
+        self.due_s = if self.next <= self.last { self.next as f64 / self.rate_hz } else { f64::INFINITY };
+        tick
+    }
+}
+
 /// One run under way.
 pub struct Course<'m> {
     pub model: &'m Model,
@@ -46,8 +70,8 @@ pub struct Course<'m> {
     pub stats: Stats,
     method: &'static str,
     end_s: f64,
-    next_sample: u64,
-    last_sample: u64,
+    /// When somebody wants to see the state: the log first, then the sensors' clocks.
+    tickers: Vec<Ticker>,
     switch_s: f64,
     /// `Some` where contacts open and close.
     contacts: Vec<Contact>,
@@ -74,9 +98,10 @@ impl<'m> Course<'m> {
             stats: Stats::default(),
             method,
             end_s: scene.duration_s,
-            next_sample: 0,
-            // A last sample that the duration misses by rounding alone is still taken.
-            last_sample: (scene.duration_s * scene.log_rate_hz * (1.0 + 1e-12)).floor() as u64,
+            tickers: std::iter::once(scene.log_rate_hz)
+                .chain(model.sensor_clocks().iter().map(|c| c.rate_hz))
+                .map(|rate_hz| Ticker::new(rate_hz, scene.duration_s))
+                .collect(),
             switch_s: f64::INFINITY,
             contacts: vec![Contact::Clamped; n],
             touching: vec![false; n],
@@ -101,22 +126,34 @@ impl<'m> Course<'m> {
         self.t_s >= self.end_s
     }
 
-    fn log_time_s(&self, index: u64) -> f64 {
-        index as f64 / self.model.scene.log_rate_hz
+    /// Whose tick comes next, and when.
+    fn next_tick(&self) -> (usize, f64) {
+        let mut first = (0, self.tickers[0].due_s);
+        for (i, ticker) in self.tickers.iter().enumerate().skip(1) {
+            if ticker.due_s < first.1 {
+                first = (i, ticker.due_s);
+            }
+        }
+        first
     }
 
-    /// The next log time up to and including `t_s`.
+    /// The next moment, up to and including `t_s`, at which the log or a sensor wants the state.
+    #[inline]
     pub fn sample_due(&self, t_s: f64) -> Option<f64> {
-        let due = self.log_time_s(self.next_sample);
-        (self.next_sample <= self.last_sample && due <= t_s + SAME_MOMENT_S).then_some(due)
+        let (_, due) = self.next_tick();
+        (due <= t_s + SAME_MOMENT_S).then_some(due)
     }
 
-    /// Hands a sample to the observer. `y` is the state at that time.
+    /// Hands the state that [`Self::sample_due`] asked for to the observer.
     pub fn sample(&mut self, y: &[f64], observer: &mut dyn Observer) -> Result<(), Stopped> {
-        let t_s = self.log_time_s(self.next_sample);
+        let (who, t_s) = self.next_tick();
+        let tick = self.tickers[who].advance();
+        if who > 0 {
+            observer.tick(who - 1, tick, t_s, y, &mut self.w);
+            return Ok(());
+        }
         self.model.forces(t_s, y, &mut self.w);
         self.stats.evaluations += 1;
-        self.next_sample += 1;
         // Within a rounding of an opening, N = N* can be a hair below zero.
         if self.model.watches_contact() {
             for p in &mut self.w.pair {

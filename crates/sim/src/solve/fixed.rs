@@ -29,7 +29,7 @@ fn integrate<S: Step>(course: &mut Course, step_s: f64, observer: &mut dyn Obser
     let mut method = S::new(size);
     let (mut f0, mut f1, mut y1, mut at) = (vec![0.0; size], vec![0.0; size], vec![0.0; size], vec![0.0; size]);
     let y0 = course.y.clone();
-    if course.sample_due(0.0).is_some() {
+    while course.sample_due(0.0).is_some() {
         course.sample(&y0, observer)?;
     }
     while !course.finished() {
@@ -56,7 +56,7 @@ fn integrate<S: Step>(course: &mut Course, step_s: f64, observer: &mut dyn Obser
             }
             course.y.copy_from_slice(&y1);
             finite(course, t1, &y1)?;
-            if course.sample_due(t1).is_some() {
+            while course.sample_due(t1).is_some() {
                 course.sample(&y1, observer)?;
             }
             course.arrive(t1, observer)?;

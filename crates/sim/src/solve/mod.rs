@@ -27,6 +27,8 @@ pub struct Settings {
 pub trait Observer {
     /// A sample at a log time; `w` holds the forces there. Returning `false` stops the run.
     fn sample(&mut self, t_s: f64, y: &[f64], w: &Workspace) -> bool;
+    /// A tick of one of [`Model::sensor_clocks`]. `w` may be evaluated anew; the next step does not read it.
+    fn tick(&mut self, _clock: usize, _tick: u64, _t_s: f64, _y: &[f64], _w: &mut Workspace) {}
     /// Something happened between samples.
     fn event(&mut self, _event: &Event) {}
 }

@@ -132,7 +132,7 @@ fn integrate<P: Pair, const EVENTS: bool>(
     let last = P::STAGES;
 
     let y0 = course.y.clone();
-    if course.sample_due(course.t_s).is_some() {
+    while course.sample_due(course.t_s).is_some() {
         course.sample(&y0, observer)?;
     }
     let (t, y) = (course.t_s, course.y.clone());
@@ -193,7 +193,7 @@ fn integrate<P: Pair, const EVENTS: bool>(
                 }
                 course.y.copy_from_slice(&y1);
                 let switch = t1 >= course.stop_s();
-                if course.sample_due(t1).is_some() {
+                while course.sample_due(t1).is_some() {
                     course.sample(&y1, observer)?;
                 }
                 course.arrive(t1, observer)?;

@@ -1,0 +1,141 @@
+//! Poles bend: the first bending mode of each pole, driven by the handle forces.
+//!
+//! ```text
+//! s_i = R (p_i + s(x_i) q ẑ)        m q̈ = Σ_i s(x_i) F_i · R ẑ − m ω² q − 2 ζ m ω q̇        s(x) = (3u² − u³)/2,  u = |x|/x_max
+//! ```
+//! q deflection of the pole's ends against the body's z axis [m]: one mode, two states (q, q̇) for each pole; m modal mass [kg];
+//! ω = 2πf natural frequency [rad/s]; ζ damping ratio [1]; s(x) mode shape, 1 at the farthest handle x_max of the pole and
+//! 0 at its middle, where the body is lashed on [1]; F_i handle force [N]. Handles with the same y belong to one pole.
+//! Holds for small q and m ≪ M: the mode's own weight and its inertial pull on the body are left out. What is kept comes from the
+//! virtual work of the handle forces, so energy balances exactly. q > 0 where the ends are pressed up. A pole whose handles are
+//! all at x = 0 does not bend. Source: cantilever deflection under an end load, Timoshenko, *Strength of
+//! Materials* I, §39; modal reduction: Meirovitch, *Fundamentals of Vibrations* (2001), ch. 8.
+
+use crate::lanes::{f64x2, pack, sum};
+use crate::model::{Account, Model, Power, Stage, Term, Workspace};
+use crate::scene::{Checker, Problem, Scene};
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+
+/// `[effects.flexure]`
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(default, deny_unknown_fields)]
+pub struct Flexure {
+    /// f, Hz.
+    pub frequency_hz: f64,
+    /// ζ, 1.
+    pub damping_ratio: f64,
+    /// m, kg.
+    pub modal_mass_kg: f64,
+}
+
+impl Default for Flexure {
+    /// A 5 m pole of deodar, 12 cm thick: some 25 kg of wood, of which a quarter moves with its ends.
+    fn default() -> Self {
+        Self { frequency_hz: 6.0, damping_ratio: 0.02, modal_mass_kg: 6.0 }
+    }
+}
+
+impl Flexure {
+    pub(super) fn check(&self, _scene: &Scene) -> Result<(), Problem> {
+        Checker::positive("effects.flexure.frequency_hz", self.frequency_hz)?;
+        Checker::not_negative("effects.flexure.damping_ratio", self.damping_ratio)?;
+        Checker::positive("effects.flexure.modal_mass_kg", self.modal_mass_kg)
+    }
+
+    pub(super) fn build(&self, scene: &Scene, model: &mut Model) {
+        let handles = &scene.carriers.handles_m;
+        let mut lines: Vec<f64> = handles.iter().map(|h| h[1]).collect();
+        lines.sort_by(f64::total_cmp);
+        lines.dedup();
+        let w = std::f64::consts::TAU * self.frequency_hz;
+        let mut poles = Vec::new();
+        for (k, y) in lines.into_iter().enumerate() {
+            let on = |h: &[f64; 3]| h[1] == y;
+            let end = handles.iter().filter(|h| on(h)).fold(0.0_f64, |m, h| m.max(h[0].abs()));
+            if end == 0.0 {
+                continue;
+            }
+            let names = [format!("pole_{}_m", k + 1), format!("pole_{}_m_per_s", k + 1)];
+            let first = model.add_states(names.map(|name| (name, 0.0)));
+            let shape = |h: &[f64; 3]| {
+                let u = h[0].abs() / end;
+                if on(h) { 0.5 * u * u * (3.0 - u) } else { 0.0 }
+            };
+            poles.push(Pole { first, shape: pack(handles.iter().map(shape)) });
+        }
+        let law = Bending {
+            poles,
+            mass: self.modal_mass_kg,
+            stiffness: self.modal_mass_kg * w * w,
+            damping: 2.0 * self.damping_ratio * self.modal_mass_kg * w,
+        };
+        model.set_flexure(law.clone());
+        model.add(Stage::Body, law.clone());
+        model.add_account("flexure", law);
+    }
+}
+
+#[derive(Clone, Debug)]
+struct Pole {
+    /// Its q in the extra states; q̇ follows.
+    first: usize,
+    shape: Vec<f64x2>,
+}
+
+/// Every pole of a scene.
+#[derive(Clone, Debug)]
+pub(crate) struct Bending {
+    poles: Vec<Pole>,
+    mass: f64,
+    stiffness: f64,
+    damping: f64,
+}
+
+impl Bending {
+    /// Moves the handles by the deflection.
+    pub(crate) fn bend(&self, w: &mut Workspace) {
+        let r = w.rotation;
+        let [ux, uy, uz] = r.map(|row| row[2]);
+        let [wx, wy, wz] = r.map(|row| row[0] * w.spin[0] + row[1] * w.spin[1] + row[2] * w.spin[2]);
+        // The deflection turns with the body: its rate is q̇ u + q ω × u.
+        let (up, swept) = ([ux, uy, uz], [wy * uz - wz * uy, wz * ux - wx * uz, wx * uy - wy * ux]);
+        for pole in &self.poles {
+            let (q, rate) = (w.extra[pole.first], w.extra[pole.first + 1]);
+            for (p, shape) in w.pair.iter_mut().zip(&pole.shape) {
+                for axis in 0..3 {
+                    p.arm[axis] += *shape * (q * up[axis]);
+                    p.gap[axis] -= *shape * (q * up[axis]);
+                    p.gap_rate[axis] -= *shape * (rate * up[axis] + q * swept[axis]);
+                }
+            }
+        }
+    }
+}
+
+impl Term for Bending {
+    fn apply(&self, _t_s: f64, w: &mut Workspace) {
+        let [ux, uy, uz] = w.rotation.map(|row| row[2]);
+        for pole in &self.poles {
+            let mut load = f64x2::ZERO;
+            for (p, shape) in w.pair.iter().zip(&pole.shape) {
+                load += *shape * (p.tangential[0] * ux + p.tangential[1] * uy + p.normal * uz);
+            }
+            let (q, rate) = (w.extra[pole.first], w.extra[pole.first + 1]);
+            w.extra_rate[pole.first] = rate;
+            w.extra_rate[pole.first + 1] = (sum(load) - self.stiffness * q - self.damping * rate) / self.mass;
+        }
+    }
+}
+
+impl Account for Bending {
+    fn power(&self, w: &Workspace) -> Power {
+        let rate2: f64 = self.poles.iter().map(|p| w.extra[p.first + 1].powi(2)).sum();
+        Power { work_w: 0.0, dissipated_w: self.damping * rate2 }
+    }
+
+    fn stored_j(&self, w: &Workspace) -> f64 {
+        let of = |p: &Pole| self.stiffness * w.extra[p.first].powi(2) + self.mass * w.extra[p.first + 1].powi(2);
+        0.5 * self.poles.iter().map(of).sum::<f64>()
+    }
+}

@@ -1,0 +1,132 @@
+//! The way the party takes: a slope of the ground, and a turn.
+//!
+//! ```text
+//! g = |g| (−sin s, −sin b cos s, −cos b cos s)                                            (slope)
+//! χ(t) = Δχ S((t − t₀)/T),  S(u) = u³(10 − 15u + 6u²) on 0 … 1        ċ = v (cos χ − 1, sin χ)         (turn)
+//! b_i ← c + R_z(χ) b_i        ḃ_i ← ċ + R_z(χ) ḃ_i + χ̇ ẑ × R_z(χ) b_i
+//! ```
+//! s slope, positive uphill along the walk [rad]; b bank, positive where the left side is the higher one [rad]; z stays the normal
+//! of the ground. χ heading [rad], Δχ turn (left is positive), t₀ beginning, T time it takes [s]; v walking speed, the
+//! x part of `carriers.walk_m_per_s` [m/s]; c where the party's centre is, against the straight walk [m]: two states. Heading, its
+//! rate and its curvature are continuous, so nothing jerks; t₀ and t₀ + T are moments the solver meets. Shoulders keep their
+//! places in the party, which turns as a whole: the outer carriers walk faster. Frames are not turned: everything
+//! stays in axes at rest, and centrifugal forces come out by themselves.
+//! The slope replaces the direction of `body.gravity_m_per_s2`, not its size. Source: rigid kinematics; S is the quintic of
+//! least jerk (Flash & Hogan 1985).
+
+use crate::lanes::f64x2;
+use crate::model::{Model, Stage, Switch, Term, Workspace};
+use crate::scene::{Checker, Problem, Scene, problem};
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+
+/// `[effects.path]`
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(default, deny_unknown_fields)]
+pub struct Path {
+    /// s, degrees; positive uphill.
+    pub slope_deg: f64,
+    /// b, degrees; positive where the left is higher.
+    pub bank_deg: f64,
+    /// Δχ, degrees; positive to the left.
+    pub turn_deg: f64,
+    /// t₀, s.
+    pub turn_start_s: f64,
+    /// T, s.
+    pub turn_time_s: f64,
+}
+
+impl Default for Path {
+    fn default() -> Self {
+        Self { slope_deg: 0.0, bank_deg: 0.0, turn_deg: 0.0, turn_start_s: 10.0, turn_time_s: 10.0 }
+    }
+}
+
+impl Path {
+    pub(super) fn check(&self, _scene: &Scene) -> Result<(), Problem> {
+        for (key, x) in [("effects.path.slope_deg", self.slope_deg), ("effects.path.bank_deg", self.bank_deg)] {
+            if x.is_nan() || x.abs() >= 60.0 {
+                return Err(problem(key, format!("found {x}, expected above -60 and below 60: nobody walks there")));
+            }
+        }
+        Checker::finite("effects.path.turn_deg", self.turn_deg)?;
+        Checker::not_negative("effects.path.turn_start_s", self.turn_start_s)?;
+        Checker::positive("effects.path.turn_time_s", self.turn_time_s)
+    }
+
+    /// Gravity as the sloping ground sees it.
+    pub(crate) fn lean(&self, gravity: [f64; 3]) -> [f64; 3] {
+        if self.slope_deg == 0.0 && self.bank_deg == 0.0 {
+            return gravity;
+        }
+        let size = gravity.iter().map(|g| g * g).sum::<f64>().sqrt();
+        let (s, b) = (self.slope_deg.to_radians(), self.bank_deg.to_radians());
+        [-size * s.sin(), -size * b.sin() * s.cos(), -size * b.cos() * s.cos()]
+    }
+
+    pub(super) fn build(&self, scene: &Scene, model: &mut Model) {
+        if self.turn_deg == 0.0 {
+            return;
+        }
+        let first = model.add_states(["path_x_m", "path_y_m"].map(|name| (name.to_owned(), 0.0)));
+        model.add(
+            Stage::Party,
+            Turn {
+                first,
+                speed: scene.carriers.walk_m_per_s[0],
+                turn: self.turn_deg.to_radians(),
+                start_s: self.turn_start_s,
+                per_s: 1.0 / self.turn_time_s,
+            },
+        );
+        model.add_switch(Ends([self.turn_start_s, self.turn_start_s + self.turn_time_s]));
+    }
+}
+
+#[derive(Debug)]
+struct Turn {
+    first: usize,
+    speed: f64,
+    turn: f64,
+    start_s: f64,
+    per_s: f64,
+}
+
+impl Turn {
+    /// χ, χ̇
+    fn heading(&self, t_s: f64) -> (f64, f64) {
+        let u = ((t_s - self.start_s) * self.per_s).clamp(0.0, 1.0);
+        let heading = u * u * u * (10.0 + u * (6.0 * u - 15.0));
+        let rate = 30.0 * u * u * (1.0 - u) * (1.0 - u) * self.per_s;
+        (self.turn * heading, self.turn * rate)
+    }
+}
+
+impl Term for Turn {
+    fn apply(&self, t_s: f64, w: &mut Workspace) {
+        let (heading, rate) = self.heading(t_s);
+        let (sin, cos) = heading.sin_cos();
+        let centre = [w.extra[self.first], w.extra[self.first + 1]];
+        let velocity = [self.speed * (cos - 1.0), self.speed * sin];
+        for p in &mut w.pair {
+            let ([x, y, _], [vx, vy, _]) = (p.base, p.base_rate);
+            let (turned_x, turned_y) = (x * cos - y * sin, x * sin + y * cos);
+            p.base[0] = turned_x + f64x2::splat(centre[0]);
+            p.base[1] = turned_y + f64x2::splat(centre[1]);
+            p.base_rate[0] = vx * cos - vy * sin - turned_y * rate + f64x2::splat(velocity[0]);
+            p.base_rate[1] = vx * sin + vy * cos + turned_x * rate + f64x2::splat(velocity[1]);
+        }
+        w.extra_rate[self.first] = velocity[0];
+        w.extra_rate[self.first + 1] = velocity[1];
+    }
+}
+
+/// Where the turn begins and ends.
+#[derive(Debug)]
+struct Ends([f64; 2]);
+
+impl Switch for Ends {
+    fn next_s(&self, after_s: f64) -> f64 {
+        self.0.into_iter().find(|t| *t > after_s).unwrap_or(f64::INFINITY)
+    }
+}

@@ -1,0 +1,196 @@
+//! Virtual instruments: what they show of known motions, and that their noise is what the scene says.
+
+mod common;
+
+use common::{readings, samples, scene};
+use nalgebra::Vector3;
+use sim::scene::parse;
+
+/// At rest the specific force is +g along the axis that points up, whichever axis that is.
+#[test]
+fn at_rest_the_axis_that_points_up_shows_plus_g() {
+    let scene = scene(
+        r#"
+        name = "rest"
+        duration_s = 0.5
+        [effects.contact]
+        [effects.imu]
+        ideal = true
+        sensors = [
+            { on = "rath" },
+            { on = "rath", name = "on_its_side", place_m = [0.3, 0.1, -0.2], mounting_roll_pitch_yaw_deg = [90.0, 0.0, 0.0] },
+            { on = "carrier_2" },
+        ]
+        "#,
+    );
+    let (shown, _) = readings(&scene);
+    assert_eq!(shown.len(), 3 * 101);
+    for r in shown {
+        let expected = if r.topic == "/imu/on_its_side" { [0.0, 9.81, 0.0] } else { [0.0, 0.0, 9.81] };
+        for axis in 0..3 {
+            assert!((r.force[axis] - expected[axis]).abs() < 1e-9, "{r:?}");
+            assert!(r.spin[axis].abs() < 1e-9);
+        }
+    }
+}
+
+/// A symmetric top in free fall: a sensor off the centre shows ω × (ω × p) + α × p and nothing else.
+///
+/// ω = (b cos λt, b sin λt, s) for I = diag(I₁, I₁, I₃), λ = (I₃ − I₁) s/I₁. Landau & Lifshitz, Mechanics, §33.
+#[test]
+fn val_off_centre_sensor_on_a_free_top() {
+    let scene = scene(
+        r#"
+        name = "top"
+        duration_s = 10.0
+        [body]
+        inertia_kg_m2 = { xx = 2.0, yy = 2.0, zz = 3.0 }
+        [start]
+        height_m = 500.0
+        angular_velocity_rad_per_s = [0.8, 0.0, 5.0]
+        [solver]
+        tolerance = 1e-13
+        [effects.imu]
+        ideal = true
+        sensors = [{ on = "rath", place_m = [0.4, -0.3, 0.7] }]
+        "#,
+    );
+    let (b, s, p) = (0.8, 5.0, Vector3::new(0.4, -0.3, 0.7));
+    let turn = (3.0 - 2.0) * s / 2.0;
+    for r in readings(&scene).0 {
+        let (sin, cos) = (turn * r.t_s).sin_cos();
+        let spin = Vector3::new(b * cos, b * sin, s);
+        let change = Vector3::new(-b * turn * sin, b * turn * cos, 0.0);
+        let expected = spin.cross(&spin.cross(&p)) + change.cross(&p);
+        assert!((Vector3::from(r.force) - expected).norm() < 1e-9, "t = {}: {:.1e}", r.t_s, (Vector3::from(r.force) - expected).norm());
+        assert!((Vector3::from(r.spin) - spin).norm() < 1e-9);
+    }
+}
+
+/// A shoulder that goes up and down as A sin φ, φ̇ constant, is felt as g − A φ̇² sin φ.
+#[test]
+fn val_shoulder_sensor_of_a_steady_gait() {
+    let scene = scene(
+        r#"
+        name = "steps"
+        duration_s = 5.0
+        [carriers]
+        initial_phase_rad = [0.3, 1.0]
+        [effects.gait]
+        amplitude_m = 0.06
+        [effects.imu]
+        ideal = true
+        rate_hz = 90.0
+        sensors = [{ on = "carrier_2" }]
+        "#,
+    );
+    let w = std::f64::consts::TAU * 2.0;
+    for r in readings(&scene).0 {
+        let expected = 9.81 - 0.06 * w * w * (1.0 + w * r.t_s).sin();
+        // The five-point difference: h⁴/30 · A ω⁶ = 1e-11, rounding 1e-9.
+        assert!((r.force[2] - expected).abs() < 5e-9, "{:.1e}", r.force[2] - expected);
+    }
+}
+
+/// Instruments touch nothing: the samples are the same to the last bit.
+#[test]
+fn sensors_only_watch() {
+    let with = parse("field-imu", sim::scene::builtin("field-imu").unwrap(), &["duration_s=5.0".into()]).unwrap();
+    let mut without = with.clone();
+    without.effects.imu = None;
+    let motion = |s: &sim::scene::Scene| samples(s).iter().flat_map(|s| s.pose.position_m.map(f64::to_bits)).collect::<Vec<_>>();
+    assert_eq!(motion(&with), motion(&without));
+}
+
+/// Its own clock: stamps begin at the offset and tick nominally while true time runs at the drifting rate; samples get lost.
+#[test]
+fn clocks_drift_and_samples_get_lost() {
+    let text = r#"
+        name = "clock"
+        duration_s = 20.0
+        epoch_s = 1e9
+        [effects.imu]
+        rate_hz = 100.0
+        dropout = 0.1
+        sensors = [{ on = "rath", clock_offset_s = -2.5, clock_drift_ppm = 500.0 }]
+    "#;
+    let (shown, _) = readings(&scene(text));
+    // 2001 ticks of a clock that is 10 ms ahead after 20 s.
+    assert!((1740..=1860).contains(&shown.len()), "{} of 2001 arrived", shown.len());
+    for r in &shown {
+        assert!((r.stamp_s - (-2.5 + r.t_s * (1.0 + 500e-6))).abs() < 1e-9, "{r:?}");
+    }
+    assert!(shown.windows(2).all(|w| w[0].t_s < w[1].t_s));
+}
+
+/// Ranges clip and digits round.
+#[test]
+fn ranges_clip_and_digits_round() {
+    let (shown, _) = readings(&scene(
+        r#"
+        name = "coarse"
+        duration_s = 1.0
+        [start]
+        height_m = 100.0
+        angular_velocity_rad_per_s = [0.0, 0.0, 7.03]
+        [effects.imu]
+        gyro_range_rad_per_s = 5.0
+        accel_resolution_m_per_s2 = 0.5
+        sensors = [{ on = "rath", place_m = [0.1, 0.0, 0.0] }]
+        "#,
+    ));
+    for r in shown {
+        // The last digit within the range: 0.04 deg/s apart.
+        assert!((5.0 - 0.04_f64.to_radians()..=5.0).contains(&r.spin[2]), "{r:?}");
+        assert!(r.force.iter().all(|f| (f / 0.5 - (f / 0.5).round()).abs() < 1e-12), "{r:?}");
+        assert!((r.force[0] + 0.1 * 7.03 * 7.03).abs() < 0.5, "{r:?}");
+    }
+}
+
+/// Overlapping Allan variance at averaging times of `m` samples. IEEE Std 952-1997, annex C.
+fn allan_variance(x: &[f64], rate_hz: f64, m: usize) -> f64 {
+    let mut sums = vec![0.0];
+    for v in x {
+        sums.push(sums[sums.len() - 1] + v / rate_hz);
+    }
+    let tau = m as f64 / rate_hz;
+    let terms = sums.len() - 2 * m;
+    let total: f64 = (0..terms).map(|k| (sums[k + 2 * m] - 2.0 * sums[k + m] + sums[k]).powi(2)).sum();
+    total / (2.0 * tau * tau * terms as f64)
+}
+
+/// A static log of an hour shows the scene's noise density and bias walk in its Allan deviation, within 5 %.
+#[test]
+fn val_allan_deviation_of_an_hour_at_rest() {
+    let scene = scene(
+        r#"
+        name = "hour"
+        duration_s = 3600.0
+        log_rate_hz = 0.1
+        [effects.imu]
+        rate_hz = 100.0
+        sensors = [{ on = "rath" }]
+        [solver]
+        energy = false
+        [effects.contact]
+        "#,
+    );
+    let (shown, _) = readings(&scene);
+    assert_eq!(shown.len(), 360_001);
+    let axes = |pick: fn(&common::Shown) -> [f64; 3]| -> [Vec<f64>; 3] {
+        std::array::from_fn(|a| shown.iter().map(|r| pick(r)[a]).collect())
+    };
+    // σ²(τ) = D²/τ + W² τ/3: the mean over the axes at a short and at a long averaging time gives both.
+    let fit = |signals: [Vec<f64>; 3], short: usize, long: usize| {
+        let mean = |m: usize| signals.iter().map(|x| allan_variance(x, 100.0, m)).sum::<f64>() / 3.0;
+        let (ts, tl, vs, vl) = (short as f64 / 100.0, long as f64 / 100.0, mean(short), mean(long));
+        let walk2 = (vl * tl - vs * ts) * 3.0 / (tl * tl - ts * ts);
+        ((vs * ts - walk2 * ts * ts / 3.0).sqrt(), walk2.sqrt())
+    };
+    let (density, walk) = fit(axes(|r| r.force), 10, 400);
+    assert!((density / 2.0e-3 - 1.0).abs() < 0.05, "accelerometer density {density:.3e}");
+    assert!((walk / 3.0e-3 - 1.0).abs() < 0.05, "accelerometer walk {walk:.3e}");
+    let (density, walk) = fit(axes(|r| r.spin), 50, 4000);
+    assert!((density / 1.6968e-4 - 1.0).abs() < 0.05, "gyroscope density {density:.3e}");
+    assert!((walk / 1.9393e-5 - 1.0).abs() < 0.05, "gyroscope walk {walk:.3e}");
+}
