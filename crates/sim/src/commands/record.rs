@@ -7,6 +7,7 @@ use sim::model::Model;
 use sim::record::Recorder;
 use sim::run::{Listener, Sample, run_model, settings};
 use sim::scene::load;
+use sim::sensors::Reading;
 use sim::solve::{Stopped, method};
 use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -153,6 +154,10 @@ struct Watch<'m> {
 }
 
 impl Listener for Watch<'_> {
+    fn reading(&mut self, reading: &Reading<'_>) {
+        self.recorder.reading(reading);
+    }
+
     fn sample(&mut self, sample: &Sample) -> bool {
         self.samples += 1;
         // A short run needs no progress bar; indicatif shows one on a terminal only.

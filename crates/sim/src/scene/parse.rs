@@ -150,7 +150,19 @@ fn set_key(table: &mut toml::Table, path: &[&str], value: toml::Value) -> Result
 
 /// Adds the nearest key to serde's `unknown field` message.
 fn readable(message: &str) -> String {
-    let message = message.trim().replace('\n', " ");
+    let mut message = message.trim().replace('\n', " ");
+    for (theirs, ours) in [
+        ("invalid type: ", "found "),
+        ("invalid value: ", "found "),
+        ("expected f64", "expected a number"),
+        ("expected u64", "expected a whole number, zero or more"),
+        ("expected u32", "expected a whole number, zero or more"),
+        ("expected usize", "expected a whole number, zero or more"),
+        ("expected a sequence", "expected a list"),
+        ("data did not match any variant of untagged enum PerCarrier", "expected a number, or a list with one for each carrier"),
+    ] {
+        message = message.replace(theirs, ours);
+    }
     let mut ticks = message.split('`').skip(1).step_by(2);
     if message.starts_with("unknown field") || message.starts_with("unknown variant") {
         if let Some(word) = ticks.next() {

@@ -1,0 +1,132 @@
+//! Fewer freedoms: the same motion where the held coordinates stay at rest, the same equations where they are held.
+
+mod common;
+
+use common::{samples, scene};
+use sim::model::Model;
+use sim::scene::{Freedom, Scene};
+
+/// A rath of the paper's kind in which both carriers step together: only height, roll and the sideways sway move.
+fn in_step(freedom: &str) -> Scene {
+    scene(&format!(
+        r#"
+        name = "in step"
+        duration_s = 20.0
+        freedom = {freedom}
+        [start]
+        height_m = 0.85
+        roll_pitch_yaw_deg = [4.0, 0.0, 0.0]
+        [solver]
+        tolerance = 1e-11
+        [effects.contact]
+        [effects.hold]
+        [effects.pole_friction]
+        [effects.gait]
+        amplitude_m = 0.06
+        sway_m = 0.004
+        "#
+    ))
+}
+
+#[test]
+fn held_coordinates_that_would_stay_at_rest_change_nothing() {
+    let full = samples(&in_step(r#"["x", "y", "height", "roll", "tilt", "yaw"]"#));
+    let plane = samples(&in_step(r#"["y", "height", "roll"]"#));
+    assert_eq!(full.len(), plane.len());
+    let mut worst: f64 = 0.0;
+    for (a, b) in full.iter().zip(&plane) {
+        assert!(a.roll_pitch_yaw_rad[1].abs() < 1e-12 && a.roll_pitch_yaw_rad[2].abs() < 1e-12);
+        worst = worst.max((a.roll_pitch_yaw_rad[0] - b.roll_pitch_yaw_rad[0]).abs());
+        worst = worst.max((a.pose.position_m[2] - b.pose.position_m[2]).abs());
+        worst = worst.max((a.pose.position_m[1] - b.pose.position_m[1]).abs());
+    }
+    assert!(worst < 1e-8, "{worst:.1e}");
+}
+
+/// Where a coordinate is held that would have moved, the difference is that coordinate's doing, and small here: the sway.
+#[test]
+fn height_and_roll_alone_come_near_the_full_motion_with_a_stiff_hold() {
+    let stiff = |freedom: &str| {
+        let mut scene = in_step(freedom);
+        scene.effects.gait.as_mut().unwrap().sway_m = 0.0.into();
+        scene.effects.hold = None;
+        scene
+    };
+    // Without a hold nothing pushes sideways: roll and height are all there is.
+    let full = samples(&stiff(r#"["x", "y", "height", "roll", "tilt", "yaw"]"#));
+    let two = samples(&stiff(r#"["height", "roll"]"#));
+    for (a, b) in full.iter().zip(&two) {
+        assert!((a.roll_pitch_yaw_rad[0] - b.roll_pitch_yaw_rad[0]).abs() < 1e-8);
+        assert!((a.pose.position_m[2] - b.pose.position_m[2]).abs() < 1e-8);
+    }
+}
+
+/// Every choice of freedoms keeps its own energy balance, and its rates are those of the full equations under the constraint.
+#[test]
+fn every_subset_balances_its_energy() {
+    for mask in 1..63_u32 {
+        let names: Vec<String> = Freedom::ALL
+            .iter()
+            .enumerate()
+            .filter(|(i, _)| mask >> i & 1 == 1)
+            .map(|(_, f)| format!("\"{}\"", format!("{f:?}").to_lowercase()))
+            .collect();
+        let scene = scene(&format!(
+            r#"
+            name = "subset"
+            duration_s = 3.0
+            freedom = [{}]
+            [body]
+            inertia_kg_m2 = {{ xx = 2.0, yy = 11.0, zz = 12.0, xy = 0.4, xz = -0.3, yz = 0.2 }}
+            [carriers]
+            initial_phase_rad = [0.4, 2.0]
+            [start]
+            height_m = 0.85
+            roll_pitch_yaw_deg = [8.0, 3.0, -5.0]
+            velocity_m_per_s = [0.1, -0.2, 0.1]
+            angular_velocity_rad_per_s = [0.5, 0.1, -0.3]
+            [solver]
+            tolerance = 1e-10
+            [effects.contact]
+            [effects.hold]
+            [effects.pole_friction]
+            [effects.gait]
+            sway_m = 0.01
+            "#,
+            names.join(", ")
+        ));
+        let model = Model::new(&scene);
+        let attitude_is_a_quaternion = names.iter().filter(|n| ["\"roll\"", "\"tilt\"", "\"yaw\""].contains(&n.as_str())).count() == 3;
+        let expected = if attitude_is_a_quaternion { 13 } else { 2 * names.len() };
+        assert_eq!(model.layout().body, expected, "{names:?}");
+        for s in samples(&scene) {
+            let e = s.energy.unwrap();
+            // The ledger is a quadrature beside the motion and steers no step: it is held to a part of what went through it.
+            let through = 1.0 + e.work_in_j.abs() + e.dissipated_j.abs();
+            let off = e.unexplained_j.abs() / through;
+            assert!(off < 1e-6, "{names:?} at {} s: {:.1e} J, {off:.1e} of {through} J", s.t_s, e.unexplained_j);
+            assert!(s.pose.position_m.iter().chain(&s.roll_pitch_yaw_rad).all(|x| x.is_finite()));
+        }
+    }
+}
+
+/// A held body is a pendulum with one angle: about its pole, θ̈ = −(torque of gravity is none at the centre of mass) = 0.
+#[test]
+fn one_free_angle_spins_on() {
+    let s = scene(
+        r#"
+        name = "spit"
+        duration_s = 5.0
+        freedom = ["roll"]
+        [body]
+        inertia_kg_m2 = { xx = 2.0, yy = 11.0, zz = 12.0, xz = 0.5 }
+        [start]
+        height_m = 3.0
+        angular_velocity_rad_per_s = [1.5, 0.0, 0.0]
+        "#,
+    );
+    for s in samples(&s) {
+        let turned = 1.5 * s.t_s;
+        assert!((turned - s.roll_pitch_yaw_rad[0]).sin().abs() < 1e-7 && s.pose.position_m[2] == 3.0);
+    }
+}

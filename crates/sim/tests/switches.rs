@@ -1,0 +1,139 @@
+//! Effects are independent: what one adds is the same to the last bit whether another is there or not.
+
+mod common;
+
+use common::scene;
+use sim::effects::TABLE;
+use sim::model::{Model, Workspace};
+use sim::scene::Scene;
+
+/// A scene with every effect.
+fn everything() -> Scene {
+    scene(
+        r#"
+        name = "everything"
+        [carriers]
+        handles_m = [[2.4, 0.3, 0.1], [2.3, -0.3, 0.1], [-2.4, 0.3, 0.1]]
+        initial_phase_rad = [0.3, 1.1, 2.0]
+        [start]
+        height_m = 0.85
+        roll_pitch_yaw_deg = [3.0, 1.0, 2.0]
+        angular_velocity_rad_per_s = [0.3, 0.2, -0.1]
+        [effects.contact]
+        [effects.hold]
+        [effects.friction]
+        [effects.pole_friction]
+        [effects.gait]
+        sway_m = 0.01
+        harmonics = [{ order = 2, amplitude_m = [0.001, 0.002, 0.003] }]
+        [effects.lift]
+        [effects.frequency_spread]
+        [effects.coupling]
+        graph = "chain"
+        [effects.music]
+        onset_s = 0.0
+        build_up_s = 0.0
+        [effects.noise]
+        [effects.feedback]
+        [effects.path]
+        turn_deg = 90.0
+        turn_start_s = 0.0
+        slope_deg = 5.0
+        [effects.flexure]
+        [effects.imu]
+        "#,
+    )
+}
+
+/// Every number that a term can write.
+fn written(model: &Model, w: &Workspace) -> Vec<(String, u64)> {
+    let mut out: Vec<(String, u64)> = Vec::new();
+    for i in 0..model.carriers() {
+        let mut put = |name: &str, x: f64| out.push((format!("{name} {i}"), x.to_bits()));
+        put("rate", w.of(i, |p| p.rate));
+        put("normal", w.of(i, |p| p.normal));
+        put("unclamped", w.of(i, |p| p.unclamped));
+        for a in 0..3 {
+            put(&format!("base {a}"), w.of(i, |p| p.base[a]));
+            put(&format!("base rate {a}"), w.of(i, |p| p.base_rate[a]));
+        }
+        for a in 0..2 {
+            put(&format!("tangential {a}"), w.of(i, |p| p.tangential[a]));
+        }
+    }
+    for a in 0..3 {
+        out.push((format!("torque {a}"), w.body_torque[a].to_bits()));
+    }
+    out
+}
+
+#[test]
+fn switching_one_effect_off_leaves_the_others_as_they_are() {
+    let full = everything();
+    let t_s = 0.7;
+    for kept in TABLE {
+        for other in TABLE.iter().filter(|o| o.name != kept.name) {
+            // Two effects that are about each other by their definition: lift amplifies the gait, friction limits the hold.
+            if ["gait", "hold"].contains(&other.name) && ["lift", "friction"].contains(&kept.name) {
+                continue;
+            }
+            let mut without = full.clone();
+            (other.switch_off)(&mut without.effects);
+            if other.name == "gait" {
+                without.effects.lift = None;
+            }
+            let (a, b) = (Model::new(&full), Model::new(&without));
+            let evaluated = |m: &Model| {
+                let (y, mut w) = (m.initial_state(), m.workspace());
+                m.begin_segment(0.0, &mut w);
+                m.forces(t_s, &y, &mut w);
+                w
+            };
+            // The same workspace for both, but for the states that only one of them has: each reads its own by name.
+            let mut wa = evaluated(&a);
+            let mut wb = evaluated(&b);
+            let (extra, rates) = (wb.extra.clone(), wb.extra_rate.clone());
+            wb = Workspace { extra, extra_rate: rates, ..wa.clone() };
+            let states = |m: &Model| m.state_names()[m.layout().extra_range()].to_vec();
+            let (names_a, names_b) = (states(&a), states(&b));
+            for (name, x) in names_a.iter().zip(&mut wa.extra) {
+                *x = 0.01 * name.len() as f64;
+            }
+            for (name, x) in names_b.iter().zip(&mut wb.extra) {
+                *x = 0.01 * name.len() as f64;
+            }
+            a.apply_only(kept.name, t_s, &mut wa);
+            b.apply_only(kept.name, t_s, &mut wb);
+            assert_eq!(written(&a, &wa), written(&b, &wb), "`{}` with and without `{}`", kept.name, other.name);
+            for (name, rate) in names_b.iter().zip(&wb.extra_rate) {
+                let i = names_a.iter().position(|n| n == name).unwrap();
+                // Rates that belong to neither keep what the evaluation left there.
+                if b.state_names().contains(name) && wa.extra_rate[i].to_bits() != rate.to_bits() {
+                    let own = |m: &Model| {
+                        let mut w = evaluated(m);
+                        w.extra_rate.fill(f64::NAN);
+                        m.apply_only(kept.name, t_s, &mut w);
+                        let at = states(m).iter().position(|n| n == name).unwrap();
+                        w.extra_rate[at].is_nan()
+                    };
+                    assert!(own(&a) && own(&b), "rate of {name}: `{}` with and without `{}`", kept.name, other.name);
+                }
+            }
+        }
+    }
+}
+
+/// An effect that is off adds no state, no account and no sensor.
+#[test]
+fn an_absent_effect_leaves_nothing_behind() {
+    let full = everything();
+    let mut bare = full.clone();
+    for effect in TABLE {
+        (effect.switch_off)(&mut bare.effects);
+    }
+    let model = Model::new(&bare);
+    assert_eq!(model.layout().size(), 13);
+    assert_eq!(model.accounts().count(), 0);
+    assert!(model.imus().is_empty() && model.sensor_clocks().is_empty() && model.beat().is_none());
+    assert_eq!(model.next_switch_s(0.0), f64::INFINITY);
+}
