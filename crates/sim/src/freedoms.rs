@@ -83,8 +83,35 @@ pub struct Six {
     mass: f64,
     inverse_mass: f64,
     gravity: [f64; 3],
-    inertia: Matrix3<f64>,
-    inverse_inertia: Matrix3<f64>,
+    inertia: Tensor,
+    inverse_inertia: Tensor,
+}
+
+/// A symmetric tensor; without products it costs a third.
+#[derive(Clone, Copy, Debug)]
+struct Tensor {
+    /// xx, yy, zz
+    moments: [f64; 3],
+    /// yz, xz, xy
+    products: [f64; 3],
+    diagonal: bool,
+}
+
+impl Tensor {
+    fn new(m: &Matrix3<f64>) -> Self {
+        let products = [m[(1, 2)], m[(0, 2)], m[(0, 1)]];
+        Self { moments: [m[(0, 0)], m[(1, 1)], m[(2, 2)]], products, diagonal: products == [0.0; 3] }
+    }
+
+    #[inline(always)]
+    fn times(&self, v: [f64; 3]) -> [f64; 3] {
+        let own = [self.moments[0] * v[0], self.moments[1] * v[1], self.moments[2] * v[2]];
+        if self.diagonal {
+            return own;
+        }
+        let [yz, xz, xy] = self.products;
+        [own[0] + xy * v[1] + xz * v[2], own[1] + xy * v[0] + yz * v[2], own[2] + xz * v[0] + yz * v[1]]
+    }
 }
 
 impl Six {
@@ -96,15 +123,10 @@ impl Six {
             mass: body.mass_kg,
             inverse_mass: 1.0 / body.mass_kg,
             gravity: body.gravity_m_per_s2.into(),
-            inertia: body.inertia_kg_m2,
-            inverse_inertia: body.inverse_inertia,
+            inertia: Tensor::new(&body.inertia_kg_m2),
+            inverse_inertia: Tensor::new(&body.inverse_inertia),
         }
     }
-}
-
-#[inline(always)]
-fn times(m: &Matrix3<f64>, v: [f64; 3]) -> [f64; 3] {
-    [0, 1, 2].map(|a| m[(a, 0)] * v[0] + m[(a, 1)] * v[1] + m[(a, 2)] * v[2])
 }
 
 /// Rows of the rotation matrix of q/|q|.
@@ -194,15 +216,12 @@ impl Freedoms for Six {
         let (force, t, r) = (force.map(sum), torque.map(sum), &w.rotation);
         let in_body = [0, 1, 2].map(|a| r[0][a] * t[0] + r[1][a] * t[1] + r[2][a] * t[2] + w.body_torque[a]);
         let [wx, wy, wz] = w.spin;
-        let momentum = times(&self.inertia, [wx, wy, wz]);
-        let angular = times(
-            &self.inverse_inertia,
-            [
-                in_body[0] - (wy * momentum[2] - wz * momentum[1]),
-                in_body[1] - (wz * momentum[0] - wx * momentum[2]),
-                in_body[2] - (wx * momentum[1] - wy * momentum[0]),
-            ],
-        );
+        let momentum = self.inertia.times([wx, wy, wz]);
+        let angular = self.inverse_inertia.times([
+            in_body[0] - (wy * momentum[2] - wz * momentum[1]),
+            in_body[1] - (wz * momentum[0] - wx * momentum[2]),
+            in_body[2] - (wx * momentum[1] - wy * momentum[0]),
+        ]);
         let (qx, qy, qz, qw) = (0.5 * y[3], 0.5 * y[4], 0.5 * y[5], 0.5 * y[6]);
         dy[0] = y[7];
         dy[1] = y[8];
@@ -249,8 +268,7 @@ impl Freedoms for Six {
 
     fn energy_j(&self, y: &[f64]) -> [f64; 2] {
         let v = Vector3::new(y[7], y[8], y[9]);
-        let spin = Vector3::new(y[10], y[11], y[12]);
-        let kinetic = 0.5 * (self.mass * v.norm_squared() + spin.dot(&(self.inertia * spin)));
+        let kinetic = 0.5 * (self.mass * v.norm_squared() + (0..3).map(|a| y[10 + a] * self.inertia.times([y[10], y[11], y[12]])[a]).sum::<f64>());
         [kinetic, -self.mass * (0..3).map(|a| self.gravity[a] * y[a]).sum::<f64>()]
     }
 }

@@ -27,16 +27,18 @@ pub fn pack(values: impl ExactSizeIterator<Item = f64>) -> Vec<f64x2> {
 /// Reads `y` (one number per carrier, contiguous) pair by pair; padding is zero.
 #[inline(always)]
 pub fn load(y: &[f64]) -> impl Iterator<Item = f64x2> {
-    let whole = y.chunks_exact(LANES);
-    let rest = whole.remainder().first().map(|&last| f64x2::new([last, 0.0]));
-    whole.map(|c| f64x2::new([c[0], c[1]])).chain(rest)
+    y.chunks(LANES).map(|c| f64x2::new(if let [a, b] = c { [*a, *b] } else { [c[0], 0.0] }))
 }
 
 /// Writes pairs into `y` (one number per carrier, contiguous).
 #[inline(always)]
 pub fn store(packed: impl Iterator<Item = f64x2>, y: &mut [f64]) {
     for (to, from) in y.chunks_mut(LANES).zip(packed) {
-        to.copy_from_slice(&from.as_array()[..to.len()]);
+        let [a, b] = from.to_array();
+        to[0] = a;
+        if let [_, second] = to {
+            *second = b;
+        }
     }
 }
 
@@ -68,11 +70,11 @@ pub fn sin_cos(x: f64x2) -> (f64x2, f64x2) {
     let shifted = x * splat(std::f64::consts::FRAC_2_PI) + splat(ROUND);
     let quadrant: i64x2 = cast(shifted);
     let n = shifted - splat(ROUND);
-    let r = ((x - n * splat(HALF_PI[0])) - n * splat(HALF_PI[1])) - n * splat(HALF_PI[2]);
+    let r = ((x - n * HALF_PI[0]) - n * HALF_PI[1]) - n * HALF_PI[2];
     let z = r * r;
-    let sin = |c: [f64; 6]| c[1..].iter().fold(splat(c[0]), |sum, a| sum * z + splat(*a));
-    let s = r + r * z * sin(SIN);
-    let c = splat(1.0) - (z * splat(0.5) - z * z * sin(COS));
+    let poly = |c: &[f64x2; 6]| ((((c[0] * z + c[1]) * z + c[2]) * z + c[3]) * z + c[4]) * z + c[5];
+    let s = r + r * z * poly(&SIN);
+    let c = splat(1.0) - (z * splat(0.5) - z * z * poly(&COS));
     // Odd quadrants swap; bit 1 of n and of n + 1 is the sign.
     let odd: f64x2 = cast(i64x2::ZERO - (quadrant & i64x2::splat(1)));
     let swapped = (s ^ c) & odd;
@@ -88,24 +90,35 @@ fn far(x: f64x2) -> (f64x2, f64x2) {
     (f64x2::new([a.0, b.0]), f64x2::new([a.1, b.1]))
 }
 
+/// The same constants in both lanes.
+const fn both<const N: usize>(values: [f64; N]) -> [f64x2; N] {
+    let mut out = [f64x2::ZERO; N];
+    let mut i = 0;
+    while i < N {
+        out[i] = f64x2::new([values[i]; 2]);
+        i += 1;
+    }
+    out
+}
+
 /// π/2 in three parts; the first two have 31 bits, so that their products with n < 2²² are exact.
-const HALF_PI: [f64; 3] = [1.570_796_326_734_125_6, 6.077_100_503_593_46e-11, 2.912_732_056_093_356e-20];
-const SIN: [f64; 6] = [
+const HALF_PI: [f64x2; 3] = both([1.570_796_326_734_125_6, 6.077_100_503_593_46e-11, 2.912_732_056_093_356e-20]);
+const SIN: [f64x2; 6] = both([
     1.589_623_015_765_465_6e-10,
     -2.505_074_776_285_780_7e-8,
     2.755_731_362_138_572_2e-6,
     -1.984_126_982_958_953_9e-4,
     8.333_333_333_322_118e-3,
     -1.666_666_666_666_663e-1,
-];
-const COS: [f64; 6] = [
+]);
+const COS: [f64x2; 6] = both([
     -1.135_853_652_138_768_2e-11,
     2.087_570_084_197_473e-9,
     -2.755_731_417_929_673_9e-7,
     2.480_158_728_885_170_5e-5,
     -1.388_888_888_887_305_6e-3,
     4.166_666_666_666_659e-2,
-];
+]);
 
 #[cfg(test)]
 mod tests {

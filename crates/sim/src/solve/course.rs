@@ -1,6 +1,7 @@
 //! What every method shares: segments between events, contacts, log times, the count of work.
 
 use super::{Observer, Settings, Stats, Stopped};
+use crate::lanes::{LANES, f64x2, pairs};
 use crate::model::{Model, Workspace};
 
 /// Times closer than this are the same moment, s.
@@ -77,6 +78,8 @@ pub struct Course<'m> {
     contacts: Vec<Contact>,
     /// Whether N > 0 at the end of the last step, per handle; for methods that locate nothing.
     touching: Vec<bool>,
+    /// What makes a margin of N*, by pairs: ±1 and 0, or 0 and ∞ for a handle without events.
+    watch: Vec<(f64x2, f64x2)>,
     locate: bool,
     /// Last event of each handle and how many came at nearly the same moment.
     recent: Vec<(f64, u32)>,
@@ -105,6 +108,7 @@ impl<'m> Course<'m> {
             switch_s: f64::INFINITY,
             contacts: vec![Contact::Clamped; n],
             touching: vec![false; n],
+            watch: vec![(f64x2::ZERO, f64x2::splat(f64::INFINITY)); pairs(n)],
             locate,
             recent: vec![(f64::NEG_INFINITY, 0); n],
             most_evaluations: settings.most_evaluations,
@@ -157,7 +161,7 @@ impl<'m> Course<'m> {
         // Within a rounding of an opening, N = N* can be a hair below zero.
         if self.model.watches_contact() {
             for p in &mut self.w.pair {
-                p.normal = p.normal.fast_max(crate::lanes::f64x2::ZERO);
+                p.normal = p.normal.fast_max(f64x2::ZERO);
             }
         }
         if observer.sample(t_s, y, &self.w) { Ok(()) } else { Err(Stopped::ByObserver { t_s }) }
@@ -170,19 +174,21 @@ impl<'m> Course<'m> {
         self.model.rhs(t_s, y, dy, &mut self.w);
     }
 
+    /// The right-hand side at the present state.
+    pub fn slope(&mut self, dy: &mut [f64]) {
+        self.stats.evaluations += 1;
+        self.model.rhs(self.t_s, &self.y, dy, &mut self.w);
+    }
+
     /// How far the contacts are from an event at the last evaluation: negative when one has happened, N.
     #[inline]
     pub fn margin_n(&self) -> f64 {
-        let mut least = f64::INFINITY;
-        for (i, contact) in self.contacts.iter().enumerate() {
-            let free = self.w.of(i, |p| p.unclamped);
-            least = least.min(match contact {
-                Contact::Closed => free,
-                Contact::Open => -free,
-                Contact::Clamped => f64::INFINITY,
-            });
+        let mut least = f64x2::splat(f64::INFINITY);
+        for (p, (sense, never)) in self.w.pair.iter().zip(&self.watch) {
+            least = least.fast_min(p.unclamped * *sense + *never);
         }
-        least
+        let [a, b] = least.to_array();
+        a.min(b)
     }
 
     /// The margin at a state between steps, N.
@@ -230,17 +236,23 @@ impl<'m> Course<'m> {
     pub fn fire(&mut self, observer: &mut dyn Observer) {
         self.model.forces(self.t_s, &self.y, &mut self.w);
         self.stats.evaluations += 1;
+        // The located zero is one to rounding: its handle may be a hair short of it.
+        let edge = self.margin_n().max(0.0);
         for i in 0..self.contacts.len() {
             let free = self.w.of(i, |p| p.unclamped);
             let (kind, next) = match self.contacts[i] {
-                Contact::Closed if free <= 0.0 => (EventKind::ContactOpened, Contact::Open),
-                Contact::Open if free >= 0.0 => (EventKind::ContactClosed, Contact::Closed),
+                Contact::Closed if free <= edge => (EventKind::ContactOpened, Contact::Open),
+                Contact::Open if -free <= edge => (EventKind::ContactClosed, Contact::Closed),
                 _ => continue,
             };
             let (last_s, count) = self.recent[i];
             let count = if self.t_s - last_s < 1e-9 { count + 1 } else { 0 };
             self.recent[i] = (self.t_s, count);
             self.set_contact(i, if count >= CHATTER { Contact::Clamped } else { next });
+            // What rounding leaves on the wrong side of the zero is the zero of the new segment.
+            let (sense, zero) = &mut self.watch[i / LANES];
+            let short = (sense.as_array()[i % LANES] * free).min(0.0);
+            zero.as_mut_array()[i % LANES] -= short;
             self.changed(i, kind, observer);
         }
     }
@@ -297,6 +309,13 @@ impl<'m> Course<'m> {
         };
         *self.w.of_mut(i, |p| &mut p.contact_gain) = gain;
         *self.w.of_mut(i, |p| &mut p.contact_floor) = floor;
+        let (sense, never) = match contact {
+            Contact::Closed => (1.0, 0.0),
+            Contact::Open => (-1.0, 0.0),
+            Contact::Clamped => (0.0, f64::INFINITY),
+        };
+        self.watch[i / LANES].0.as_mut_array()[i % LANES] = sense;
+        self.watch[i / LANES].1.as_mut_array()[i % LANES] = never;
     }
 
     fn note_unlocated(&mut self, observer: &mut dyn Observer) {

@@ -3,7 +3,7 @@
 //! Source: Hairer, Nørsett, Wanner, Solving Ordinary Differential Equations I, 2nd ed. (1993), II.5 and II.6, and the
 //! program dop853.f by the same authors; the digits are those of `scipy.integrate._ivp.dop853_coefficients` (BSD-3-Clause).
 
-use super::pair::{Pair, Row, Stages};
+use super::pair::{Arithmetic, Pair, Polynomial, Row, Slopes, TILE, sum};
 
 pub struct Dop853;
 
@@ -44,38 +44,49 @@ impl Pair for Dop853 {
     ];
     const C_DENSE: &'static [f64] = &[0.1, 0.2, 0.7777777777777778];
 
-    /// |e₅|²/√(|e₅|² + 0.01 |e₃|²), the authors' combination: of order 8, and alive where e₅ vanishes by chance.
     #[inline(always)]
-    fn error(h: f64, k: &Stages, scale: &[f64]) -> f64 {
-        let (mut five, mut three) = (0.0, 0.0);
-        for (d, s) in scale.iter().enumerate() {
-            let (a, b) = (k.sum(E5, d) / s, k.sum(E3, d) / s);
-            five += a * a;
-            three += b * b;
-        }
-        let below = (five + 0.01 * three) * scale.len() as f64;
-        if below > 0.0 { h.abs() * five / below.sqrt() } else { below }
+    fn last_term(theta: f64) -> f64 {
+        let rest = 1.0 - theta;
+        theta.powi(4) * rest.powi(3)
     }
 
-    fn dense(h: f64, y0: &[f64], y1: &[f64], k: &Stages, out: &mut [Vec<f64>]) {
-        let (f0, f1) = (k.get(0), k.get(12));
-        for d in 0..y0.len() {
-            let dy = y1[d] - y0[d];
-            out[0][d] = dy;
-            out[1][d] = h * f0[d] - dy;
-            out[2][d] = 2.0 * dy - h * (f1[d] + f0[d]);
-            for (row, coefficients) in out[3..].iter_mut().zip(D) {
-                row[d] = h * k.sum(coefficients, d);
+    #[inline(always)]
+    fn errors<F: Arithmetic>(k: &Slopes) -> [[f64; TILE]; 2] {
+        [sum::<F>(E5, k), sum::<F>(E3, k)]
+    }
+
+    /// |e₅|²/√(|e₅|² + 0.01 |e₃|²), the authors' combination: of order 8, and alive where e₅ vanishes by chance.
+    #[inline(always)]
+    fn error(h: f64, [five, three]: [f64; 2], count: f64) -> f64 {
+        let below = (five + 0.01 * three) * count;
+        if below > 0.0 { h * five / below.sqrt() } else { below }
+    }
+
+    #[inline(always)]
+    fn dense<F: Arithmetic>(h: f64, y0: &[f64; TILE], y1: &[f64; TILE], k: &Slopes, out: &mut Polynomial) {
+        let high = [sum::<F>(D[0], k), sum::<F>(D[1], k), sum::<F>(D[2], k), sum::<F>(D[3], k)];
+        for l in 0..TILE {
+            let dy = y1[l] - y0[l];
+            let (f0, f1) = (k[0][l], k[12][l]);
+            out[0][l] = dy;
+            out[1][l] = h * f0 - dy;
+            out[2][l] = 2.0 * dy - h * (f1 + f0);
+            for (row, sum) in out[3..].iter_mut().zip(&high) {
+                row[l] = h * sum[l];
             }
         }
     }
 
-    fn interpolate(theta: f64, y0: &[f64], rows: &[Vec<f64>], out: &mut [f64]) {
+    #[inline(always)]
+    fn interpolate<F: Arithmetic>(theta: f64, y0: &[f64; TILE], r: &Polynomial) -> [f64; TILE] {
         let rest = 1.0 - theta;
-        for (d, o) in out.iter_mut().enumerate() {
-            let r = |i: usize| rows[i][d];
-            let inner = r(3) + theta * (r(4) + rest * (r(5) + theta * r(6)));
-            *o = y0[d] + theta * (r(0) + rest * (r(1) + theta * (r(2) + rest * inner)));
+        let mut out = [0.0; TILE];
+        for l in 0..TILE {
+            let inner = F::madd(rest, F::madd(theta, r[6][l], r[5][l]), r[4][l]);
+            let inner = F::madd(rest, F::madd(theta, inner, r[3][l]), r[2][l]);
+            let inner = F::madd(rest, F::madd(theta, inner, r[1][l]), r[0][l]);
+            out[l] = F::madd(theta, inner, y0[l]);
         }
+        out
     }
 }

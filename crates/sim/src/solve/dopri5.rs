@@ -2,7 +2,7 @@
 //!
 //! Source: Dormand & Prince, J. Comput. Appl. Math. 6 (1980), 19–26; dense output: Hairer, Nørsett, Wanner (1993), II.6.
 
-use super::pair::{Pair, Row, Stages, rms};
+use super::pair::{Arithmetic, Pair, Polynomial, Row, Slopes, TILE, sum};
 
 pub struct Dopri5;
 
@@ -43,27 +43,43 @@ impl Pair for Dopri5 {
     const C_DENSE: &'static [f64] = &[];
 
     #[inline(always)]
-    fn error(h: f64, k: &Stages, scale: &[f64]) -> f64 {
-        rms(scale, |d| h * k.sum(E, d))
+    fn last_term(theta: f64) -> f64 {
+        // The cubic Hermite part is of order 3, the last row lifts it to 4.
+        (theta * (1.0 - theta)).powi(2)
     }
 
-    fn dense(h: f64, y0: &[f64], y1: &[f64], k: &Stages, out: &mut [Vec<f64>]) {
-        let (f0, f1) = (k.get(0), k.get(6));
-        for d in 0..y0.len() {
-            let dy = y1[d] - y0[d];
-            let bump = h * f0[d] - dy;
-            out[0][d] = dy;
-            out[1][d] = bump;
-            out[2][d] = dy - h * f1[d] - bump;
-            out[3][d] = h * k.sum(D, d);
+    #[inline(always)]
+    fn errors<F: Arithmetic>(k: &Slopes) -> [[f64; TILE]; 2] {
+        [sum::<F>(E, k), [0.0; TILE]]
+    }
+
+    #[inline(always)]
+    fn error(h: f64, squares: [f64; 2], count: f64) -> f64 {
+        h * (squares[0] / count).sqrt()
+    }
+
+    #[inline(always)]
+    fn dense<F: Arithmetic>(h: f64, y0: &[f64; TILE], y1: &[f64; TILE], k: &Slopes, out: &mut Polynomial) {
+        let last = sum::<F>(D, k);
+        for l in 0..TILE {
+            let dy = y1[l] - y0[l];
+            let bump = h * k[0][l] - dy;
+            out[0][l] = dy;
+            out[1][l] = bump;
+            out[2][l] = dy - h * k[6][l] - bump;
+            out[3][l] = h * last[l];
         }
     }
 
-    fn interpolate(theta: f64, y0: &[f64], rows: &[Vec<f64>], out: &mut [f64]) {
+    #[inline(always)]
+    fn interpolate<F: Arithmetic>(theta: f64, y0: &[f64; TILE], r: &Polynomial) -> [f64; TILE] {
         let rest = 1.0 - theta;
-        for (d, o) in out.iter_mut().enumerate() {
-            let r = |i: usize| rows[i][d];
-            *o = y0[d] + theta * (r(0) + rest * (r(1) + theta * (r(2) + rest * r(3))));
+        let mut out = [0.0; TILE];
+        for l in 0..TILE {
+            let inner = F::madd(rest, r[3][l], r[2][l]);
+            let inner = F::madd(theta, inner, r[1][l]);
+            out[l] = F::madd(theta, F::madd(rest, inner, r[0][l]), y0[l]);
         }
+        out
     }
 }

@@ -40,9 +40,7 @@ fn integrate<S: Step>(course: &mut Course, step_s: f64, observer: &mut dyn Obser
         let h = (stop - begin) / steps;
         for i in 0..steps as u64 {
             let t0 = course.t_s;
-            let y = std::mem::take(&mut course.y);
-            course.rhs(t0, &y, &mut f0);
-            course.y = y;
+            course.slope(&mut f0);
             method.step(course, h, &f0, &mut y1);
             let t1 = if i + 1 == steps as u64 { stop } else { begin + (i + 1) as f64 * h };
             if course.sample_due(t1 - 2.0 * SAME_MOMENT_S).is_some() {

@@ -1,17 +1,61 @@
 //! Adaptive embedded Runge–Kutta pairs with dense output and located contact events.
 //!
 //! A step is taken with every contact frozen as it was at its start, so the method sees a smooth right-hand side. Each
-//! stage gives the contacts' margins for nothing; when one is negative anywhere in an accepted step, dense output is
-//! searched for the first zero, the step is cut there, and the contact changes. An event fires on (t₀, t₁]; the state at
-//! the event has a margin that is zero or past it, so the next step does not find the same zero again. The step size is
-//! controlled by a PI controller: Hairer, Nørsett, Wanner, Solving ODEs I (1993), II.4 and IV.2.
+//! stage gives the contacts' margins for nothing; when they say that one has passed zero, or may have between two stages,
+//! [`super::events`] looks for the first zero, the step is cut there, and the contact changes. The step size follows a
+//! PI controller: Hairer, Nørsett, Wanner, Solving ODEs I (1993), II.4 and IV.2.
+//!
+//! Dense output is of lower order than the step. Where the last term of its polynomial is not small against the tolerance,
+//! the state between steps is not read off the polynomial but stepped to, so a sample is as good as a step.
+//!
+//! States are held in tiles of [`TILE`] numbers, and the sums over stages are unrolled for each row of the tableau: no
+//! allocation, no index check and no loop over coefficients is left inside a step.
 
 use super::course::{Course, SAME_MOMENT_S};
+use super::events::{self, Looks};
 use super::{Observer, Settings, Stats, Stopped};
 use crate::model::Model;
 
 /// Coefficients `(stage, a)` of one stage, zeros left out.
 pub type Row = &'static [(usize, f64)];
+
+/// Numbers that are treated together.
+pub const TILE: usize = 16;
+type Tile = [f64; TILE];
+
+/// Most stages that a method may have, those for dense output and the slope at the end included.
+const MOST_STAGES: usize = 16;
+/// The stages of one tile.
+pub type Slopes = [Tile; MOST_STAGES];
+
+/// Most coefficients of a dense polynomial per state.
+const MOST_ROWS: usize = 7;
+/// The dense polynomial of one tile.
+pub type Polynomial = [Tile; MOST_ROWS];
+
+/// a·b + c, fused or not.
+pub trait Arithmetic {
+    /// a·b + c
+    fn madd(a: f64, b: f64, c: f64) -> f64;
+}
+
+/// Two roundings; what every processor does fast.
+pub struct Plain;
+impl Arithmetic for Plain {
+    #[inline(always)]
+    fn madd(a: f64, b: f64, c: f64) -> f64 {
+        a * b + c
+    }
+}
+
+/// One rounding; fast only where the processor has the instruction.
+pub struct Fused;
+impl Arithmetic for Fused {
+    #[inline(always)]
+    fn madd(a: f64, b: f64, c: f64) -> f64 {
+        a.mul_add(b, c)
+    }
+}
 
 /// A pair, as data.
 pub trait Pair {
@@ -35,70 +79,37 @@ pub trait Pair {
     const EXPONENT: f64;
     /// Coefficients of the dense polynomial needed per state.
     const DENSE_ROWS: usize;
+    /// The size at `theta` of the polynomial's last term, whose coefficient is the last row.
+    fn last_term(theta: f64) -> f64;
 
-    /// Error of the step in units of the tolerance (root mean square over `scale.len()` states), given the stages.
-    fn error(h: f64, k: &Stages, scale: &[f64]) -> f64;
-    /// Prepares the dense polynomial.
-    fn dense(h: f64, y0: &[f64], y1: &[f64], k: &Stages, out: &mut [Vec<f64>]);
+    /// Two error estimates of a tile, per unit of h.
+    fn errors<F: Arithmetic>(k: &Slopes) -> [Tile; 2];
+    /// The error of a step of size h from the sums of squares of both estimates over `count` states, in units of the tolerance.
+    fn error(h: f64, squares: [f64; 2], count: f64) -> f64;
+    /// Prepares the dense polynomial of a tile.
+    fn dense<F: Arithmetic>(h: f64, y0: &Tile, y1: &Tile, k: &Slopes, out: &mut Polynomial);
     /// Evaluates it at `theta` in 0…1.
-    fn interpolate(theta: f64, y0: &[f64], rows: &[Vec<f64>], out: &mut [f64]);
+    fn interpolate<F: Arithmetic>(theta: f64, y0: &Tile, rows: &Polynomial) -> Tile;
 }
 
-/// Stage derivatives k_i.
-pub struct Stages {
-    k: Vec<Vec<f64>>,
-}
-
-impl Stages {
-    fn new(stages: usize, size: usize) -> Self {
-        Self { k: vec![vec![0.0; size]; stages] }
-    }
-
-    /// k_i
-    #[inline(always)]
-    pub fn get(&self, i: usize) -> &[f64] {
-        &self.k[i]
-    }
-
-    /// Σ a_j k_j of state `d`.
-    #[inline(always)]
-    pub fn sum(&self, row: Row, d: usize) -> f64 {
-        row.iter().map(|&(j, a)| a * self.k[j][d]).sum()
-    }
-
-    /// out = y + h Σ a_j k_j
-    #[inline(always)]
-    fn advance(&self, y: &[f64], h: f64, row: Row, out: &mut [f64]) {
-        let n = out.len();
-        let y = &y[..n];
-        out.copy_from_slice(y);
-        // Row by row over contiguous states: each pass is a vector multiply-add.
-        for &(j, a) in row {
-            let ha = h * a;
-            for (o, k) in out.iter_mut().zip(&self.k[j][..n]) {
-                *o += ha * k;
-            }
+/// Σ a_j k_j over a row that is known when the program is compiled.
+#[inline(always)]
+pub fn sum<F: Arithmetic>(row: Row, k: &Slopes) -> Tile {
+    let mut out = [0.0; TILE];
+    for &(j, a) in row {
+        for l in 0..TILE {
+            out[l] = F::madd(a, k[j][l], out[l]);
         }
     }
-}
-
-/// Root mean square of `e_d / scale_d`.
-#[inline(always)]
-pub fn rms(scale: &[f64], e: impl Fn(usize) -> f64) -> f64 {
-    let mut sum = 0.0;
-    for (d, s) in scale.iter().enumerate() {
-        let x = e(d) / s;
-        sum += x * x;
-    }
-    (sum / scale.len() as f64).sqrt()
+    out
 }
 
 const SAFETY: f64 = 0.9;
 const SHRINK: f64 = 0.2;
 const GROW: f64 = 6.0;
 const SMALLEST_STEP_S: f64 = 1e-13;
-/// Most points at which a suspicious step is looked at before its dense output is believed to have no event.
-const LOOKS: usize = 8;
+/// The last term of the dense polynomial may be so many times the tolerance; its error is well below its last term.
+const TRUST: f64 = 10.0;
 
 /// Integrates a model with pair `P`; with `EVENTS` contacts are frozen within a step and their changes located.
 pub fn run<P: Pair, const EVENTS: bool>(
@@ -106,224 +117,362 @@ pub fn run<P: Pair, const EVENTS: bool>(
     settings: &Settings,
     observer: &mut dyn Observer,
 ) -> (Stats, Result<(), Stopped>) {
-    let mut course = Course::new(model, P::NAME, settings, EVENTS);
-    let outcome = integrate::<P, EVENTS>(&mut course, settings, observer);
-    (course.stats, outcome)
+    let mut run = Run::<P, EVENTS>::new(model, settings);
+    #[cfg(target_arch = "x86_64")]
+    if is_x86_feature_detected!("avx2") && is_x86_feature_detected!("fma") {
+        // SAFETY: the processor has just been asked for both features, all that the callee requires.
+        #[allow(unsafe_code)]
+        let outcome = unsafe { integrate_fused(&mut run, observer) };
+        return (run.course.stats, outcome);
+    }
+    let outcome = run.integrate::<Plain>(observer);
+    (run.course.stats, outcome)
 }
 
-fn integrate<P: Pair, const EVENTS: bool>(
-    course: &mut Course,
-    settings: &Settings,
+#[cfg(target_arch = "x86_64")]
+#[target_feature(enable = "avx2,fma")]
+fn integrate_fused<P: Pair, const EVENTS: bool>(
+    run: &mut Run<'_, P, EVENTS>,
     observer: &mut dyn Observer,
 ) -> Result<(), Stopped> {
-    let size = course.y.len();
-    let watched = course.model.layout().ledger_range().start;
-    let units: Vec<f64> = {
-        let mut units = course.model.freedoms().scales().to_vec();
-        units.resize(watched, 1.0);
-        units
-    };
-    let mut k = Stages::new(P::STAGES + 1 + P::DENSE_STAGES, size);
-    let mut trial = vec![0.0; size];
-    let mut y1 = vec![0.0; size];
-    let mut at = vec![0.0; size];
-    let mut dense = vec![vec![0.0; size]; P::DENSE_ROWS];
-    let mut scale = vec![0.0; watched];
-    let last = P::STAGES;
+    run.integrate::<Fused>(observer)
+}
 
-    let y0 = course.y.clone();
-    while course.sample_due(course.t_s).is_some() {
-        course.sample(&y0, observer)?;
+/// A run and its buffers, all of whole tiles.
+struct Run<'m, P, const EVENTS: bool> {
+    course: Course<'m>,
+    tolerance: f64,
+    /// Stages by tile.
+    k: Vec<Slopes>,
+    dense: Vec<Polynomial>,
+    /// The state at which a stage is evaluated, and its slope.
+    trial: Vec<f64>,
+    slope: Vec<f64>,
+    y1: Vec<f64>,
+    /// A state between steps.
+    at: Vec<f64>,
+    /// 1/unit of each state that the error norm watches, 0 for the others.
+    weight: Vec<Tile>,
+    /// How far the unit grows with the state: 1 or 0.
+    relative: Vec<Tile>,
+    watched: f64,
+    looks: Looks,
+    method: std::marker::PhantomData<P>,
+}
+
+fn tiles(y: &[f64]) -> &[Tile] {
+    y.as_chunks().0
+}
+
+fn tiles_mut(y: &mut [f64]) -> &mut [Tile] {
+    y.as_chunks_mut().0
+}
+
+/// A row, empty for a stage that the method does not have.
+const fn row<P: Pair>(stage: usize) -> Row {
+    if stage == P::STAGES {
+        P::B
+    } else if stage > 0 && stage < P::STAGES {
+        P::A[stage - 1]
+    } else if stage > P::STAGES && stage <= P::STAGES + P::DENSE_STAGES {
+        P::A_DENSE[stage - P::STAGES - 1]
+    } else {
+        &[]
     }
-    let (t, y) = (course.t_s, course.y.clone());
-    course.rhs(t, &y, &mut k.k[0]);
-    let mut h_next = first_step(&y, k.get(0), &units, settings.tolerance, course.stop_s());
-    let mut error_before: f64 = 1e-4;
-    let mut rejected_before = false;
+}
 
-    while !course.finished() {
-        let t0 = course.t_s;
-        let left = course.stop_s() - t0;
-        // A remainder of a whole step or little more is taken in one; one of up to two steps in two equal halves.
-        let mut h = if left <= h_next * 1.01 {
-            left
-        } else if left < 2.0 * h_next {
-            0.5 * left
-        } else {
-            h_next
+/// c of a stage; that of the slope at the end is 1.
+const fn time<P: Pair>(stage: usize) -> f64 {
+    if stage < P::STAGES {
+        P::C[stage]
+    } else if stage > P::STAGES && stage <= P::STAGES + P::DENSE_STAGES {
+        P::C_DENSE[stage - P::STAGES - 1]
+    } else {
+        1.0
+    }
+}
+
+macro_rules! stages {
+    ($run:ident, $h:ident, $from:expr, $to:expr, [$($i:literal)*]) => {
+        $(if $i >= $from && $i < $to {
+            $run.stage::<F, $i>($h);
+        })*
+    };
+}
+
+impl<'m, P: Pair, const EVENTS: bool> Run<'m, P, EVENTS> {
+    fn new(model: &'m Model, settings: &Settings) -> Self {
+        let course = Course::new(model, P::NAME, settings, EVENTS);
+        let size = course.y.len().next_multiple_of(TILE);
+        let count = size / TILE;
+        let (mut weight, mut relative) = (vec![[0.0; TILE]; count], vec![[0.0; TILE]; count]);
+        let (body, watched) = (model.layout().body, model.layout().ledger_range().start);
+        for d in 0..watched {
+            // Phases grow without bound and mean nothing modulo a turn: they are held absolutely, the body relatively too.
+            weight.as_flattened_mut()[d] = if d < body { 1.0 / model.freedoms().scales()[d] } else { 1.0 };
+            relative.as_flattened_mut()[d] = if d < body { weight.as_flattened()[d] } else { 0.0 };
+        }
+        let mut run = Self {
+            course,
+            tolerance: settings.tolerance,
+            k: vec![[[0.0; TILE]; MOST_STAGES]; count],
+            dense: vec![[[0.0; TILE]; MOST_ROWS]; count],
+            trial: vec![0.0; size],
+            slope: vec![0.0; size],
+            y1: vec![0.0; size],
+            at: vec![0.0; size],
+            weight,
+            relative,
+            watched: watched as f64,
+            looks: Looks::new(),
+            method: std::marker::PhantomData,
         };
-        let error = loop {
-            if h < SMALLEST_STEP_S && h < left {
-                return Err(Stopped::StepTooSmall { method: P::NAME, t_s: t0, step_s: h, tolerance: settings.tolerance });
-            }
-            let mut margin = f64::INFINITY;
-            for i in 1..P::STAGES {
-                k.advance(&course.y, h, P::A[i - 1], &mut trial);
-                course.rhs(t0 + P::C[i] * h, &trial, &mut k.k[i]);
-                if EVENTS {
-                    margin = margin.min(course.margin_n());
+        run.course.y.resize(size, 0.0);
+        run
+    }
+
+    #[inline(always)]
+    fn integrate<F: Arithmetic>(&mut self, observer: &mut dyn Observer) -> Result<(), Stopped> {
+        while self.course.sample_due(self.course.t_s).is_some() {
+            self.at.copy_from_slice(&self.course.y);
+            self.course.sample(&self.at, observer)?;
+        }
+        self.begin();
+        let mut h_next = self.first_step();
+        let mut error_before: f64 = 1e-4;
+        let mut rejected_before = false;
+        while !self.course.finished() {
+            let t0 = self.course.t_s;
+            let left = self.course.stop_s() - t0;
+            // A remainder of a whole step or little more is taken in one; one of up to two steps in two equal halves.
+            let mut h = if left <= h_next * 1.01 {
+                left
+            } else if left < 2.0 * h_next {
+                0.5 * left
+            } else {
+                h_next
+            };
+            let error = loop {
+                if h < SMALLEST_STEP_S && h < left {
+                    let (t_s, step_s) = (t0, h);
+                    return Err(Stopped::StepTooSmall { method: P::NAME, t_s, step_s, tolerance: self.tolerance });
                 }
-            }
-            k.advance(&course.y, h, P::B, &mut y1);
-            let t1 = if h == left { course.stop_s() } else { t0 + h };
-            course.rhs(t1, &y1, &mut k.k[last]);
-            if EVENTS {
-                margin = margin.min(course.margin_n());
-            }
-            for d in 0..watched {
-                scale[d] = settings.tolerance * (units[d] + relative_part(course, d, course.y[d].abs().max(y1[d].abs())));
-            }
-            let error = P::error(h, &k, &scale);
-            if error <= 1.0 {
-                if EVENTS && margin < 0.0 {
-                    prepare::<P>(course, t0, h, &mut k, &y1, &mut trial, &mut dense);
-                    if let Some(theta) = first_event::<P>(course, t0, h, &dense, &mut at) {
-                        let t_event = t0 + theta * h;
-                        emit::<P>(course, t0, h, t_event, &dense, &mut at, observer)?;
-                        P::interpolate(theta, &course.y, &dense, &mut at);
-                        course.y.copy_from_slice(&at);
-                        course.arrive(t_event, observer)?;
-                        course.fire(observer);
-                        break None;
+                let error = self.step::<F>(h);
+                if error <= 1.0 {
+                    break error;
+                }
+                self.course.stats.rejected += 1;
+                rejected_before = true;
+                h *= if error.is_finite() { (SAFETY * error.powf(-P::EXPONENT)).clamp(SHRINK, 1.0) } else { SHRINK };
+                h_next = h;
+            };
+            let mut t1 = if h == left { self.course.stop_s() } else { t0 + h };
+            let moved = loop {
+                match self.close::<F>(h, t1, observer)? {
+                    // The polynomial is too rough to hold an event there: step to just beyond it, where it is exact.
+                    Moved::Nowhere(theta) => {
+                        h *= (1.001 * theta).min(0.9);
+                        t1 = t0 + h;
+                        self.step::<F>(h);
                     }
-                    emit::<P>(course, t0, h, t1 - 2.0 * SAME_MOMENT_S, &dense, &mut at, observer)?;
-                } else if course.sample_due(t1 - 2.0 * SAME_MOMENT_S).is_some() {
-                    prepare::<P>(course, t0, h, &mut k, &y1, &mut trial, &mut dense);
-                    emit::<P>(course, t0, h, t1 - 2.0 * SAME_MOMENT_S, &dense, &mut at, observer)?;
+                    moved => break moved,
                 }
-                course.y.copy_from_slice(&y1);
-                let switch = t1 >= course.stop_s();
-                while course.sample_due(t1).is_some() {
-                    course.sample(&y1, observer)?;
-                }
-                course.arrive(t1, observer)?;
-                if !switch {
-                    k.k.swap(0, last);
-                }
-                break Some((error, switch));
+            };
+            let e = error.max(1e-10);
+            let factor = SAFETY * e.powf(-P::EXPONENT * 0.8) * error_before.powf(P::EXPONENT * 0.2);
+            let factor = factor.clamp(SHRINK, if rejected_before || moved == Moved::Event { 1.0 } else { GROW });
+            // A step that was cut to meet a moment says nothing against a longer one.
+            h_next = if h < h_next { h_next.max(h * factor) } else { h * factor };
+            error_before = e.max(1e-4);
+            rejected_before = false;
+            if moved != Moved::On && !self.course.finished() {
+                self.begin();
             }
-            course.stats.rejected += 1;
-            rejected_before = true;
-            h *= if error.is_finite() { (SAFETY * error.powf(-P::EXPONENT)).clamp(SHRINK, 1.0) } else { SHRINK };
-            h_next = h;
+        }
+        Ok(())
+    }
+
+    /// The first slope after a switch or an event.
+    fn begin(&mut self) {
+        self.course.slope(&mut self.slope);
+        for (k, slope) in self.k.iter_mut().zip(tiles(&self.slope)) {
+            k[0] = *slope;
+        }
+    }
+
+    /// A first step: a tenth of the time in which the state would change by one unit, at tolerance 1; the error refines it.
+    fn first_step(&self) -> f64 {
+        let speed = self.norm(|tile, l| self.k[tile][0][l], 1.0);
+        let h = 0.1 * self.tolerance.powf(0.125) / speed.max(1e-3);
+        h.clamp(1e-9, (self.course.stop_s() - self.course.t_s).max(1e-9))
+    }
+
+    /// Root mean square in units of `tolerance` over the watched states.
+    #[inline(always)]
+    fn norm(&self, of: impl Fn(usize, usize) -> f64, tolerance: f64) -> f64 {
+        let mut total = 0.0;
+        for (tile, y) in tiles(&self.course.y).iter().enumerate() {
+            for l in 0..TILE {
+                let x = of(tile, l) * self.weight[tile][l] / (1.0 + self.relative[tile][l] * y[l].abs());
+                total += x * x;
+            }
+        }
+        (total / self.watched).sqrt() / tolerance
+    }
+
+    /// Stage `I` of a step of size h: its state from the earlier stages, its slope from the model.
+    #[inline(always)]
+    fn stage<F: Arithmetic, const I: usize>(&mut self, h: f64) {
+        let into = if I == P::STAGES { &mut self.y1 } else { &mut self.trial };
+        for ((k, y), out) in self.k.iter().zip(tiles(&self.course.y)).zip(tiles_mut(into)) {
+            let sum = sum::<F>(const { row::<P>(I) }, k);
+            for l in 0..TILE {
+                out[l] = F::madd(h, sum[l], y[l]);
+            }
+        }
+        let t = self.course.t_s + const { time::<P>(I) } * h;
+        self.course.rhs(t, into, &mut self.slope);
+        for (k, slope) in self.k.iter_mut().zip(tiles(&self.slope)) {
+            k[I] = *slope;
+        }
+        if EVENTS && I <= P::STAGES {
+            self.looks.note(const { time::<P>(I) }, self.course.margin_n());
+        }
+    }
+
+    /// A step of size h from the present state into `y1`; its error in units of the tolerance.
+    #[inline(always)]
+    fn step<F: Arithmetic>(&mut self, h: f64) -> f64 {
+        if EVENTS {
+            self.looks.clear();
+        }
+        stages!(self, h, 1, P::STAGES + 1, [1 2 3 4 5 6 7 8 9 10 11 12 13 14 15]);
+        let mut squares = [0.0; 2];
+        let states = tiles(&self.course.y).iter().zip(tiles(&self.y1));
+        for ((k, (y0, y1)), (weight, relative)) in self.k.iter().zip(states).zip(self.weight.iter().zip(&self.relative)) {
+            let [a, b] = P::errors::<F>(k);
+            let mut tile = [[0.0; TILE]; 2];
+            for l in 0..TILE {
+                let w = weight[l] / F::madd(relative[l], y0[l].abs().max(y1[l].abs()), 1.0);
+                tile[0][l] = (a[l] * w) * (a[l] * w);
+                tile[1][l] = (b[l] * w) * (b[l] * w);
+            }
+            for (square, tile) in squares.iter_mut().zip(tile) {
+                *square += tile.into_iter().sum::<f64>();
+            }
+        }
+        P::error(h, squares, self.watched) / self.tolerance
+    }
+
+    /// Hands over what lies within an accepted step and moves to its end, or to the first event.
+    #[inline(always)]
+    fn close<F: Arithmetic>(&mut self, h: f64, t1: f64, observer: &mut dyn Observer) -> Result<Moved, Stopped> {
+        let inner = t1 - 2.0 * SAME_MOMENT_S;
+        let suspicious = EVENTS && self.looks.suspicious();
+        if suspicious || self.course.sample_due(inner).is_some() {
+            return self.close_with_care::<F>(h, t1, suspicious, observer);
+        }
+        self.arrive_at_y1(t1, observer)
+    }
+
+    #[inline(always)]
+    fn arrive_at_y1(&mut self, t1: f64, observer: &mut dyn Observer) -> Result<Moved, Stopped> {
+        std::mem::swap(&mut self.course.y, &mut self.y1);
+        let switched = t1 >= self.course.stop_s();
+        while self.course.sample_due(t1).is_some() {
+            self.at.copy_from_slice(&self.course.y);
+            self.course.sample(&self.at, observer)?;
+        }
+        self.course.arrive(t1, observer)?;
+        if switched {
+            return Ok(Moved::Switched);
+        }
+        for k in &mut self.k {
+            k[0] = k[P::STAGES];
+        }
+        Ok(Moved::On)
+    }
+
+    #[inline(always)]
+    fn close_with_care<F: Arithmetic>(
+        &mut self,
+        h: f64,
+        t1: f64,
+        suspicious: bool,
+        observer: &mut dyn Observer,
+    ) -> Result<Moved, Stopped> {
+        let t0 = self.course.t_s;
+        stages!(self, h, P::STAGES + 1, P::STAGES + 1 + P::DENSE_STAGES, [7 8 9 10 11 12 13 14 15]);
+        for ((out, k), (y0, y1)) in
+            self.dense.iter_mut().zip(&self.k).zip(tiles(&self.course.y).iter().zip(tiles(&self.y1)))
+        {
+            P::dense::<F>(h, y0, y1, k, out);
+        }
+        let last = self.norm(|tile, l| self.dense[tile][P::DENSE_ROWS - 1][l], self.tolerance);
+        let mut event = None;
+        if suspicious {
+            let (course, dense, at) = (&mut self.course, &self.dense, &mut self.at);
+            let resolution = (0.25 * SAME_MOMENT_S / h).max(2.0 * f64::EPSILON);
+            event = events::first(&self.looks, resolution, |theta| {
+                // Plain: a closure does not inherit the processor features of its caller.
+                interpolate::<P, Plain>(theta, &course.y, dense, at);
+                course.margin_at_n(t0 + theta * h, at)
+            });
+        }
+        if let Some(theta) = event.filter(|&theta| last * P::last_term(theta) > TRUST) {
+            return Ok(Moved::Nowhere(theta));
+        }
+        let end = event.map_or(t1 - 2.0 * SAME_MOMENT_S, |theta| t0 + theta * h);
+        while let Some(t) = self.course.sample_due(end) {
+            self.between::<F>(((t - t0) / h).clamp(0.0, 1.0), h, last);
+            self.course.model.freedoms().project(&mut self.at);
+            self.course.sample(&self.at, observer)?;
+        }
+        let Some(theta) = event else {
+            // Stepping to a sample leaves another end behind.
+            if self.looks.spoilt() {
+                self.step::<F>(h);
+            }
+            return self.arrive_at_y1(t1, observer);
         };
-        match error {
-            Some((error, switch)) => {
-                let e = error.max(1e-10);
-                let factor = SAFETY * e.powf(-P::EXPONENT * 0.8) * error_before.powf(P::EXPONENT * 0.2);
-                let factor = factor.clamp(SHRINK, if rejected_before { 1.0 } else { GROW });
-                // A step that was cut to meet a moment says nothing against a longer one.
-                h_next = if h < h_next { h_next.max(h * factor) } else { h * factor };
-                error_before = e.max(1e-4);
-                rejected_before = false;
-                if switch && !course.finished() {
-                    let (t, y) = (course.t_s, std::mem::take(&mut course.y));
-                    course.rhs(t, &y, &mut k.k[0]);
-                    course.y = y;
-                }
-            }
-            None => {
-                let (t, y) = (course.t_s, std::mem::take(&mut course.y));
-                course.rhs(t, &y, &mut k.k[0]);
-                course.y = y;
-                rejected_before = false;
-            }
-        }
-        h = h_next;
-        h_next = h;
+        interpolate::<P, F>(theta, &self.course.y, &self.dense, &mut self.at);
+        std::mem::swap(&mut self.course.y, &mut self.at);
+        self.course.arrive(t0 + theta * h, observer)?;
+        self.course.fire(observer);
+        Ok(Moved::Event)
     }
-    Ok(())
-}
 
-/// Phases grow without bound and mean nothing modulo a turn: they are held absolutely, the body relatively too.
-#[inline(always)]
-fn relative_part(course: &Course, d: usize, size: f64) -> f64 {
-    if d < course.model.layout().body { size } else { 0.0 }
-}
-
-/// A first step: a hundredth of the time in which the state would change by one unit, refined by the error at once.
-fn first_step(y: &[f64], f: &[f64], units: &[f64], tolerance: f64, most_s: f64) -> f64 {
-    let speed = rms(units, |d| f[d] / (1.0 + y[d].abs()));
-    let h = 0.1 * tolerance.powf(0.125) / speed.max(1e-3);
-    h.clamp(1e-9, most_s.max(1e-9))
-}
-
-fn prepare<P: Pair>(
-    course: &mut Course,
-    t0: f64,
-    h: f64,
-    k: &mut Stages,
-    y1: &[f64],
-    trial: &mut [f64],
-    dense: &mut [Vec<f64>],
-) {
-    for i in 0..P::DENSE_STAGES {
-        k.advance(&course.y, h, P::A_DENSE[i], trial);
-        course.rhs(t0 + P::C_DENSE[i] * h, trial, &mut k.k[P::STAGES + 1 + i]);
-    }
-    P::dense(h, &course.y, y1, k, dense);
-}
-
-/// Hands over every sample in (t₀, until].
-fn emit<P: Pair>(
-    course: &mut Course,
-    t0: f64,
-    h: f64,
-    until_s: f64,
-    dense: &[Vec<f64>],
-    at: &mut [f64],
-    observer: &mut dyn Observer,
-) -> Result<(), Stopped> {
-    while let Some(t) = course.sample_due(until_s) {
-        P::interpolate(((t - t0) / h).clamp(0.0, 1.0), &course.y, dense, at);
-        course.model.freedoms().project(at);
-        course.sample(at, observer)?;
-    }
-    Ok(())
-}
-
-/// The first place in (0, 1] where the margin has become negative, to within [`SAME_MOMENT_S`] of its zero.
-fn first_event<P: Pair>(course: &mut Course, t0: f64, h: f64, dense: &[Vec<f64>], at: &mut [f64]) -> Option<f64> {
-    let mut margin = |theta: f64, course: &mut Course| {
-        P::interpolate(theta, &course.y, dense, at);
-        course.margin_at_n(t0 + theta * h, at)
-    };
-    let (mut a, mut fa) = (0.0, margin(0.0, course).max(0.0));
-    let (mut b, mut fb) = (0.0, fa);
-    for look in 1..=LOOKS {
-        (b, fb) = (look as f64 / LOOKS as f64, 0.0);
-        fb += margin(b, course);
-        if fb < 0.0 {
-            break;
-        }
-        (a, fa) = (b, fb);
-    }
-    if fb >= 0.0 {
-        return None;
-    }
-    // ITP (Oliveira & Takahashi 2020): no slower than bisection, as fast as the secant method on a smooth margin.
-    let resolution = (0.5 * SAME_MOMENT_S / h).max(4.0 * f64::EPSILON);
-    let (kappa, slack) = (0.2 / (b - a), 1.0);
-    let halvings = ((b - a) / (2.0 * resolution)).log2().ceil().max(0.0) + slack;
-    let mut j = 0.0;
-    while b - a > 2.0 * resolution {
-        let middle = 0.5 * (a + b);
-        let secant = (fb * a - fa * b) / (fb - fa);
-        let sign = (middle - secant).signum();
-        let push = kappa * (b - a) * (b - a);
-        let truncated = if push <= (middle - secant).abs() { secant + sign * push } else { middle };
-        let radius = resolution * (halvings - j).exp2() - 0.5 * (b - a);
-        let theta = if (truncated - middle).abs() <= radius { truncated } else { middle - sign * radius };
-        let f = margin(theta, course);
-        if f > 0.0 {
-            (a, fa) = (theta, f);
+    /// Puts the state at `theta` of the step into `at`: off the polynomial where that is good enough, else by a step.
+    #[inline(always)]
+    fn between<F: Arithmetic>(&mut self, theta: f64, h: f64, last: f64) {
+        if last * P::last_term(theta) <= TRUST {
+            interpolate::<P, F>(theta, &self.course.y, &self.dense, &mut self.at);
         } else {
-            (b, fb) = (theta, f);
-            if f == 0.0 {
-                break;
-            }
+            // The polynomial is spoilt by this, but whoever does not trust it at one place does not read it at another.
+            self.step::<F>(theta * h);
+            self.at.copy_from_slice(&self.y1);
+            self.looks.spoil();
         }
-        j += 1.0;
     }
-    Some(b)
+}
+
+/// The dense state of all tiles.
+#[inline(always)]
+fn interpolate<P: Pair, F: Arithmetic>(theta: f64, y0: &[f64], dense: &[Polynomial], out: &mut [f64]) {
+    for ((o, y), rows) in tiles_mut(out).iter_mut().zip(tiles(y0)).zip(dense) {
+        *o = P::interpolate::<F>(theta, y, rows);
+    }
+}
+
+/// How a step ended.
+#[derive(Clone, Copy, PartialEq)]
+enum Moved {
+    /// At its end.
+    On,
+    /// At its end, where the right-hand side jumps.
+    Switched,
+    /// At an event.
+    Event,
+    /// Not yet: there is an event at this part of the step, but the polynomial does not hold it.
+    Nowhere(f64),
 }
