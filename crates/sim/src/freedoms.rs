@@ -129,6 +129,12 @@ impl Six {
     }
 }
 
+/// M v
+#[inline(always)]
+fn times(m: &Matrix3<f64>, v: [f64; 3]) -> [f64; 3] {
+    [0, 1, 2].map(|a| m[(a, 0)] * v[0] + m[(a, 1)] * v[1] + m[(a, 2)] * v[2])
+}
+
 /// Rows of the rotation matrix of q/|q|.
 #[inline(always)]
 fn rotation(q: &[f64]) -> [[f64; 3]; 3] {

@@ -107,8 +107,8 @@ pub struct Method {
 }
 
 /// Tolerances below this are worth the twelve stages of order 8; above it contacts and samples cut the steps short anyway.
-/// Measured on palanquin-bench A and B: order 5 costs half at 1e-3, the same at about 1e-5, twice at 1e-9.
-const WORTH_ORDER_8: f64 = 5e-6;
+/// Measured on palanquin-bench A and B and on `music`: order 5 costs half at 1e-3, as much at about 1e-6, twice at 1e-9.
+const WORTH_ORDER_8: f64 = 5e-7;
 
 /// The method that `method` stands for: itself, or what `auto` picks for these settings.
 pub fn resolve(method: &'static Method, settings: &Settings) -> &'static Method {
@@ -128,7 +128,7 @@ fn auto(model: &Model, settings: &Settings, observer: &mut dyn Observer) -> (Sta
 pub const METHODS: &[Method] = &[
     Method {
         name: "auto",
-        about: "the cheapest for the tolerance: dop853 below 5e-6, else dopri5",
+        about: "the cheapest for the tolerance: dop853 below 5e-7, else dopri5",
         order: 8,
         adaptive: true,
         run: auto,
