@@ -101,6 +101,9 @@ impl Evidence {
 impl fmt::Display for Evidence {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         write!(f, "RMS roll {:.3}°", self.rms_roll_rad.to_degrees())?;
+        if self.verdict() == Ok(Verdict::Quiet) {
+            return write!(f, ", below {QUIET_DEG}°: nothing to explain");
+        }
         if let (Some(hz), Some(half), Some(at_f)) = (self.f_hz, self.share_at_half, self.share_at_f)
         {
             let percent = |x: f64| 100.0 * x;

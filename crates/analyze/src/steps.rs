@@ -82,16 +82,25 @@ pub struct Steps {
 /// When the recording is too short, too slowly sampled, or holds no walking.
 pub fn steps(t_s: &[f64], accel_m_per_s2: [&[f64]; 3]) -> Result<Steps, StepError> {
     let (times, norm) = norm(t_s, accel_m_per_s2);
+    steps_in(&times, &norm)
+}
+
+/// Steps from one signal that swings once per step: the norm, or better the vertical acceleration where a gyroscope tells
+/// what is vertical (the norm folds where the acceleration exceeds g downwards). Times ascend strictly and all is finite.
+///
+/// # Errors
+/// As [`steps`].
+pub fn steps_in(times: &[f64], norm: &[f64]) -> Result<Steps, StepError> {
     let found_s = times.last().unwrap_or(&0.0) - times.first().unwrap_or(&0.0);
     if found_s < SHORTEST_S {
         return Err(StepError::TooShort { found_s });
     }
-    let found_hz = period_s(&times).map_or(0.0, |p| 1.0 / p);
+    let found_hz = period_s(times).map_or(0.0, |p| 1.0 / p);
     if found_hz < 15.0 {
         return Err(StepError::TooSlow { found_hz });
     }
     // Stay clear of the sensor's own half rate.
-    let (grid, m) = even(&times, &norm, RATE_HZ);
+    let (grid, m) = even(times, norm, RATE_HZ);
     let top_hz = 6.0f64.min(0.4 * found_hz);
     let wide = band(&m, 0.7, top_hz);
     let walking = where_it_swings(&wide);

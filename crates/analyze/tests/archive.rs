@@ -3,6 +3,7 @@
 
 use std::path::{Path, PathBuf};
 
+use analyze::metrics::{Context, mechanism_evidence};
 use analyze::{Inputs, Metrics, Window, metrics};
 
 /// The folders of the runs, or nothing (with a printed note) where the archive is not there.
@@ -138,8 +139,8 @@ fn the_mechanism_is_what_the_findings_say() {
             run.display()
         );
         if music {
-            let context = analyze::metrics::Context::new(&inputs, Window::from(15.0));
-            let fit = analyze::metrics::mechanism_evidence(&context)
+            let context = Context::new(&inputs, Window::from(15.0));
+            let fit = mechanism_evidence(&context)
                 .unwrap()
                 .fit
                 .unwrap();

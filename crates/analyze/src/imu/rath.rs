@@ -387,7 +387,7 @@ fn varied(motion: &Motion, window: Window, draw: u64) -> Inputs {
     let n = ((last - first - phase) / step_s).max(0.0) as usize + 1;
     let t_s: Vec<f64> = (0..n.min(range.len())).map(|k| first + phase + k as f64 * step_s).collect();
     let pick = |x: &[f64]| interpolate(&inputs.t_s[range.clone()], &x[range.clone()], &t_s);
-    let mut angle = |x: &[f64], random: &mut Random| -> Vec<f64> {
+    let angle = |x: &[f64], random: &mut Random| -> Vec<f64> {
         let (offset, scale) = (budget.tilt_offset_rad * random.normal(), 1.0 + budget.angle_scale * random.normal());
         let wander = random.wander(t_s.len(), step_s, budget.tilt_wander_rad);
         pick(x).iter().zip(wander).map(|(x, w)| scale * x + offset + w).collect()

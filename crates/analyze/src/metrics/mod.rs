@@ -10,6 +10,7 @@ mod lines;
 mod onset;
 mod together;
 
+pub use contact::FLOAT_SHARE;
 pub use context::{Context, Need};
 pub use drive::evidence as mechanism_evidence;
 pub use onset::{ONSET_ROLL_DEG, ONSET_STRETCH_S, onset_s};

@@ -61,6 +61,22 @@ impl Segments {
         })
     }
 
+    /// The same segmentation at another rate.
+    pub fn at_rate(&self, fs_hz: f64) -> Result<Self, SpectrumError> {
+        if !(fs_hz.is_finite() && fs_hz > 0.0) {
+            return Err(SpectrumError::Rate(fs_hz));
+        }
+        Ok(Segments {
+            fs_hz,
+            taper: self.taper.clone(),
+            plan: self.plan.clone(),
+            input: Vec::new(),
+            output: Vec::new(),
+            scratch: Vec::new(),
+            ..*self
+        })
+    }
+
     /// First samples of the whole segments in a signal of `len` samples.
     pub fn starts(&self, len: usize) -> StepBy<Range<usize>> {
         (0..len - self.nperseg + 1).step_by(self.step)

@@ -67,9 +67,17 @@ impl WelchStream {
     /// # Errors
     /// [`SpectrumError::TooShort`] if nothing came.
     pub fn finish(&self) -> Result<Spectrum, SpectrumError> {
+        self.finish_at(self.fs_hz)
+    }
+
+    /// The same at the rate `fs_hz`, where that became known only at the end; the segments keep their number of samples.
+    ///
+    /// # Errors
+    /// As [`WelchStream::finish`], and for a rate that is no rate.
+    pub fn finish_at(&self, fs_hz: f64) -> Result<Spectrum, SpectrumError> {
         if self.count == 0 {
-            return super::welch(&self.buffer, self.fs_hz, &self.options);
+            return super::welch(&self.buffer, fs_hz, &self.options);
         }
-        Ok(self.segments.spectrum(self.sums.clone(), self.count))
+        Ok(self.segments.at_rate(fs_hz)?.spectrum(self.sums.clone(), self.count))
     }
 }

@@ -1,0 +1,172 @@
+//! `analyze FILE...`
+
+use std::io::Read;
+use std::path::Path;
+
+use anyhow::{Context, bail};
+use analyze::examine::{Analysis, Request, examine};
+use analyze::report;
+use analyze::roles::RolesFile;
+use recording::read::{ReadOptions, Recording};
+
+use super::{AnalyzeArgs, Done, Format, annotate, complain, print};
+
+pub(super) fn run(args: &AnalyzeArgs) -> anyhow::Result<Done> {
+    let request = request(args)?;
+    let single = [("--out", &args.out), ("--annotate", &args.annotate), ("--report", &args.report)];
+    for (option, value) in single {
+        if value.is_some() && args.files.len() > 1 {
+            bail!("{option} takes one recording, but {} were given: run it once for each", args.files.len());
+        }
+    }
+    let mut analyses = Vec::new();
+    let mut failed = false;
+    for file in &args.files {
+        match one(file, args, &request) {
+            Ok(analysis) => analyses.push(analysis),
+            Err(error) if args.files.len() > 1 => {
+                complain(&error);
+                failed = true;
+            }
+            Err(error) => return Err(error),
+        }
+    }
+    #[cfg(feature = "figures")]
+    if let Some(folder) = &args.figures {
+        draw(&analyses, folder)?;
+    }
+    let text = match args.format {
+        Format::Json => report::json(&analyses),
+        Format::Csv => report::csv(&analyses),
+        Format::Table if analyses.len() == 1 => report::table(&analyses[0], !request.signals.is_empty()),
+        Format::Table => report::ensemble(&analyses),
+    };
+    print(&text)?;
+    let lost: Vec<&Analysis> = analyses.iter().filter(|a| a.lost()).collect();
+    for a in &lost {
+        eprintln!("analyze: {}", loss(a));
+    }
+    Ok(match (failed, lost.is_empty()) {
+        (true, _) => Done::Partly,
+        (false, false) => Done::WithLoss,
+        (false, true) => Done::Well,
+    })
+}
+
+fn request(args: &AnalyzeArgs) -> anyhow::Result<Request> {
+    let roles = match &args.roles {
+        None => None,
+        Some(path) => Some(roles(path)?),
+    };
+    let window = args.window.unwrap_or((None, None));
+    Ok(Request { window, signals: args.signal.clone(), topics: args.topic.clone(), roles, truth: args.truth, traces: args.draws() })
+}
+
+fn roles(path: &Path) -> anyhow::Result<RolesFile> {
+    let name = path.display();
+    let text = std::fs::read_to_string(path).with_context(|| format!("{name}: the roles cannot be read"))?;
+    toml::from_str(&text).with_context(|| format!("{name}: is not a roles file"))
+}
+
+/// Opens a recording, or what comes through standard input.
+pub(super) fn open(path: &Path) -> anyhow::Result<Recording> {
+    let options = ReadOptions::default();
+    if path.as_os_str() == "-" {
+        let mut bytes = Vec::new();
+        std::io::stdin().lock().read_to_end(&mut bytes).context("standard input cannot be read")?;
+        return Ok(Recording::from_bytes(bytes, &options)?);
+    }
+    let opened = Recording::open(path, &options);
+    if opened.is_err() && !path.exists() && path.to_str().is_some_and(|p| strsim::damerau_levenshtein(p, "ingest") <= 2) {
+        bail!("{}: there is no such file; did you mean `analyze ingest`?", path.display());
+    }
+    Ok(opened?)
+}
+
+fn one(path: &Path, args: &AnalyzeArgs, request: &Request) -> anyhow::Result<Analysis> {
+    let recording = open(path)?;
+    let name = if path.as_os_str() == "-" { "standard input".to_owned() } else { path.display().to_string() };
+    let analysis = examine(&name, &recording, request)?;
+    if analysis.is_empty() {
+        bail!("{}", nothing(&analysis, request));
+    }
+    if let Some(out) = &args.out {
+        analyze::table::write(&recording, request, args.downsample, out)?;
+    }
+    if let Some(out) = &args.report {
+        whole(out, report::html(&analysis, &command_line()).as_bytes())?;
+    }
+    if let Some(out) = &args.annotate {
+        annotate::write(&recording, &analysis, out)?;
+    }
+    Ok(analysis)
+}
+
+/// The figures of one recording into the folder; of several into a folder each, and those of all together beside them.
+#[cfg(feature = "figures")]
+fn draw(analyses: &[Analysis], folder: &Path) -> anyhow::Result<()> {
+    use report::figures::figures;
+    let mut written = 0;
+    if let [one] = analyses {
+        written += figures(&report::plots::plots(one), folder)?.len();
+    } else {
+        written += figures(&report::ensemble_plots(analyses), folder)?.len();
+        for (k, a) in analyses.iter().enumerate() {
+            let stem = Path::new(&a.file).file_stem().and_then(|s| s.to_str()).unwrap_or("recording");
+            // Numbered: files of one name may come from several folders.
+            written += figures(&report::plots::plots(a), &folder.join(format!("{:03}-{stem}", k + 1)))?.len();
+        }
+    }
+    eprintln!("analyze: {written} files written to {}", folder.display());
+    Ok(())
+}
+
+/// The command line as it could be typed again.
+fn command_line() -> String {
+    let quoted = |arg: String| {
+        let plain = !arg.is_empty() && arg.chars().all(|c| c.is_alphanumeric() || "-_./=:,+@%".contains(c));
+        if plain { arg } else { format!("'{}'", arg.replace('\'', "'\\''")) }
+    };
+    let args = std::env::args().skip(1).map(quoted);
+    std::iter::once("analyze".to_owned()).chain(args).collect::<Vec<_>>().join(" ")
+}
+
+/// Writes a file whole or not at all.
+fn whole(path: &Path, bytes: &[u8]) -> anyhow::Result<()> {
+    use std::io::Write;
+    let said = || format!("{}: cannot be written; no file of that name was made or changed", path.display());
+    let folder = path.parent().filter(|p| !p.as_os_str().is_empty()).unwrap_or(Path::new("."));
+    let mut file = tempfile::Builder::new().prefix(".analyze-").suffix(".part").tempfile_in(folder).with_context(said)?;
+    file.write_all(bytes).with_context(said)?;
+    file.persist(path).with_context(said)?;
+    Ok(())
+}
+
+/// Why there is nothing to analyse.
+fn nothing(a: &Analysis, request: &Request) -> String {
+    if !request.signals.is_empty() || !request.topics.is_empty() {
+        let asked: Vec<&str> = request.signals.iter().chain(&request.topics).map(String::as_str).collect();
+        let topics: Vec<&str> = a.topics.iter().map(|t| t.name.as_str()).take(20).collect();
+        return format!("{}: no numeric signal fits {}; its topics are {}", a.file, asked.join(", "), topics.join(", "));
+    }
+    if a.messages == 0 {
+        return format!("{}: holds no messages", a.file);
+    }
+    let found: Vec<String> = a.topics.iter().take(20).map(|t| format!("{} ({}, {})", t.name, t.schema, t.encoding)).collect();
+    format!("{}: holds no numeric signal that can be used; found {}", a.file, found.join(", "))
+}
+
+fn loss(a: &Analysis) -> String {
+    let told: Vec<String> = a
+        .quality
+        .iter()
+        .filter(|q| q.loss)
+        .map(|q| if q.topic.is_empty() { q.text.clone() } else { format!("{}: {}", q.topic, q.text) })
+        .collect();
+    let lost = match a.skipped_messages {
+        0 => "no whole message is known to be lost".to_owned(),
+        1 => "1 message is lost".to_owned(),
+        n => format!("{n} messages are lost"),
+    };
+    format!("{}: the file is damaged; {lost}, the rest was used: {}", a.file, told.join("; "))
+}

@@ -1,0 +1,143 @@
+//! `--annotate OUT.mcap`: the recording again, with what was found as topics beside it.
+
+use std::path::Path;
+
+use analyze::examine::Analysis;
+use analyze::{metrics::Datum, phase};
+use recording::cdr::{Float64, Log, Time};
+use recording::read::Recording;
+use recording::topics::MessageKind;
+use recording::write::{RawChannel, RecordingWriter, WriterOptions};
+
+/// Length of the moving stretch whose RMS roll is written [s].
+const STRETCH_S: f64 = analyze::metrics::ONSET_STRETCH_S;
+
+/// Copies every message as it is and adds `/findings/...`; the file appears whole or not at all.
+pub(super) fn write(recording: &Recording, analysis: &Analysis, out: &Path) -> anyhow::Result<()> {
+    let mut writer = RecordingWriter::create(out, &WriterOptions::default())?;
+    for (name, values) in &recording.info().metadata {
+        writer.metadata(name, values)?;
+    }
+    writer.metadata("findings", &findings(analysis))?;
+    for attachment in &recording.info().attachments {
+        if let Some(bytes) = recording.attachment(&attachment.name) {
+            writer.attachment(&attachment.name, &attachment.media_type, &bytes)?;
+        }
+    }
+    let mut channels = Vec::new();
+    for c in &recording.info().channels {
+        channels.push(writer.raw_channel(&RawChannel {
+            topic: &c.topic,
+            message_encoding: &c.encoding,
+            schema_name: &c.schema,
+            schema_encoding: &c.schema_encoding,
+            schema_data: &c.schema_data,
+            metadata: &c.metadata,
+        })?);
+    }
+    let start_ns = recording.info().start_ns;
+    let mut own = own(analysis, start_ns);
+    own.sort_by_key(|m| m.t_ns);
+    let mut topics: Vec<(&'static str, _)> = Vec::new();
+    for message in &own {
+        if topics.iter().all(|(t, _)| *t != message.topic) {
+            let kind = if matches!(message.content, Content::Text(..)) { MessageKind::Log } else { MessageKind::Float64 };
+            topics.push((message.topic, writer.channel(message.topic, kind)?));
+        }
+    }
+    let mut own = own.into_iter().peekable();
+    let mut result = Ok(());
+    recording.messages(&|_| true, &mut |raw| {
+        let mut both = || -> anyhow::Result<()> {
+            while let Some(message) = own.next_if(|m| m.t_ns <= raw.log_time_ns) {
+                put(&mut writer, &topics, &message)?;
+            }
+            Ok(writer.message(channels[raw.channel], raw.log_time_ns, raw.data)?)
+        };
+        if result.is_ok() {
+            result = both();
+        }
+    })?;
+    result?;
+    for message in own {
+        put(&mut writer, &topics, &message)?;
+    }
+    Ok(writer.finish()?)
+}
+
+struct Message {
+    t_ns: i64,
+    topic: &'static str,
+    content: Content,
+}
+
+enum Content {
+    Number(f64),
+    Text(&'static str, String),
+}
+
+fn put(
+    writer: &mut RecordingWriter,
+    topics: &[(&'static str, recording::write::ChannelId)],
+    message: &Message,
+) -> anyhow::Result<()> {
+    let Some((_, channel)) = topics.iter().find(|(t, _)| *t == message.topic) else { return Ok(()) };
+    match &message.content {
+        Content::Number(data) => writer.message(*channel, message.t_ns, &Float64 { data: *data })?,
+        Content::Text(kind, what) => {
+            let log = Log {
+                stamp: Time::from_ns(message.t_ns),
+                // 20 is what the message type calls information.
+                level: 20,
+                name: (*kind).to_owned(),
+                msg: what.clone(),
+            };
+            writer.message(*channel, message.t_ns, &log)?;
+        }
+    }
+    Ok(())
+}
+
+/// The metrics by name, as text.
+fn findings(a: &Analysis) -> std::collections::BTreeMap<String, String> {
+    let text = |d: &Datum| match d {
+        Datum::Number(x) => Some(x.to_string()),
+        Datum::Bool(x) => Some(x.to_string()),
+        Datum::Word(x) => Some((*x).to_owned()),
+        Datum::Missing => None,
+    };
+    let mut out: std::collections::BTreeMap<String, String> =
+        a.metrics.iter().filter_map(|(name, v)| Some((name.to_owned(), text(&v.datum)?))).collect();
+    out.insert("version".into(), env!("CARGO_PKG_VERSION").into());
+    out.insert("window_s".into(), format!("{} {}", a.window.start_s, a.window.end_s));
+    out
+}
+
+/// Everything that is added.
+fn own(a: &Analysis, start_ns: i64) -> Vec<Message> {
+    let at = |t_s: f64| start_ns.saturating_add((t_s * 1e9).round() as i64).max(0);
+    let mut out: Vec<Message> = a
+        .events
+        .iter()
+        .map(|e| Message { t_ns: at(e.t_s), topic: "/findings/events", content: Content::Text(e.kind, e.what.clone()) })
+        .collect();
+    let i = &a.inputs;
+    let mut series = |topic: &'static str, t_s: &[f64], x: &[f64]| {
+        let finite = t_s.iter().zip(x).filter(|(_, x)| x.is_finite());
+        out.extend(finite.map(|(t, x)| Message { t_ns: at(*t), topic, content: Content::Number(*x) }));
+    };
+    let phases: Vec<&[f64]> = i.phase_rad.iter().map(|p| &p[..]).collect();
+    series("/findings/order_parameter", i.phase_times(), &phase::order_parameter(&phases));
+    if let Some(mass_kg) = i.mass_kg {
+        let ratio: Vec<f64> = i.total_force_n().iter().map(|n| n / (mass_kg * i.gravity_m_per_s2)).collect();
+        series("/findings/support_ratio", i.force_times(), &ratio);
+    }
+    let step_s = analyze::inputs::mean_step_s(&i.t_s).unwrap_or(1.0);
+    let m = ((STRETCH_S / step_s + 1e-3).floor() as usize).max(1);
+    if i.roll_rad.len() >= m && i.roll_rad.iter().all(|r| r.is_finite()) {
+        let rms: Vec<f64> =
+            i.roll_rad.windows(m).map(|w| (w.iter().map(|r| r * r).sum::<f64>() / m as f64).sqrt().to_degrees()).collect();
+        series("/findings/rms_roll_2s_deg", &i.t_s[m - 1..], &rms);
+    }
+    out
+}

@@ -1,0 +1,181 @@
+//! The command line: what it takes, and where each part of it goes.
+
+mod analyze;
+mod annotate;
+mod ingest;
+mod window;
+
+use std::io::Write;
+use std::path::PathBuf;
+use std::process::ExitCode;
+
+use clap::{Args, Parser, Subcommand, ValueEnum};
+
+const EXAMPLES: &str = "\
+Examples:
+  analyze music.mcap                              metrics, spectra, events and quality, as a table
+  analyze music.mcap --format json                the same for programs
+  analyze runs/*.mcap --format csv                one line per file and metric
+  analyze bag.mcap --signal '/imu/*' --window 10..70
+  analyze bag.mcap --signal '*.angular_velocity.*' --out gyro.csv
+  analyze bag.mcap --roles roles.toml             say which signal is the roll, the height, a handle's force
+  analyze run.mcap --report run.html              plots and numbers as one page, for any browser
+  analyze run.mcap --figures pictures             the same plots as SVG and PNG
+  analyze run.mcap --annotate seen.mcap           the recording with what was found, for any viewer
+  analyze ingest logs.npz --out run.mcap          a log of another format becomes a recording
+  sim record --out - | analyze -                  from standard input
+
+Exit codes: 0 done; 1 it could not; 2 wrong usage; 3 done, but the input was damaged and part of it is lost.";
+
+/// What a recording says about how a carried thing moves: metrics, spectra, events, and what is wrong with the data.
+#[derive(Parser)]
+#[command(name = "analyze", version, after_help = EXAMPLES, args_conflicts_with_subcommands = true, subcommand_negates_reqs = true)]
+struct Cli {
+    #[command(subcommand)]
+    command: Option<Command>,
+    #[command(flatten)]
+    args: AnalyzeArgs,
+}
+
+#[derive(Subcommand)]
+enum Command {
+    /// Turn logs of other formats into one recording
+    Ingest(ingest::IngestArgs),
+}
+
+/// How the result is printed.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+enum Format {
+    /// For people
+    Table,
+    /// For programs: one object, or an array for several files
+    Json,
+    /// One line per file and metric
+    Csv,
+}
+
+#[derive(Args)]
+struct AnalyzeArgs {
+    /// Recordings (MCAP of any kind); `-` is standard input
+    #[arg(required = true, value_name = "FILE")]
+    files: Vec<PathBuf>,
+    /// How to print the result
+    #[arg(long, value_enum, default_value = "table")]
+    format: Format,
+    /// Analyse from A to B, seconds after the first message: 15..60, 15.. or ..60
+    #[arg(long, value_name = "A..B", value_parser = window::parse, allow_hyphen_values = true)]
+    window: Option<(Option<f64>, Option<f64>)>,
+    /// A TOML file that says which signal plays which role
+    #[arg(long, value_name = "FILE.toml")]
+    roles: Option<PathBuf>,
+    /// List these signals, * for anything: '/imu/rath.angular_velocity.x', '*.roll'
+    #[arg(long, value_name = "PATH")]
+    signal: Vec<String>,
+    /// List the signals of these topics only, * for anything
+    #[arg(long, value_name = "TOPIC")]
+    topic: Vec<String>,
+    /// Write the signals to a table; columns are named by their paths
+    #[arg(long, value_name = "FILE.parquet|.csv")]
+    out: Option<PathBuf>,
+    /// Write one row in so many, for --out
+    #[arg(long, value_name = "N", default_value_t = 1, value_parser = clap::value_parser!(u64).range(1..))]
+    downsample: u64,
+    /// Write the recording again with what was found beside it
+    #[arg(long, value_name = "FILE.mcap")]
+    annotate: Option<PathBuf>,
+    /// Write a report: one HTML page with plots, definitions and facts that needs nothing else
+    #[arg(long, value_name = "FILE.html")]
+    report: Option<PathBuf>,
+    /// Draw every plot into this folder, as SVG and PNG
+    #[cfg(feature = "figures")]
+    #[arg(long, value_name = "DIR")]
+    figures: Option<PathBuf>,
+    /// Judge estimates by the truth that the recording holds
+    #[arg(long)]
+    truth: bool,
+}
+
+impl AnalyzeArgs {
+    /// Whether something is drawn.
+    fn draws(&self) -> bool {
+        #[cfg(feature = "figures")]
+        if self.figures.is_some() {
+            return true;
+        }
+        self.report.is_some()
+    }
+}
+
+/// How a command ended, when it did.
+enum Done {
+    /// All well.
+    Well,
+    /// Done with what was left of a damaged input.
+    WithLoss,
+    /// Some of the files could not be used; the messages are out.
+    Partly,
+}
+
+/// Parses the command line and runs the command; the exit code is the contract's.
+pub fn run() -> ExitCode {
+    // Nothing half-written stays behind when the user interrupts.
+    let _ = ctrlc::set_handler(|| {
+        recording::write::remove_unfinished_files();
+        std::process::exit(130);
+    });
+    let cli = Cli::parse();
+    let result = match &cli.command {
+        Some(Command::Ingest(args)) => ingest::run(args),
+        None => analyze::run(&cli.args),
+    };
+    match result {
+        Ok(Done::Well) => ExitCode::SUCCESS,
+        Ok(Done::WithLoss) => ExitCode::from(3),
+        Ok(Done::Partly) => ExitCode::FAILURE,
+        Err(error) => {
+            complain(&error);
+            ExitCode::FAILURE
+        }
+    }
+}
+
+/// One sentence first, then the causes.
+fn complain(error: &anyhow::Error) {
+    let mut err = std::io::stderr().lock();
+    let first = error.to_string();
+    let _ = writeln!(err, "analyze: {first}");
+    let mut said = first;
+    for cause in error.chain().skip(1) {
+        let cause = cause.to_string();
+        // Libraries often put the cause into their own sentence already.
+        if !said.contains(&cause) {
+            let _ = writeln!(err, "  because: {cause}");
+        }
+        said = cause;
+    }
+}
+
+/// Writes the result to standard output; a reader that went away early is no error.
+fn print(text: &str) -> anyhow::Result<()> {
+    let mut out = std::io::stdout().lock();
+    match out.write_all(text.as_bytes()).and_then(|()| out.flush()) {
+        Err(e) if e.kind() != std::io::ErrorKind::BrokenPipe => Err(anyhow::Error::new(e).context("standard output takes no more")),
+        _ => Ok(()),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use clap::CommandFactory;
+
+    #[test]
+    fn the_command_line_is_sound() {
+        Cli::command().debug_assert();
+        assert!(Cli::try_parse_from(["analyze"]).is_err());
+        assert!(Cli::try_parse_from(["analyze", "a.mcap", "b.mcap", "--window", "15..60"]).is_ok());
+        assert!(Cli::try_parse_from(["analyze", "ingest", "logs.npz", "--out", "x.mcap"]).is_ok());
+        let error = Cli::try_parse_from(["analyze", "a.mcap", "--windw", "15..60"]).err().unwrap().to_string();
+        assert!(error.contains("--window"), "{error}");
+    }
+}

@@ -1,0 +1,185 @@
+//! What happened when: contact lost and regained, jumps, the beat, the onset of instability.
+
+use crate::inputs::{Inputs, Window};
+use crate::metrics::onset_s;
+use crate::phase;
+
+/// One event.
+#[derive(Clone, Debug, PartialEq, serde::Serialize)]
+pub struct Event {
+    /// When [s] after the recording's first message.
+    pub t_s: f64,
+    /// `onset`, `contact_lost`, `contact_regained`, `jump`, `beat_start`, `locked`, `gap`, ...
+    pub kind: &'static str,
+    /// One line for people.
+    pub what: String,
+}
+
+/// Mean order parameter from which a stretch of [`LOCK_STRETCH_S`] counts as locked.
+const LOCKED: f64 = 0.95;
+/// Length of a stretch judged for locking [s].
+const LOCK_STRETCH_S: f64 = 5.0;
+/// The support below this share of the weight is a jump's flight.
+const FLIGHT: f64 = crate::metrics::FLOAT_SHARE;
+
+/// Every event of a run, in order of time.
+///
+/// Contact, jumps, beat and locking are looked for in the whole run (what is before the window is part of its story); the onset, like its
+/// metric, inside `window`.
+pub fn events(inputs: &Inputs, window: Window) -> Vec<Event> {
+    let mut out = Vec::new();
+    contact(inputs, &mut out);
+    jumps(inputs, &mut out);
+    beat(inputs, &mut out);
+    locking(inputs, &mut out);
+    let range = window.range(&inputs.t_s);
+    if inputs.roll_rad.len() == inputs.t_s.len()
+        && let Some(t_s) = onset_s(&inputs.t_s[range.clone()], &inputs.roll_rad[range])
+    {
+        out.push(Event { t_s, kind: "onset", what: "RMS roll of the last 2 s exceeds 10° for the first time".into() });
+    }
+    out.sort_by(|a, b| a.t_s.total_cmp(&b.t_s));
+    out
+}
+
+/// A handle's force falls to 0, or rises above it again. The first sample is no event.
+fn contact(inputs: &Inputs, out: &mut Vec<Event>) {
+    let t_s = inputs.force_times();
+    for (handle, force) in inputs.normal_n.iter().enumerate() {
+        let mut held: Option<bool> = None;
+        for (t_s, n) in t_s.iter().zip(force).filter(|(_, n)| n.is_finite()) {
+            let holds = *n > 0.0;
+            if held.is_some_and(|h| h != holds) {
+                let number = handle + 1;
+                out.push(match holds {
+                    true => Event { t_s: *t_s, kind: "contact_regained", what: format!("handle {number} presses again with {n:.0} N") },
+                    false => Event { t_s: *t_s, kind: "contact_lost", what: format!("handle {number} goes slack") },
+                });
+            }
+            held = Some(holds);
+        }
+    }
+}
+
+/// Stretches of at least two samples in which nothing holds the weight.
+fn jumps(inputs: &Inputs, out: &mut Vec<Event>) {
+    let (t_s, ratio) = match inputs.mass_kg {
+        Some(mass_kg) if !inputs.normal_n.is_empty() => {
+            let weight_n = mass_kg * inputs.gravity_m_per_s2;
+            (inputs.force_times(), inputs.total_force_n().iter().map(|n| n / weight_n).collect())
+        }
+        _ => (&inputs.t_s[..], inputs.support_ratio.clone()),
+    };
+    let mut start: Option<usize> = None;
+    for k in 0..=ratio.len().min(t_s.len()) {
+        let flies = ratio.get(k).is_some_and(|r| *r <= FLIGHT);
+        match (start, flies) {
+            (None, true) => start = Some(k),
+            (Some(from), false) => {
+                if k - from >= 2 {
+                    let last = t_s[(k).min(t_s.len() - 1)];
+                    out.push(Event { t_s: t_s[from], kind: "jump", what: format!("nothing holds it for {:.2} s", last - t_s[from]) });
+                }
+                start = None;
+            }
+            _ => {}
+        }
+    }
+}
+
+fn beat(inputs: &Inputs, out: &mut Vec<Event>) {
+    let (t_s, psi) = (inputs.phase_times(), &inputs.beat_phase_rad);
+    let sounding: Vec<bool> = psi.iter().map(|p| p.is_finite()).collect();
+    let tempo_hz = |k: usize| {
+        let next = k + 1 + psi[k + 1..].iter().position(|p| p.is_finite())?;
+        let step = (psi[next] - psi[k]).rem_euclid(std::f64::consts::TAU);
+        (next < t_s.len() && t_s[next] > t_s[k]).then(|| step / std::f64::consts::TAU / (t_s[next] - t_s[k]))
+    };
+    for k in 0..sounding.len().min(t_s.len()) {
+        let before = k > 0 && sounding[k - 1];
+        if sounding[k] && !before {
+            let what = tempo_hz(k).map_or("a beat begins".into(), |hz| format!("a beat of {hz:.3} Hz begins"));
+            out.push(Event { t_s: t_s[k], kind: "beat_start", what });
+        } else if before && !sounding[k] {
+            out.push(Event { t_s: t_s[k], kind: "beat_end", what: "the beat ends".into() });
+        }
+    }
+}
+
+/// The end of the first stretch of 5 s whose mean r exceeds 0.95, if an earlier stretch was looser.
+fn locking(inputs: &Inputs, out: &mut Vec<Event>) {
+    let phases: Vec<&[f64]> = inputs.phase_rad.iter().map(|p| &p[..]).collect();
+    if phases.len() < 2 {
+        return;
+    }
+    let t_s = inputs.phase_times();
+    let r = phase::order_parameter(&phases);
+    let Some(step_s) = crate::inputs::mean_step_s(t_s) else { return };
+    let m = ((LOCK_STRETCH_S / step_s).round() as usize).max(1);
+    let mut sum = 0.0;
+    let mut loose = false;
+    for k in 0..r.len().min(t_s.len()) {
+        if !r[k].is_finite() {
+            return;
+        }
+        sum += r[k];
+        if k >= m {
+            sum -= r[k - m];
+        }
+        if k + 1 < m {
+            continue;
+        }
+        let mean = sum / m as f64;
+        if mean > LOCKED && loose {
+            let what = format!("the carriers walk together: mean r of the last {LOCK_STRETCH_S:.0} s exceeds {LOCKED}");
+            out.push(Event { t_s: t_s[k], kind: "locked", what });
+            return;
+        }
+        loose |= mean <= LOCKED;
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_hop_is_told_as_it_happened() {
+        let n = 100;
+        let inputs = Inputs {
+            t_s: (0..n).map(|k| k as f64 / 10.0).collect(),
+            normal_n: vec![
+                (0..n).map(|k| if (20..25).contains(&k) { 0.0 } else { 300.0 }).collect(),
+                (0..n).map(|k| if (22..24).contains(&k) { 0.0 } else { 300.0 }).collect(),
+            ],
+            beat_phase_rad: (0..n).map(|k| if k < 50 { f64::NAN } else { k as f64 * 1.2 }).collect(),
+            mass_kg: Some(60.0),
+            ..Inputs::default()
+        };
+        let told: Vec<(f64, &str)> = events(&inputs, Window::ALL).iter().map(|e| (e.t_s, e.kind)).collect();
+        assert_eq!(
+            told,
+            [
+                (2.0, "contact_lost"),
+                (2.2, "contact_lost"),
+                (2.2, "jump"),
+                (2.4, "contact_regained"),
+                (2.5, "contact_regained"),
+                (5.0, "beat_start")
+            ]
+        );
+    }
+
+    #[test]
+    fn carriers_that_fall_into_step_are_noticed_once() {
+        let t_s: Vec<f64> = (0..600).map(|k| k as f64 / 30.0).collect();
+        let inputs = Inputs {
+            phase_rad: vec![t_s.iter().map(|t| 12.0 * t).collect(), t_s.iter().map(|t| 12.0 * t + (10.0 - t).max(0.0)).collect()],
+            t_s,
+            ..Inputs::default()
+        };
+        let events = events(&inputs, Window::ALL);
+        assert_eq!(events.len(), 1);
+        assert!(events[0].kind == "locked" && (11.0..15.0).contains(&events[0].t_s), "{events:?}");
+    }
+}

@@ -1,0 +1,599 @@
+//! A recording in one pass: a line per signal, the roles' columns, what is odd; then metrics, spectra and events.
+
+use std::collections::HashMap;
+
+use recording::read::{Batch, ReadError, Recording};
+
+use crate::envelope::Envelope;
+use crate::events::{Event, events};
+use crate::field::Field;
+use crate::inputs::{Inputs, Window, interpolate};
+use crate::metrics::{self, Metrics};
+use crate::peaks::SpectrumSummary;
+use crate::quaternion::Quaternions;
+use crate::roles::{Role, Roles, RolesFile, matches};
+use crate::summary::{Stream, Summary, Times, segment};
+
+/// What is asked of a recording.
+#[derive(Clone, Debug, Default)]
+pub struct Request {
+    /// First and last moment of the window [s]; what is `None` is decided by the recording.
+    pub window: (Option<f64>, Option<f64>),
+    /// Signals to list, with wildcards; empty means all.
+    pub signals: Vec<String>,
+    /// Topics to list, with wildcards; empty means all.
+    pub topics: Vec<String>,
+    /// Who plays which role, where the user says so.
+    pub roles: Option<RolesFile>,
+    /// Judge estimates by the recorded truth.
+    pub truth: bool,
+    /// Keep the outlines of signals for drawing.
+    pub traces: bool,
+}
+
+impl Request {
+    /// Whether a signal of a topic is to be listed.
+    pub fn lists(&self, topic: &str, path: &str) -> bool {
+        (self.topics.is_empty() || self.topics.iter().any(|p| matches(p, topic)))
+            && (self.signals.is_empty() || self.signals.iter().any(|p| matches(p, path)))
+    }
+}
+
+/// One remark on the quality of the data.
+#[derive(Clone, Debug, PartialEq, serde::Serialize)]
+pub struct Quality {
+    /// Topic; empty where the whole file is meant.
+    pub topic: String,
+    /// Kind, one word.
+    pub kind: &'static str,
+    /// How often.
+    pub count: u64,
+    /// When first [s].
+    pub t_s: Option<f64>,
+    /// One line for people.
+    pub text: String,
+    /// Whether something that the file once held is lost.
+    #[serde(skip)]
+    pub loss: bool,
+}
+
+/// What a topic holds.
+#[derive(Clone, Debug, PartialEq, serde::Serialize)]
+pub struct Topic {
+    /// Name.
+    pub name: String,
+    /// Schema.
+    pub schema: String,
+    /// Encoding.
+    pub encoding: String,
+    /// Messages.
+    pub messages: u64,
+    /// Mean rate [Hz].
+    pub hz: Option<f64>,
+}
+
+/// What is found in a recording.
+#[derive(Clone, Debug)]
+pub struct Analysis {
+    /// Name of the file.
+    pub file: String,
+    /// Last minus first log time [s].
+    pub duration_s: f64,
+    /// Samples of the motion, or messages of the busiest topic where there is none.
+    pub samples: u64,
+    /// The window [s].
+    pub window: Window,
+    /// Profile of the file.
+    pub profile: String,
+    /// Software that wrote it.
+    pub library: String,
+    /// Messages in all.
+    pub messages: u64,
+    /// Its topics, by name.
+    pub topics: Vec<Topic>,
+    /// The summary was missing or wrong.
+    pub salvaged: bool,
+    /// Messages lost.
+    pub skipped_messages: u64,
+    /// What the user should know of file and analysis.
+    pub warnings: Vec<String>,
+    /// Metadata record `rath`.
+    pub metadata: Vec<(String, String)>,
+    /// Role and the signals or topics that play it.
+    pub roles: Vec<(&'static str, Vec<String>)>,
+    /// Signals by path.
+    pub signals: Vec<(String, Summary)>,
+    /// Remarks.
+    pub quality: Vec<Quality>,
+    /// Metrics.
+    pub metrics: Metrics,
+    /// Spectra by signal.
+    pub spectra: Vec<(String, SpectrumSummary)>,
+    /// Events by time.
+    pub events: Vec<Event>,
+    /// The columns behind metrics, spectra and events, for figures.
+    pub inputs: Inputs,
+    /// Outlines of signals that play no role, where they were asked for.
+    pub traces: Vec<Trace>,
+}
+
+/// Signals of one topic and unit, drawn together: name, times [s] and values of each.
+#[derive(Clone, Debug, Default)]
+pub struct Trace {
+    /// Topic and the part of the path that the signals share.
+    pub topic: String,
+    /// What the ordinate shows, with its unit.
+    pub label: String,
+    /// Name, times and values.
+    pub series: Vec<(String, Vec<f64>, Vec<f64>)>,
+}
+
+/// At most so many panels of traces are kept.
+const MOST_TRACES: usize = 24;
+
+impl Analysis {
+    /// Whether data were lost: the exit code is 3 then.
+    pub fn lost(&self) -> bool {
+        self.skipped_messages > 0 || self.quality.iter().any(|q| q.loss)
+    }
+
+    /// Whether there is a signal that could be used.
+    pub fn is_empty(&self) -> bool {
+        self.signals.is_empty()
+    }
+}
+
+/// Reads `recording` once and finds everything.
+///
+/// # Errors
+/// Where the file cannot be read at all; damage inside it is part of the answer.
+pub fn examine(file: &str, recording: &Recording, request: &Request) -> Result<Analysis, ReadError> {
+    let info = recording.info();
+    let channels = info.channels.iter().map(|c| (c.topic.as_str(), c.schema.as_str()));
+    let roles = Roles::infer(channels, request.roles.as_ref());
+    let mut pass = Pass::new(recording, request, &roles);
+    let select = |path: &str| wanted(path, request, &roles);
+    let findings = recording.stream(&select, &mut |batch| pass.take(batch))?;
+    let mut quality: Vec<Quality> = findings
+        .into_iter()
+        .map(|f| Quality { topic: f.topic, kind: f.kind.word(), count: f.count, t_s: f.t_s, text: f.text, loss: f.kind.is_loss() })
+        .collect();
+    quality.sort_by(|a, b| (&a.topic, a.kind).cmp(&(&b.topic, b.kind)));
+
+    let mut warnings = info.warnings.clone();
+    let metadata: Vec<(String, String)> = info.metadata.get("rath").map(|m| m.iter().map(|(k, v)| (k.clone(), v.clone())).collect()).unwrap_or_default();
+    let duration_s = ((i128::from(info.end_ns) - i128::from(info.start_ns)) as f64 / 1e9).max(0.0);
+    let said = request.roles.as_ref();
+    let mut inputs = pass.inputs(&metadata, said);
+    let mut field = Field::read(recording, &roles, inputs.gravity_m_per_s2, request.truth)?;
+    field.fill(&mut inputs);
+    quality.extend(field.quality());
+    let window = window(request, &metadata, said, duration_s, &mut warnings);
+    let mut metrics = metrics::metrics(&inputs, window);
+    field.finish(&mut metrics, window);
+    let spectra = spectra(&pass, &inputs, window, &metrics, request);
+    let mut events = events(&inputs, window);
+    events.extend(quality.iter().filter(|q| q.kind == "gap").filter_map(|q| {
+        Some(Event { t_s: q.t_s?, kind: "gap", what: format!("{}: {}", q.topic, q.text) })
+    }));
+    events.extend(field.events());
+    events.sort_by(|a, b| a.t_s.total_cmp(&b.t_s));
+    let topics = pass.topics();
+    let samples = match inputs.t_s.len() {
+        0 => topics.iter().map(|t| t.messages).max().unwrap_or(0),
+        n => n as u64,
+    };
+    Ok(Analysis {
+        file: file.to_owned(),
+        duration_s,
+        samples,
+        window,
+        profile: info.profile.clone(),
+        library: info.library.clone(),
+        messages: info.messages,
+        topics,
+        salvaged: info.salvaged,
+        skipped_messages: recording.skipped_messages().max(info.skipped_messages),
+        warnings,
+        metadata,
+        roles: pass.roles_played(),
+        signals: pass.signals(),
+        quality,
+        metrics,
+        spectra,
+        events,
+        inputs,
+        traces: pass.traces(),
+    })
+}
+
+/// Whether a field has to be decoded: it is listed, plays a role, or is part of a quaternion whose angles are or do.
+fn wanted(path: &str, request: &Request, roles: &Roles) -> bool {
+    // The topic is not known apart from the path here; a topic filter without wildcards is a prefix of it.
+    let listed = |path: &str| {
+        let topic = request.topics.is_empty() || request.topics.iter().any(|t| matches(&format!("{t}.*"), path));
+        topic && (request.signals.is_empty() || request.signals.iter().any(|p| matches(p, path)))
+    };
+    let wants = |path: &str| listed(path) || roles.of_signal(path).is_some();
+    if wants(path) {
+        return true;
+    }
+    let part = path.rsplit_once('.').filter(|(_, last)| matches!(*last, "x" | "y" | "z" | "w"));
+    part.is_some_and(|(prefix, _)| crate::quaternion::ANGLES.iter().any(|angle| wants(&format!("{prefix}.{angle}"))))
+}
+
+/// The window: what the user says, else from the recording's own start of analysis to its end.
+fn window(
+    request: &Request,
+    metadata: &[(String, String)],
+    said: Option<&RolesFile>,
+    duration_s: f64,
+    warnings: &mut Vec<String>,
+) -> Window {
+    let end_s = request.window.1.unwrap_or(duration_s);
+    let own = said.and_then(|s| s.analysis_start_s).or_else(|| number(metadata, "analysis_start_s")).unwrap_or(0.0);
+    let start_s = match request.window.0 {
+        Some(start_s) => start_s,
+        None if own < end_s || own == 0.0 => own,
+        None => {
+            warnings.push(format!("the recording ends at {end_s:.3} s, before its analysis would start at {own} s: all of it is analysed"));
+            0.0
+        }
+    };
+    Window { start_s, end_s }
+}
+
+/// A finite number out of a metadata record.
+fn number(metadata: &[(String, String)], key: &str) -> Option<f64> {
+    let (_, value) = metadata.iter().find(|(k, _)| k == key)?;
+    value.trim().parse().ok().filter(|x: &f64| x.is_finite())
+}
+
+/// One signal on the way.
+struct Entry {
+    path: String,
+    unit: &'static str,
+    channel: usize,
+    listed: bool,
+    role: Option<Role>,
+    stream: Stream,
+    /// Times of its own where not every message has it.
+    times: Option<Times>,
+    /// Kept values with their times, where it plays a role.
+    kept: Vec<(i64, f64)>,
+    /// Its outline, where it is to be drawn.
+    outline: Option<Envelope>,
+}
+
+/// What is gathered while batches stream by.
+struct Pass<'a> {
+    recording: &'a Recording,
+    request: &'a Request,
+    roles: &'a Roles,
+    times: Vec<Times>,
+    /// Rough rate of each channel, for the length of the segments [Hz].
+    rough_hz: Vec<f64>,
+    entries: Vec<Entry>,
+    /// Entry of a column of the stream.
+    by_column: Vec<Option<usize>>,
+    /// Entries of the angles of a quaternion, by the path of the quaternion.
+    quaternions: Quaternions,
+    by_path: HashMap<String, usize>,
+    scratch: Vec<i64>,
+}
+
+impl<'a> Pass<'a> {
+    fn new(recording: &'a Recording, request: &'a Request, roles: &'a Roles) -> Self {
+        let info = recording.info();
+        let span_s = (info.end_ns.saturating_sub(info.start_ns)) as f64 / 1e9;
+        let rough = |messages: u64| if span_s > 0.0 { messages.saturating_sub(1) as f64 / span_s } else { 0.0 };
+        Pass {
+            recording,
+            request,
+            roles,
+            times: vec![Times::default(); info.channels.len()],
+            rough_hz: info.channels.iter().map(|c| rough(c.messages)).collect(),
+            entries: Vec::new(),
+            by_column: Vec::new(),
+            quaternions: Quaternions::default(),
+            by_path: HashMap::new(),
+            scratch: Vec::new(),
+        }
+    }
+
+    fn take(&mut self, batch: &Batch<'_>) {
+        self.times[batch.channel].push(batch.times_ns);
+        for column in batch.columns {
+            if self.by_column.len() <= column.id {
+                self.by_column.resize(column.id + 1, None);
+            }
+            let entry = match self.by_column[column.id] {
+                Some(entry) => entry,
+                None => {
+                    let entry = self.entry(batch, column.path);
+                    self.by_column[column.id] = Some(entry);
+                    entry
+                }
+            };
+            self.push(entry, batch, column.rows, column.values);
+        }
+        let mut quaternions = std::mem::take(&mut self.quaternions);
+        quaternions.each(batch, |path, values| {
+            if wanted(path, self.request, self.roles) {
+                let entry = match self.by_path.get(path) {
+                    Some(entry) => *entry,
+                    None => {
+                        let entry = self.entry(batch, path);
+                        self.by_path.insert(path.to_owned(), entry);
+                        entry
+                    }
+                };
+                self.push(entry, batch, None, values);
+            }
+        });
+        self.quaternions = quaternions;
+    }
+
+    fn entry(&mut self, batch: &Batch<'_>, path: &str) -> usize {
+        let field = path.strip_prefix(batch.topic).unwrap_or(path).trim_start_matches('.');
+        let hz = self.rough_hz[batch.channel];
+        let messages = self.recording.info().channels[batch.channel].messages;
+        let listed = self.request.lists(batch.topic, path);
+        // A stamp's seconds and nanoseconds are a clock, not a signal with lines.
+        let clock = field.contains("stamp.") || field == "time_s";
+        let nperseg = if listed && !clock { segment(hz, messages) } else { 0 };
+        let angle = crate::quaternion::ANGLES.iter().any(|a| field.rsplit('.').next() == Some(a));
+        self.entries.push(Entry {
+            path: path.to_owned(),
+            unit: match recording::signal::unit_of(batch.schema, field) {
+                "" if angle => "rad",
+                unit => unit,
+            },
+            channel: batch.channel,
+            listed,
+            role: self.roles.of_signal(path),
+            stream: Stream::new(hz, nperseg),
+            times: None,
+            kept: Vec::new(),
+            outline: (self.request.traces && listed && !clock && !field.contains("covariance")).then(Envelope::default),
+        });
+        self.entries.len() - 1
+    }
+
+    fn push(&mut self, entry: usize, batch: &Batch<'_>, rows: Option<&[u32]>, values: &[f64]) {
+        let entry = &mut self.entries[entry];
+        if entry.listed {
+            entry.stream.push(values);
+        }
+        if rows.is_some() && entry.times.is_none() {
+            entry.times = Some(Times::default());
+        }
+        let times = match rows {
+            None => batch.times_ns,
+            Some(rows) => {
+                self.scratch.clear();
+                self.scratch.extend(rows.iter().map(|r| batch.times_ns[*r as usize]));
+                &self.scratch
+            }
+        };
+        if let Some(own) = &mut entry.times {
+            own.push(times);
+        }
+        if let Some(outline) = &mut entry.outline {
+            let start_ns = i128::from(self.recording.info().start_ns);
+            times.iter().zip(values).for_each(|(t, x)| outline.push((i128::from(*t) - start_ns) as f64 / 1e9, *x));
+        }
+        if entry.role.is_some() {
+            entry.kept.extend(times.iter().copied().zip(values.iter().copied()));
+        }
+    }
+
+    fn topics(&self) -> Vec<Topic> {
+        let mut topics: Vec<Topic> = (self.recording.info().channels.iter().zip(&self.times))
+            .map(|(c, times)| Topic {
+                name: c.topic.clone(),
+                schema: c.schema.clone(),
+                encoding: c.encoding.clone(),
+                messages: c.messages.max(times.count()),
+                hz: times.hz(),
+            })
+            .collect();
+        topics.sort_by(|a, b| a.name.cmp(&b.name));
+        topics
+    }
+
+    fn signals(&self) -> Vec<(String, Summary)> {
+        let listed = self.entries.iter().filter(|e| e.listed);
+        let mut signals: Vec<(String, Summary)> =
+            listed.map(|e| (e.path.clone(), e.stream.summary(e.times.as_ref().unwrap_or(&self.times[e.channel]), e.unit))).collect();
+        // Angles of a quaternion that never held a rotation say nothing.
+        signals.retain(|(path, s)| s.count > 0 || !self.by_path.contains_key(path));
+        signals.sort_by(|a, b| natural(&a.0, &b.0));
+        signals
+    }
+
+    /// Outlines of moving signals without a role, those of one vector together.
+    fn traces(&self) -> Vec<Trace> {
+        let mut drawn: Vec<&Entry> = self.entries.iter().filter(|e| e.role.is_none() && e.outline.is_some()).collect();
+        drawn.sort_by(|a, b| natural(&a.path, &b.path));
+        let mut traces: Vec<Trace> = Vec::new();
+        for entry in drawn {
+            let Some(outline) = &entry.outline else { continue };
+            let (t_s, x) = outline.points();
+            let moves = x.iter().any(|v| *v != x[0]);
+            if !moves {
+                continue;
+            }
+            let (shared, last) = entry.path.rsplit_once('.').unwrap_or(("", &entry.path));
+            let label = if entry.unit.is_empty() { "value".to_owned() } else { entry.unit.to_owned() };
+            match traces.iter().position(|t| t.topic == shared && t.label == label) {
+                Some(k) => traces[k].series.push((last.to_owned(), t_s, x)),
+                None if traces.len() < MOST_TRACES => {
+                    traces.push(Trace { topic: shared.to_owned(), label, series: vec![(last.to_owned(), t_s, x)] });
+                }
+                None => {}
+            }
+        }
+        traces
+    }
+
+    fn roles_played(&self) -> Vec<(&'static str, Vec<String>)> {
+        let topics: Vec<&str> = self.recording.info().channels.iter().map(|c| c.topic.as_str()).collect();
+        let mut out = Vec::new();
+        for (role, patterns) in self.roles.iter() {
+            let mut players: Vec<String> = match role.is_topic() {
+                true => patterns.iter().filter(|p| topics.contains(&p.as_str())).cloned().collect(),
+                false => self.players(role).map(|e| e.path.clone()).collect(),
+            };
+            if !role.is_topic() {
+                players.sort_by(|a, b| natural(a, b));
+            }
+            if !players.is_empty() {
+                out.push((role.name(), players));
+            }
+        }
+        out
+    }
+
+    fn players(&self, role: Role) -> impl Iterator<Item = &Entry> {
+        self.entries.iter().filter(move |e| e.role == Some(role) && !e.kept.is_empty())
+    }
+
+    /// A role's column, ascending in time, at most one value per time.
+    fn column(&self, entry: &Entry) -> (Vec<f64>, Vec<f64>) {
+        let mut kept: Vec<(i64, f64)> = entry.kept.clone();
+        if !kept.is_sorted_by_key(|k| k.0) {
+            kept.sort_by_key(|k| k.0);
+        }
+        kept.dedup_by_key(|k| k.0);
+        let start_ns = i128::from(self.recording.info().start_ns);
+        kept.into_iter().map(|(t, x)| ((i128::from(t) - start_ns) as f64 / 1e9, x)).unzip()
+    }
+
+    fn inputs(&self, metadata: &[(String, String)], said: Option<&RolesFile>) -> Inputs {
+        let mut inputs = Inputs {
+            mass_kg: said.and_then(|s| s.mass_kg).or_else(|| number(metadata, "mass_kg")).filter(|m| *m > 0.0),
+            ..Inputs::default()
+        };
+        if let Some(g) = said.and_then(|s| s.gravity_m_per_s2).or_else(|| number(metadata, "gravity_m_per_s2")).filter(|g| *g > 0.0) {
+            inputs.gravity_m_per_s2 = g;
+        }
+        // Motion: the time axis of the roll, else of whatever is there.
+        for role in [Role::Roll, Role::Height, Role::Pitch, Role::Yaw] {
+            let Some(entry) = self.players(role).next() else { continue };
+            let (t_s, x) = self.column(entry);
+            if inputs.t_s.is_empty() {
+                inputs.t_s.clone_from(&t_s);
+            }
+            let x = if t_s == inputs.t_s { x } else { interpolate(&t_s, &x, &inputs.t_s) };
+            match role {
+                Role::Roll => inputs.roll_rad = x,
+                Role::Height => inputs.height_m = x,
+                Role::Pitch => inputs.pitch_rad = x,
+                _ => inputs.yaw_rad = x,
+            }
+        }
+        (inputs.force_t_s, inputs.normal_n) = self.columns(Role::Forces);
+        (inputs.phase_t_s, inputs.phase_rad) = self.columns(Role::Phases);
+        if let Some(entry) = self.players(Role::BeatPhase).next() {
+            let (t_s, psi) = self.column(entry);
+            if inputs.phase_t_s.is_empty() {
+                inputs.phase_t_s.clone_from(&t_s);
+            }
+            inputs.beat_phase_rad = at_times(&t_s, &psi, &inputs.phase_t_s);
+        }
+        let ours = self.players(Role::Roll).chain(self.players(Role::Height)).next();
+        if let Some(entry) = ours {
+            let schema = &self.recording.info().channels[entry.channel].schema;
+            if schema != "rath.State" {
+                inputs.sources.attitude = "pose".into();
+                inputs.sources.height = "pose".into();
+            }
+        }
+        inputs
+    }
+
+    /// All columns of a role on the time axis of the first; NaN where a column has no value at a time.
+    fn columns(&self, role: Role) -> (Vec<f64>, Vec<Vec<f64>>) {
+        let mut players: Vec<&Entry> = self.players(role).collect();
+        players.sort_by(|a, b| natural(&a.path, &b.path));
+        let Some(first) = players.first() else { return Default::default() };
+        let (axis, x) = self.column(first);
+        let mut columns = vec![x];
+        for entry in &players[1..] {
+            let (t_s, x) = self.column(entry);
+            columns.push(match (t_s == axis, entry.channel == first.channel) {
+                (true, _) => x,
+                (false, true) => at_times(&t_s, &x, &axis),
+                (false, false) => interpolate(&t_s, &x, &axis),
+            });
+        }
+        (axis, columns)
+    }
+}
+
+/// The values at exactly the times of `axis`; NaN where there is none.
+fn at_times(t_s: &[f64], x: &[f64], axis: &[f64]) -> Vec<f64> {
+    let mut k = 0;
+    axis.iter()
+        .map(|at| {
+            while k < t_s.len() && t_s[k] < *at {
+                k += 1;
+            }
+            if k < t_s.len() && t_s[k] == *at { x[k] } else { f64::NAN }
+        })
+        .collect()
+}
+
+/// Spectra of the roles' columns and of the signals that were asked for by name.
+fn spectra(pass: &Pass, inputs: &Inputs, window: Window, metrics: &Metrics, request: &Request) -> Vec<(String, SpectrumSummary)> {
+    let f_hz = metrics.number("beat_hz").or_else(|| metrics.number("peak_hz"));
+    let name = |role: Role, k: usize| {
+        let mut paths: Vec<&str> = pass.players(role).map(|e| e.path.as_str()).collect();
+        paths.sort_by(|a, b| natural(a, b));
+        paths.get(k).map_or_else(|| role.name().to_owned(), |p| (*p).to_owned())
+    };
+    let mut out = Vec::new();
+    for (role, x, unit) in [
+        (Role::Height, &inputs.height_m, "m"),
+        (Role::Roll, &inputs.roll_rad, "rad"),
+        (Role::Pitch, &inputs.pitch_rad, "rad"),
+    ] {
+        out.extend(SpectrumSummary::of(&inputs.t_s, x, window, f_hz, unit).map(|s| (name(role, 0), s)));
+    }
+    for (k, force) in inputs.normal_n.iter().enumerate() {
+        out.extend(SpectrumSummary::of(inputs.force_times(), force, window, f_hz, "N").map(|s| (name(Role::Forces, k), s)));
+    }
+    if !request.signals.is_empty() {
+        for entry in pass.entries.iter().filter(|e| e.listed) {
+            let hz = entry.times.as_ref().unwrap_or(&pass.times[entry.channel]).hz();
+            let known = out.iter().any(|(path, _)| *path == entry.path);
+            if let Some(spectrum) = hz.filter(|_| !known).and_then(|hz| entry.stream.spectrum(hz)) {
+                out.push((entry.path.clone(), SpectrumSummary::new(spectrum, f_hz, entry.unit)));
+            }
+        }
+    }
+    out
+}
+
+/// Order of names in which numbers count as numbers: `[2]` before `[10]`.
+fn natural(a: &str, b: &str) -> std::cmp::Ordering {
+    let (mut a, mut b) = (a.as_bytes(), b.as_bytes());
+    loop {
+        let digits = |s: &[u8]| s.iter().take_while(|c| c.is_ascii_digit()).count();
+        let (m, n) = (digits(a), digits(b));
+        if m > 0 && n > 0 {
+            let value = |s: &[u8]| s.iter().fold(0u128, |v, c| v.saturating_mul(10).saturating_add(u128::from(c - b'0')));
+            let order = value(&a[..m]).cmp(&value(&b[..n])).then(m.cmp(&n));
+            if order.is_ne() {
+                return order;
+            }
+            (a, b) = (&a[m..], &b[n..]);
+        } else {
+            match (a.first(), b.first()) {
+                (Some(x), Some(y)) if x == y => (a, b) = (&a[1..], &b[1..]),
+                (x, y) => return x.cmp(&y),
+            }
+        }
+    }
+}

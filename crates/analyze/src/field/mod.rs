@@ -1,0 +1,345 @@
+//! A field recording: inertial sensors, beats and truth of a recording, put through the numeric core.
+//!
+//! [`Field::read`] takes what plays the roles `imu`, `carriers`, `beats` and `truth`; [`Field::fill`] gives the metrics' columns that
+//! nothing else gave; [`Field::finish`] adds intervals, step rates, clocks and, where asked, errors against the truth.
+
+mod carriers;
+mod judge;
+mod place;
+mod sound;
+
+use std::collections::BTreeMap;
+
+use recording::read::{ReadError, Recording};
+use recording::signal::{Signal, seconds_since};
+
+use crate::beat::lock::beat_phase;
+use crate::beat::tempo_of;
+use crate::events::Event;
+use crate::examine::Quality;
+use crate::imu::Track;
+use crate::imu::orientation::Options;
+use crate::imu::rath::{self, Motion, Mounting, Settings};
+use crate::inputs::{Inputs, Window};
+use crate::metrics::{Metrics, Value, metrics_of};
+use crate::roles::{Role, Roles};
+use carriers::Carriers;
+use judge::Judge;
+
+/// The six columns of an inertial message.
+const GYRO: [&str; 3] = ["angular_velocity.x", "angular_velocity.y", "angular_velocity.z"];
+const ACCEL: [&str; 3] = ["linear_acceleration.x", "linear_acceleration.y", "linear_acceleration.z"];
+/// ROS's mark of a field that the sensor does not have.
+const GYRO_MARK: &str = "angular_velocity_covariance[0]";
+
+/// What a recording's sensors say.
+#[derive(Default)]
+pub struct Field {
+    topic: Option<String>,
+    motion: Option<Motion>,
+    no_motion: Option<String>,
+    carriers: Carriers,
+    beat_s: Vec<f64>,
+    beat_source: &'static str,
+    judge: Option<Judge>,
+    filled: Filled,
+    quality: Vec<Quality>,
+}
+
+/// Which groups of columns came from here.
+#[derive(Default)]
+struct Filled {
+    motion: bool,
+    phases: bool,
+}
+
+impl Field {
+    /// Reads the sensors' topics; nothing when the recording has none.
+    ///
+    /// # Errors
+    /// Where the file cannot be read.
+    pub fn read(recording: &Recording, roles: &Roles, gravity_m_per_s2: f64, truth: bool) -> Result<Self, ReadError> {
+        let topics: Vec<&str> = [Role::Imu, Role::Carriers, Role::Beats, Role::Truth]
+            .iter()
+            .flat_map(|r| roles.patterns(*r))
+            .map(String::as_str)
+            .filter(|t| recording.info().channels.iter().any(|c| c.topic == *t))
+            .collect();
+        let imus = roles.patterns(Role::Imu).iter().chain(roles.patterns(Role::Carriers));
+        let mut field = Self::default();
+        field.listen(recording)?;
+        if topics.is_empty() || (imus.clone().next().is_none() && !truth) {
+            return Ok(field);
+        }
+        let wanted = |path: &str| {
+            let of = |t: &&str| path.strip_prefix(*t).and_then(|p| p.strip_prefix('.'));
+            topics.iter().find_map(of).is_some_and(|field| {
+                GYRO.contains(&field) || ACCEL.contains(&field) || field == GYRO_MARK || judge::wants(field) || field == "number"
+            }) || (truth && path.starts_with(judge::STEP_TOPIC))
+        };
+        let (signals, _) = recording.signals(&wanted)?;
+        let start_ns = recording.info().start_ns;
+        let columns = Columns { signals, start_ns };
+        let places = place::places(recording);
+        let simulated = place::is_simulated(recording);
+        for topic in imus {
+            let Some(track) = columns.track(topic) else { continue };
+            let here = places.get(topic).copied().unwrap_or_default();
+            let is_rath = roles.topic(Role::Imu) == Some(topic.as_str());
+            if is_rath {
+                field.topic = Some(topic.clone());
+                field.motion(&columns, topic, &track, here, gravity_m_per_s2, simulated);
+            }
+            // The one sensor of a walker's phone plays the rath's role for want of another: steps tell.
+            if !is_rath || (roles.patterns(Role::Carriers).is_empty() && !about_the_rath(topic)) {
+                field.carriers.add(topic, &track, options(simulated));
+            }
+        }
+        if let Some(topic) = roles.topic(Role::Beats) {
+            let told = columns.times(topic);
+            if told.len() >= 3 {
+                (field.beat_s, field.beat_source) = (told, "beat");
+            }
+        }
+        field.align(roles);
+        if truth {
+            field.judge = Judge::read(&columns, roles, recording);
+        }
+        Ok(field)
+    }
+
+    /// Beats from sound, where the recording has sound.
+    fn listen(&mut self, recording: &Recording) -> Result<(), ReadError> {
+        match sound::sound_beats(recording)? {
+            Some((_, Ok(found))) => (self.beat_s, self.beat_source) = (found.beat_s, "sound"),
+            Some((topic, Err(error))) => self.quality.push(remark(&topic, "no_beat", error.to_string())),
+            None => {}
+        }
+        Ok(())
+    }
+
+    fn motion(&mut self, columns: &Columns, topic: &str, track: &Track, here: place::Place, g: f64, simulated: bool) {
+        if columns.first(topic, GYRO_MARK) == Some(-1.0) {
+            self.no_motion = Some(format!("{topic} has no gyroscope (angular_velocity_covariance[0] is -1)"));
+            return;
+        }
+        let settings = Settings {
+            orientation: options(simulated),
+            mounting: here.body_from_sensor.map_or(Mounting::Levelled, Mounting::Known),
+            lever_m: here.lever_m,
+            gravity_m_per_s2: g,
+            ..Settings::default()
+        };
+        match rath::motion(track, &settings) {
+            Ok(motion) => self.motion = Some(motion),
+            Err(error) => self.no_motion = Some(format!("{topic}: {error}")),
+        }
+    }
+
+    /// Puts the carriers' clocks on each other, by the motion of the rath that they all drive.
+    fn align(&mut self, roles: &Roles) {
+        if roles.patterns(Role::Carriers).len() < 2 {
+            return;
+        }
+        if let Some(motion) = &self.motion {
+            self.quality.extend(self.carriers.align(motion));
+        }
+    }
+
+    /// Gives `inputs` the columns that it lacks.
+    pub fn fill(&mut self, inputs: &mut Inputs) {
+        if let Some(motion) = &self.motion
+            && inputs.t_s.is_empty()
+        {
+            let seen = &motion.inputs;
+            inputs.t_s.clone_from(&seen.t_s);
+            inputs.height_m.clone_from(&seen.height_m);
+            inputs.roll_rad.clone_from(&seen.roll_rad);
+            inputs.pitch_rad.clone_from(&seen.pitch_rad);
+            if inputs.normal_n.is_empty() {
+                inputs.support_ratio.clone_from(&seen.support_ratio);
+                inputs.sources.forces = "imu".into();
+            }
+            inputs.sources.attitude = "imu".into();
+            inputs.sources.height = "imu".into();
+            self.filled.motion = true;
+        }
+        if inputs.phase_rad.is_empty()
+            && let Some((t_s, phases)) = self.carriers.phases()
+        {
+            self.filled.phases = true;
+            self.fill_phases(inputs, t_s, phases);
+        }
+    }
+
+    fn fill_phases(&self, inputs: &mut Inputs, t_s: Vec<f64>, phases: Vec<Vec<f64>>) {
+        inputs.phase_rad = phases;
+        inputs.phases_are_measured = true;
+        inputs.sources.phases = "imu".into();
+        if self.beat_s.len() >= 3 {
+            inputs.beat_phase_rad = beat_phase(&self.beat_s, &t_s);
+            inputs.sources.beat = self.beat_source.into();
+        }
+        inputs.phase_t_s = t_s;
+    }
+
+    /// Adds to the metrics what only the sensors know: intervals, reasons, step rate, and errors against the truth.
+    pub fn finish(&self, metrics: &mut Metrics, window: Window) {
+        let asked = self.filled.motion || self.filled.phases || self.judge.is_some() || self.beat_source == "sound";
+        let estimated = if asked { self.estimated(window) } else { Metrics::default() };
+        for (name, value) in &mut metrics.0 {
+            let ours = if rath::gives(name) { self.filled.motion } else { self.filled.phases && carriers::gives(name) };
+            if ours && let Some(v) = estimated.get(name) {
+                *value = v.clone();
+            }
+            if let Some(why) = &self.no_motion
+                && rath::gives(name)
+                && value.reason.is_some()
+                && value.as_f64().is_none()
+                && value.as_word().is_none()
+            {
+                value.reason = Some(why.clone());
+            }
+        }
+        if self.beat_source == "sound"
+            && let Some(v) = estimated.get("beat_hz")
+            && let Some((_, value)) = metrics.0.iter_mut().find(|(name, value)| *name == "beat_hz" && value.as_f64().is_none())
+        {
+            *value = v.clone();
+        }
+        if let Some(rate) = self.carriers.step_rate() {
+            metrics.0.push(("step_rate_hz", rate));
+        }
+        if let Some(judge) = &self.judge {
+            judge.errors(self.motion.as_ref(), &self.carriers, &estimated, metrics, window);
+        }
+    }
+
+    /// Every metric as the sensors alone give it.
+    fn estimated(&self, window: Window) -> Metrics {
+        let mut out = Metrics::default();
+        if let Some(motion) = &self.motion {
+            out = rath::metrics(motion, window);
+        }
+        if let Some((t_s, phases)) = self.carriers.phases() {
+            let mut inputs = Inputs::default();
+            self.fill_phases(&mut inputs, t_s, phases);
+            let mut together = metrics_of(&inputs, window, carriers::gives);
+            Carriers::interval(&mut together);
+            out.0.extend(together.0);
+        }
+        if let Some((hz, half)) = tempo_of(&self.beat_s) {
+            out.0.retain(|(name, _)| *name != "beat_hz");
+            out.0.push(("beat_hz", Value { unit: "Hz", ..Value::number(hz).source(self.beat_source).ci95(hz - half, hz + half) }));
+        }
+        out
+    }
+
+    /// Steps, beats heard and unloading, as events.
+    pub fn events(&self) -> Vec<Event> {
+        let mut out = self.carriers.events();
+        if self.beat_source == "sound" {
+            out.extend(self.beat_s.iter().map(|t| Event { t_s: *t, kind: "beat", what: "heard".into() }));
+        }
+        if let (Some(motion), true) = (&self.motion, self.filled.motion) {
+            let s = &motion.inputs;
+            out.extend(
+                unloadings(&s.t_s, &s.support_ratio)
+                    .into_iter()
+                    .map(|t_s| Event { t_s, kind: "unloaded", what: "support falls below 0.05 of the weight".into() }),
+            );
+        }
+        out
+    }
+
+    /// What is odd about the sensors.
+    pub fn quality(&mut self) -> Vec<Quality> {
+        let mut out = std::mem::take(&mut self.quality);
+        if let (Some(topic), Some(why)) = (&self.topic, &self.no_motion) {
+            out.push(remark(topic, "absent_field", why.clone()));
+        }
+        out.extend(self.carriers.quality());
+        out
+    }
+}
+
+/// Moments at which the support ratio falls through 0.05, between samples, s; each after the load was back above 0.15.
+pub fn unloadings(t_s: &[f64], support_ratio: &[f64]) -> Vec<f64> {
+    let (mut loaded, mut out) = (false, Vec::new());
+    for (t, s) in t_s.windows(2).zip(support_ratio.windows(2)) {
+        loaded |= s[0] > 0.15;
+        if loaded && s[0] > crate::metrics::FLOAT_SHARE && s[1] <= crate::metrics::FLOAT_SHARE {
+            out.push(t[0] + (t[1] - t[0]) * (s[0] - crate::metrics::FLOAT_SHARE) / (s[0] - s[1]));
+            loaded = false;
+        }
+    }
+    out
+}
+
+/// A simulated sensor's samples are true at their stamps.
+fn options(simulated: bool) -> Options {
+    if simulated { Options::without_latency() } else { Options::default() }
+}
+
+fn about_the_rath(topic: &str) -> bool {
+    let topic = topic.to_lowercase();
+    ["rath", "palanquin", "palki", "pole", "load"].iter().any(|word| topic.contains(word))
+}
+
+pub(super) fn remark(topic: &str, kind: &'static str, text: String) -> Quality {
+    Quality { topic: topic.to_owned(), kind, count: 1, t_s: None, text, loss: false }
+}
+
+/// Signals by topic.
+struct Columns {
+    signals: Vec<Signal>,
+    start_ns: i64,
+}
+
+impl Columns {
+    fn get(&self, topic: &str, field: &str) -> Option<&Signal> {
+        self.signals.iter().find(|s| s.path.strip_prefix(topic).and_then(|p| p.strip_prefix('.')) == Some(field))
+    }
+
+    fn first(&self, topic: &str, field: &str) -> Option<f64> {
+        self.get(topic, field)?.values.first().copied()
+    }
+
+    fn values<const N: usize>(&self, topic: &str, fields: [&str; N]) -> Option<[&[f64]; N]> {
+        let found: Vec<&[f64]> = fields.iter().filter_map(|f| Some(&self.get(topic, f)?.values[..])).collect();
+        found.try_into().ok()
+    }
+
+    fn track(&self, topic: &str) -> Option<Track> {
+        let t_s = self.get(topic, ACCEL[0])?.times_s(self.start_ns);
+        let accel = self.values(topic, ACCEL)?;
+        let still = vec![0.0; t_s.len()];
+        let gyro = self.values(topic, GYRO).unwrap_or([&still, &still, &still]);
+        Some(Track::from_columns(&t_s, gyro, accel))
+    }
+
+    /// Times of a topic's messages, s.
+    fn times(&self, topic: &str) -> Vec<f64> {
+        let of = |s: &&Signal| s.path.strip_prefix(topic).is_some_and(|p| p.starts_with('.'));
+        let mut t_s = self.signals.iter().find(of).map(|s| seconds_since(&s.times_ns, self.start_ns)).unwrap_or_default();
+        t_s.dedup();
+        t_s
+    }
+}
+
+/// Metadata records by name, as a reader gives them.
+type Records = BTreeMap<String, BTreeMap<String, String>>;
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn unloading_is_timed_between_samples() {
+        let t = [0.0, 0.1, 0.2, 0.3, 0.4];
+        let found = unloadings(&t, &[1.0, 0.15, -0.05, 0.06, 0.0]);
+        // 0.15 → −0.05 passes 0.05 half way; the second dip came without a landing.
+        assert_eq!(found.len(), 1);
+        assert!((found[0] - 0.15).abs() < 1e-12);
+    }
+}

@@ -1,0 +1,105 @@
+//! Quaternions as roll, pitch and yaw.
+
+use std::collections::HashMap;
+
+use recording::read::Batch;
+
+/// The last parts of the paths that a quaternion gives.
+pub const ANGLES: [&str; 3] = ["roll", "pitch", "yaw"];
+
+/// Roll, pitch and yaw of a rotation, R = R_z(yaw) R_y(pitch) R_x(roll) (REP-103).
+///
+/// ```text
+/// roll  = atan2(2(wx + yz), 1 − 2(x² + y²))
+/// pitch = asin(2(wy − zx))
+/// yaw   = atan2(2(wz + xy), 1 − 2(y² + z²))
+/// ```
+/// (x, y, z, w) any multiple of a unit quaternion [1]; angles [rad], pitch within ±π/2. At pitch = ±π/2 roll and yaw are only known together:
+/// their difference or sum stays right. A quaternion whose norm² lies outside 0.5 … 2 is none: NaN. Source: REP-103; Diebel (2006).
+pub fn angles(x: f64, y: f64, z: f64, w: f64) -> [f64; 3] {
+    let n = x * x + y * y + z * z + w * w;
+    if !(0.5..=2.0).contains(&n) {
+        return [f64::NAN; 3];
+    }
+    let roll = (2.0 * (w * x + y * z)).atan2(n - 2.0 * (x * x + y * y));
+    let pitch = (2.0 * (w * y - z * x) / n).clamp(-1.0, 1.0).asin();
+    let yaw = (2.0 * (w * z + x * y)).atan2(n - 2.0 * (y * y + z * z));
+    [roll, pitch, yaw]
+}
+
+/// Finds the quaternions among a batch's columns.
+#[derive(Default)]
+pub(crate) struct Quaternions {
+    /// By channel: paths of the three angles, and the positions of x, y, z, w in batches with so many columns.
+    known: HashMap<usize, (usize, Vec<Found>)>,
+    values: [Vec<f64>; 3],
+}
+
+struct Found {
+    paths: [String; 3],
+    columns: [usize; 4],
+}
+
+impl Quaternions {
+    /// Gives path and values of every angle of every quaternion in the batch.
+    pub fn each(&mut self, batch: &Batch<'_>, mut sink: impl FnMut(&str, &[f64])) {
+        let entry = self.known.entry(batch.channel).or_insert_with(|| (usize::MAX, Vec::new()));
+        let fits = entry.0 == batch.columns.len()
+            && entry.1.iter().all(|f| f.columns.iter().zip("xyzw".chars()).all(|(c, last)| batch.columns[*c].path.ends_with(last)));
+        if !fits {
+            *entry = (batch.columns.len(), find(batch));
+        }
+        for found in &entry.1 {
+            let [x, y, z, w] = found.columns.map(|c| batch.columns[c].values);
+            self.values.iter_mut().for_each(Vec::clear);
+            for (((x, y), z), w) in x.iter().zip(y).zip(z).zip(w) {
+                for (column, angle) in self.values.iter_mut().zip(angles(*x, *y, *z, *w)) {
+                    column.push(angle);
+                }
+            }
+            for (path, values) in found.paths.iter().zip(&self.values) {
+                sink(path, values);
+            }
+        }
+    }
+}
+
+/// Columns that end in .x, .y, .z and .w after the same path, with a value in every message.
+fn find(batch: &Batch<'_>) -> Vec<Found> {
+    let place: HashMap<&str, usize> =
+        batch.columns.iter().enumerate().filter(|(_, c)| c.rows.is_none()).map(|(k, c)| (c.path, k)).collect();
+    let mut found = Vec::new();
+    for column in batch.columns {
+        let Some(prefix) = column.path.strip_suffix(".w") else { continue };
+        let at = |last: &str| place.get(format!("{prefix}.{last}").as_str()).copied();
+        if let (Some(x), Some(y), Some(z), Some(w)) = (at("x"), at("y"), at("z"), at("w")) {
+            found.push(Found { paths: ANGLES.map(|a| format!("{prefix}.{a}")), columns: [x, y, z, w] });
+        }
+    }
+    found
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn angles_come_back_from_the_quaternion_they_made() {
+        for (roll, pitch, yaw) in [(0.1, 0.2, 0.3), (-2.0, 1.2, 3.0), (3.0, -1.5, -0.1), (0.0, 0.0, 0.0)] {
+            let half = |a: f64| (a / 2.0).sin_cos();
+            let ((sr, cr), (sp, cp), (sy, cy)) = (half(roll), half(pitch), half(yaw));
+            let w = cr * cp * cy + sr * sp * sy;
+            let x = sr * cp * cy - cr * sp * sy;
+            let y = cr * sp * cy + sr * cp * sy;
+            let z = cr * cp * sy - sr * sp * cy;
+            // Any multiple stands for the same rotation.
+            let k = 1.1;
+            for (a, b) in angles(k * x, k * y, k * z, k * w).iter().zip([roll, pitch, yaw]) {
+                assert!((a - b).abs() < 1e-12, "{a} {b}");
+            }
+        }
+        assert!(angles(0.0, 0.0, 0.0, 0.0)[0].is_nan());
+        let upright = angles(0.0, 0.5f64.sqrt(), 0.0, 0.5f64.sqrt());
+        assert!((upright[1] - std::f64::consts::FRAC_PI_2).abs() < 1e-7);
+    }
+}

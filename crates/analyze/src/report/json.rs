@@ -1,0 +1,73 @@
+//! The machine-readable form: docs/contract in types.
+
+use serde::ser::{Serialize, SerializeMap, Serializer};
+
+use crate::examine::{Analysis, Topic};
+
+/// One object for one recording, an array for several; ends with a line break.
+pub fn json(analyses: &[Analysis]) -> String {
+    // OK because the types below have string keys only and numbers are finite or null.
+    let text = match analyses {
+        [one] => serde_json::to_string_pretty(one),
+        many => serde_json::to_string_pretty(many),
+    };
+    text.expect("plain data") + "\n"
+}
+
+/// A map in the order of its entries.
+struct Ordered<'a, V>(&'a [(String, V)]);
+
+impl<V: Serialize> Serialize for Ordered<'_, V> {
+    fn serialize<S: Serializer>(&self, s: S) -> Result<S::Ok, S::Error> {
+        s.collect_map(self.0.iter().map(|(k, v)| (k, v)))
+    }
+}
+
+#[derive(serde::Serialize)]
+struct Recording<'a> {
+    profile: &'a str,
+    library: &'a str,
+    messages: u64,
+    topics: &'a [Topic],
+    salvaged: bool,
+    skipped_messages: u64,
+    warnings: &'a [String],
+}
+
+struct Roles<'a>(&'a [(&'static str, Vec<String>)]);
+
+impl Serialize for Roles<'_> {
+    fn serialize<S: Serializer>(&self, s: S) -> Result<S::Ok, S::Error> {
+        s.collect_map(self.0.iter().map(|(k, v)| (k, v)))
+    }
+}
+
+impl Serialize for Analysis {
+    fn serialize<S: Serializer>(&self, s: S) -> Result<S::Ok, S::Error> {
+        let mut map = s.serialize_map(None)?;
+        map.serialize_entry("file", &self.file)?;
+        map.serialize_entry("duration_s", &self.duration_s)?;
+        map.serialize_entry("samples", &self.samples)?;
+        map.serialize_entry("window_s", &[self.window.start_s, self.window.end_s])?;
+        map.serialize_entry(
+            "recording",
+            &Recording {
+                profile: &self.profile,
+                library: &self.library,
+                messages: self.messages,
+                topics: &self.topics,
+                salvaged: self.salvaged,
+                skipped_messages: self.skipped_messages,
+                warnings: &self.warnings,
+            },
+        )?;
+        map.serialize_entry("metadata", &Ordered(&self.metadata))?;
+        map.serialize_entry("roles", &Roles(&self.roles))?;
+        map.serialize_entry("signals", &Ordered(&self.signals))?;
+        map.serialize_entry("quality", &self.quality)?;
+        map.serialize_entry("metrics", &self.metrics)?;
+        map.serialize_entry("spectra", &Ordered(&self.spectra))?;
+        map.serialize_entry("events", &self.events)?;
+        map.end()
+    }
+}

@@ -1,0 +1,317 @@
+//! What is drawn, whatever draws it: the HTML report and the figures share these descriptions, so they share one look.
+
+use crate::envelope::outline;
+use crate::examine::Analysis;
+use crate::inputs::Window;
+use crate::mechanism::spline_derivatives;
+use crate::peaks::SpectrumSummary;
+use crate::phase;
+use crate::spectrum::{Mode, Options, spectrogram};
+
+/// Okabe and Ito's colours, distinct to every kind of colour vision (jfly, 2008); black comes last: it vanishes on dark paper.
+pub const COLOURS: [&str; 7] = ["#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9", "#7F7F7F"];
+
+/// A line or a cloud of points.
+#[derive(Clone, Debug)]
+pub struct Series {
+    /// Name in the legend.
+    pub name: String,
+    /// Abscissae.
+    pub x: Vec<f64>,
+    /// Ordinates, as many.
+    pub y: Vec<f64>,
+    /// Index into [`COLOURS`].
+    pub colour: usize,
+}
+
+/// One pair of axes with what is on them.
+#[derive(Clone, Debug)]
+pub struct Panel {
+    /// Name of its file and anchor.
+    pub id: &'static str,
+    /// Title.
+    pub title: String,
+    /// What it shows, in a sentence.
+    pub note: String,
+    /// Horizontal axis with its unit.
+    pub x_label: String,
+    /// Vertical axis with its unit.
+    pub y_label: String,
+    /// Lines.
+    pub series: Vec<Series>,
+    /// Horizontal lines and their names.
+    pub levels: Vec<(f64, String)>,
+    /// Vertical lines and their names.
+    pub marks: Vec<(f64, String)>,
+    /// A horizontal band and its name.
+    pub band: Option<(f64, f64, String)>,
+    /// The stretch of the abscissa that is analysed.
+    pub window: Option<(f64, f64)>,
+    /// Logarithmic ordinate.
+    pub log_y: bool,
+    /// Range of the abscissa, where not that of the data.
+    pub x_range: Option<(f64, f64)>,
+    /// Points instead of lines.
+    pub points: bool,
+    /// The abscissa is the recording's time: such panels are zoomed together.
+    pub time: bool,
+}
+
+impl Panel {
+    pub(super) fn new(id: &'static str, title: &str, x_label: &str, y_label: &str) -> Self {
+        Panel {
+            id,
+            title: title.into(),
+            note: String::new(),
+            x_label: x_label.into(),
+            y_label: y_label.into(),
+            series: Vec::new(),
+            levels: Vec::new(),
+            marks: Vec::new(),
+            band: None,
+            window: None,
+            log_y: false,
+            x_range: None,
+            points: false,
+            time: false,
+        }
+    }
+
+    fn over_time(id: &'static str, title: &str, y_label: &str, a: &Analysis) -> Self {
+        let window = Some((a.window.start_s, a.window.end_s));
+        Panel { time: true, window, ..Panel::new(id, title, "time, s", y_label) }
+    }
+
+    fn line(&mut self, name: impl Into<String>, t_s: &[f64], x: &[f64]) {
+        let (x, y) = outline(t_s, x);
+        if !x.is_empty() {
+            self.series.push(Series { name: name.into(), x, y, colour: self.series.len() % COLOURS.len() });
+        }
+    }
+}
+
+/// A surface over time and frequency.
+#[derive(Clone, Debug)]
+pub struct Image {
+    /// Name of its file and anchor.
+    pub id: &'static str,
+    /// Title.
+    pub title: String,
+    /// What it shows, in a sentence.
+    pub note: String,
+    /// Vertical axis with its unit.
+    pub y_label: String,
+    /// What the colour means, with its unit.
+    pub value_label: String,
+    /// First and last time [s].
+    pub x_range: (f64, f64),
+    /// Lowest and highest frequency [Hz].
+    pub y_range: (f64, f64),
+    /// `values[time][frequency]`.
+    pub values: Vec<Vec<f64>>,
+}
+
+/// Anything that can be drawn.
+#[derive(Clone, Debug)]
+pub enum Plot {
+    /// Axes with lines.
+    Panel(Panel),
+    /// A spectrogram.
+    Image(Image),
+}
+
+/// Events marked in plots over time: kinds of which there are at most this many.
+const MOST_MARKS: usize = 12;
+/// Highest frequency shown in spectra, as a multiple of f.
+const SPECTRUM_REACH: f64 = 4.0;
+
+/// Every plot that a recording has the columns for, in the order in which they are shown.
+pub fn plots(a: &Analysis) -> Vec<Plot> {
+    let i = &a.inputs;
+    let mut out = Vec::new();
+    let mut panel = |p: Panel| {
+        if !p.series.is_empty() {
+            out.push(Plot::Panel(p));
+        }
+    };
+    let degrees = |x: &[f64]| x.iter().map(|x| x.to_degrees()).collect::<Vec<_>>();
+
+    let mut roll = Panel::over_time("roll", "Roll and tilt", "angle, deg", a);
+    roll.note = "Roll turns about the pole, tilt lifts its nose. The shaded stretch is the analysis window.".into();
+    roll.line("roll", &i.t_s, &degrees(&i.roll_rad));
+    roll.line("tilt", &i.t_s, &degrees(&i.pitch_rad));
+    roll.marks = marks(a);
+    panel(roll);
+
+    let mut height = Panel::over_time("height", "Height of the centre of mass", "height, m", a);
+    height.line("height", &i.t_s, &i.height_m);
+    height.marks = marks(a);
+    panel(height);
+
+    let mut forces = Panel::over_time("forces", "Normal forces of the handles", "force, N", a);
+    for (k, n) in i.normal_n.iter().enumerate() {
+        forces.line(format!("handle {}", k + 1), i.force_times(), n);
+    }
+    panel(forces);
+
+    let mut support = Panel::over_time("support", "Support over weight", "N_tot / (M g)", a);
+    support.note = "Below the dashed line at 0.05 nobody holds it: that is T_float.".into();
+    match i.mass_kg {
+        Some(mass_kg) if !i.normal_n.is_empty() => {
+            let weight_n = mass_kg * i.gravity_m_per_s2;
+            let ratio: Vec<f64> = i.total_force_n().iter().map(|n| n / weight_n).collect();
+            support.line("all handles", i.force_times(), &ratio);
+        }
+        _ => support.line("specific force", &i.t_s, &i.support_ratio),
+    }
+    support.levels = vec![(crate::metrics::FLOAT_SHARE, "0.05".into()), (1.0, "at rest".into())];
+    panel(support);
+
+    if i.phase_rad.len() > 1 {
+        let phases: Vec<&[f64]> = i.phase_rad.iter().map(|p| &p[..]).collect();
+        let chance = phase::chance_level(phases.len());
+        let mut sync = Panel::over_time("synchrony", "Synchrony of the carriers", "order parameter r", a);
+        sync.note = format!(
+            "The band holds 95 % of what {} independent carriers show at a moment; their mean is {:.3}.",
+            phases.len(),
+            chance.mean
+        );
+        sync.line("r", i.phase_times(), &phase::order_parameter(&phases));
+        sync.band = Some((chance.band[0], chance.band[1], "chance, 95 %".into()));
+        sync.levels = vec![(chance.mean, "chance, mean".into())];
+        sync.marks = marks(a);
+        panel(sync);
+    }
+
+    for trace in &a.traces {
+        let mut p = Panel::over_time("signals", &trace.topic, &trace.label, a);
+        for (name, t_s, x) in &trace.series {
+            p.line(name.clone(), t_s, x);
+        }
+        panel(p);
+    }
+
+    for (id, title, name) in [("psd_roll", "Spectrum of the roll", "roll"), ("psd_height", "Spectrum of the height", "height")] {
+        if let Some((_, s)) = role_spectrum(a, name) {
+            panel(psd(id, title, name, s));
+        }
+    }
+
+    portrait(a).into_iter().chain(force_plane(a)).for_each(&mut panel);
+    if let Some(image) = roll_spectrogram(a) {
+        // After the spectra, before the planes.
+        let place = out.iter().position(|p| matches!(p, Plot::Panel(p) if p.points || p.id == "portrait")).unwrap_or(out.len());
+        out.insert(place, Plot::Image(image));
+    }
+    out
+}
+
+/// Onset, beat and locking always; other kinds while they are few.
+fn marks(a: &Analysis) -> Vec<(f64, String)> {
+    let count = |kind: &str| a.events.iter().filter(|e| e.kind == kind).count();
+    a.events.iter().filter(|e| count(e.kind) <= MOST_MARKS && e.kind != "jump").map(|e| (e.t_s, e.kind.replace('_', " "))).collect()
+}
+
+/// The spectrum of the signal that plays a role.
+pub(super) fn role_spectrum<'a>(a: &'a Analysis, role: &str) -> Option<&'a (String, SpectrumSummary)> {
+    let path = a.roles.iter().find(|(r, _)| *r == role).and_then(|(_, p)| p.first()).map_or(role, |p| p.as_str());
+    a.spectra.iter().find(|(p, _)| p == path || p == role)
+}
+
+fn psd(id: &'static str, title: &str, name: &str, s: &SpectrumSummary) -> Panel {
+    let nyquist = s.spectrum.hz.last().copied().unwrap_or(1.0);
+    let reach = s.f_hz.map_or(nyquist, |f| (SPECTRUM_REACH * f).min(nyquist));
+    let mut p = Panel::new(id, title, "frequency, Hz", &format!("density, {}", s.unit.replace("^2", "²")));
+    p.note = format!(
+        "Welch, {} segments of {:.1} s, bins {:.3} Hz apart, 95 % of the noise within ×{:.2} … ×{:.2}.",
+        s.segments, s.segment_s, s.resolution_hz, s.confidence_95[0], s.confidence_95[1]
+    );
+    let shown = s.spectrum.hz.iter().zip(&s.spectrum.power).filter(|(f, p)| **f > 0.0 && **f <= reach && **p > 0.0);
+    let (x, y) = shown.map(|(f, p)| (*f, *p)).unzip();
+    p.series.push(Series { name: name.into(), x, y, colour: 0 });
+    p.log_y = true;
+    p.x_range = Some((0.0, reach));
+    if let Some(f) = s.f_hz {
+        let lines = [(0.5, "f/2"), (1.0, "f"), (2.0, "2f"), (3.0, "3f")];
+        p.marks = lines.iter().filter(|(m, _)| m * f <= reach).map(|(m, name)| (m * f, (*name).to_owned())).collect();
+    }
+    p
+}
+
+fn inside(t_s: &[f64], window: Window) -> std::ops::Range<usize> {
+    window.range(t_s)
+}
+
+/// Roll against its rate in the window.
+fn portrait(a: &Analysis) -> Option<Panel> {
+    let i = &a.inputs;
+    if i.roll_rad.len() != i.t_s.len() {
+        return None;
+    }
+    let range = inside(&i.t_s, a.window);
+    let step_s = crate::inputs::mean_step_s(&i.t_s[range.clone()])?;
+    let roll = &i.roll_rad[range];
+    let (rate, _) = spline_derivatives(roll, step_s)?;
+    let mut p = Panel::new("portrait", "Phase portrait of the roll", "roll, deg", "roll rate, deg/s");
+    p.note = "A closed loop is a steady swing; a spiral grows or dies.".into();
+    let (x, y): (Vec<f64>, Vec<f64>) =
+        roll.iter().zip(&rate).filter(|(a, b)| a.is_finite() && b.is_finite()).map(|(a, b)| (a.to_degrees(), b.to_degrees())).unzip();
+    p.series.push(Series { name: "roll".into(), x: thin(x), y: thin(y), colour: 0 });
+    Some(p)
+}
+
+/// The first two handles' forces against each other in the window.
+fn force_plane(a: &Analysis) -> Option<Panel> {
+    let i = &a.inputs;
+    let [first, second, ..] = &i.normal_n[..] else { return None };
+    let range = inside(i.force_times(), a.window);
+    let mut p = Panel::new("force_plane", "One handle against the other", "force of handle 1, N", "force of handle 2, N");
+    p.note = "On the diagonal the handles carry alike; on an axis one of them is slack.".into();
+    let both = first[range.clone()].iter().zip(&second[range]).filter(|(a, b)| a.is_finite() && b.is_finite());
+    let (x, y): (Vec<f64>, Vec<f64>) = both.map(|(a, b)| (*a, *b)).unzip();
+    p.series.push(Series { name: "samples".into(), x: thin(x), y: thin(y), colour: 0 });
+    p.points = true;
+    Some(p)
+}
+
+/// One in so many of a long curve in a plane: at most 4000.
+fn thin(x: Vec<f64>) -> Vec<f64> {
+    let step = x.len().div_ceil(4000).max(1);
+    x.into_iter().step_by(step).collect()
+}
+
+/// Length of a spectrogram's segment [s].
+const SPECTROGRAM_SEGMENT_S: f64 = 8.0;
+
+/// Density of the roll over time, in decibels, over the whole recording.
+fn roll_spectrogram(a: &Analysis) -> Option<Image> {
+    let i = &a.inputs;
+    if i.roll_rad.len() != i.t_s.len() || i.roll_rad.iter().any(|x| !x.is_finite()) {
+        return None;
+    }
+    let fs_hz = 1.0 / crate::inputs::mean_step_s(&i.t_s)?;
+    let nperseg = (SPECTROGRAM_SEGMENT_S * fs_hz).round() as usize;
+    if i.roll_rad.len() < 2 * nperseg {
+        return None;
+    }
+    // About 240 columns, whatever the length.
+    let step = ((i.roll_rad.len() - nperseg) / 240).max(1).min(nperseg / 2);
+    let options = Options { noverlap: Some(nperseg - step), ..Options { nperseg, ..Options::default() } };
+    let degrees: Vec<f64> = i.roll_rad.iter().map(|x| x.to_degrees()).collect();
+    let s = spectrogram(&degrees, fs_hz, &options, Mode::Psd).ok()?;
+    let f_hz = a.metrics.number("beat_hz").or_else(|| a.metrics.number("peak_hz"));
+    let reach = f_hz.map_or(fs_hz / 2.0, |f| (2.5 * f).min(fs_hz / 2.0));
+    let bins = s.hz.iter().take_while(|f| **f <= reach).count();
+    let every = s.power.len().div_ceil(300).max(1);
+    let values: Vec<Vec<f64>> = s.power.iter().step_by(every).map(|p| p[..bins].iter().map(|p| 10.0 * p.max(1e-12).log10()).collect()).collect();
+    Some(Image {
+        id: "spectrogram",
+        title: "Spectrogram of the roll".into(),
+        note: format!("Segments of {SPECTROGRAM_SEGMENT_S:.0} s, {:.3} Hz apart.", s.hz[1]),
+        y_label: "frequency, Hz".into(),
+        value_label: "dB re 1 deg²/Hz".into(),
+        x_range: (i.t_s[0] + s.t_s[0], i.t_s[0] + s.t_s[s.t_s.len() - 1]),
+        y_range: (0.0, s.hz[bins - 1]),
+        values,
+    })
+}

@@ -1,0 +1,294 @@
+//! The form for people: at most 100 columns wide, what matters first.
+
+use std::fmt::Write;
+
+use crate::examine::Analysis;
+use crate::metrics::{self, Datum, Value};
+
+/// Signals shown before the rest is only counted, unless the user named signals.
+const MOST_SIGNALS: usize = 40;
+/// Events of one kind told one by one; more are counted.
+const MOST_EVENTS: usize = 3;
+/// Width of the whole table.
+const WIDTH: usize = 100;
+
+/// One recording as text. `all_signals` lists every signal, however many there are.
+pub fn table(a: &Analysis, all_signals: bool) -> String {
+    let mut out = String::new();
+    head(&mut out, a);
+    metrics_section(&mut out, a);
+    spectra_section(&mut out, a);
+    events_section(&mut out, a);
+    signals_section(&mut out, a, all_signals);
+    quality_section(&mut out, a);
+    out
+}
+
+/// Writing into a string cannot fail.
+macro_rules! line {
+    ($out:expr $(, $($arg:tt)*)?) => {{ let _ = writeln!($out $(, $($arg)*)?); }};
+}
+
+fn head(out: &mut String, a: &Analysis) {
+    line!(out, "{}", a.file);
+    line!(
+        out,
+        "  {} s, {} samples; analysed from {} to {} s",
+        plain(a.duration_s, 3),
+        thousands(a.samples),
+        plain(a.window.start_s, 3),
+        plain(a.window.end_s, 3)
+    );
+    let library = if a.library.is_empty() { "unnamed software".to_owned() } else { a.library.clone() };
+    line!(out, "  {} messages on {} topics, written by {library}", thousands(a.messages), a.topics.len());
+    let told: Vec<String> =
+        ["scene", "seed", "method", "source"].iter().filter_map(|key| a.metadata.iter().find(|(k, _)| k == key)).map(|(k, v)| format!("{k} {v}")).collect();
+    if !told.is_empty() {
+        line!(out, "  {}", told.join(", "));
+    }
+    for (role, players) in &a.roles {
+        let shown = match players.len() {
+            0..=2 => players.join(", "),
+            n => format!("{}, … {} ({n})", players[0], players[n - 1]),
+        };
+        line!(out, "  {role:<11} {shown}");
+    }
+    for warning in &a.warnings {
+        wrapped(out, "  ! ", warning);
+    }
+    if a.salvaged {
+        line!(out, "  ! its summary is missing or wrong: the file was searched from end to end");
+    }
+    if a.skipped_messages > 0 {
+        line!(out, "  ! {} messages are lost", thousands(a.skipped_messages));
+    }
+}
+
+fn metrics_section(out: &mut String, a: &Analysis) {
+    let known: Vec<(&str, &Value)> = a.metrics.iter().filter(|(_, v)| v.datum != Datum::Missing).collect();
+    let mut missing: Vec<(&str, Vec<&str>)> = Vec::new();
+    for (name, value) in a.metrics.iter().filter(|(_, v)| v.datum == Datum::Missing) {
+        let reason = value.reason.as_deref().unwrap_or("");
+        match missing.iter_mut().find(|(r, _)| *r == reason) {
+            Some((_, names)) => names.push(name),
+            None => missing.push((reason, vec![name])),
+        }
+    }
+    if !known.is_empty() {
+        line!(out, "\nMetrics");
+        for (name, value) in known {
+            let label = metrics::find(name).map_or(name, |m| m.label);
+            let unit = match value.unit {
+                "1" | "bool" | "-" => "",
+                unit => unit,
+            };
+            let shown = match &value.datum {
+                Datum::Number(x) => figures(*x),
+                Datum::Bool(x) => (if *x { "yes" } else { "no" }).to_owned(),
+                Datum::Word(x) => (*x).to_owned(),
+                Datum::Missing => String::new(),
+            };
+            let mut note = value.source.clone();
+            if let Some([low, high]) = value.ci95 {
+                let _ = write!(note, "  95 %: {} … {}", figures(low), figures(high));
+            }
+            if !value.per.is_empty() {
+                let most = 4;
+                let per: Vec<String> = value.per.iter().take(most).map(|x| figures(*x)).collect();
+                let rest = if value.per.len() > most { ", …" } else { "" };
+                let _ = write!(note, "  [{}{rest}]", per.join(", "));
+            }
+            line!(out, "  {label:<30} {shown:>10} {unit:<4} {name:<18} {note}");
+            if let (Datum::Word(_), Some(reason)) = (&value.datum, &value.reason) {
+                wrapped(out, "      ", reason);
+            }
+        }
+    }
+    for (reason, names) in missing {
+        wrapped(out, "  – ", &format!("{reason}: no {}", names.join(", ")));
+    }
+}
+
+fn spectra_section(out: &mut String, a: &Analysis) {
+    let Some((_, first)) = a.spectra.first() else { return };
+    let f = first.f_hz.map(|f| format!(", f = {} Hz", figures(f))).unwrap_or_default();
+    line!(
+        out,
+        "\nSpectra (Welch, {} × {} s, {} Hz apart, noise bandwidth {} Hz, 95 %: × {} … {}{f})",
+        first.segments,
+        plain(first.segment_s, 1),
+        figures(first.resolution_hz),
+        figures(first.enbw_hz),
+        plain(first.confidence_95[0], 2),
+        plain(first.confidence_95[1], 2)
+    );
+    for (path, s) in &a.spectra {
+        let told: Vec<String> = s
+            .peaks
+            .iter()
+            .take(4)
+            .map(|p| match p.kind {
+                "other" => format!("{} Hz", plain(p.hz, 3)),
+                kind => format!("{} Hz = {kind}", plain(p.hz, 3)),
+            })
+            .collect();
+        let told = if told.is_empty() { "no line stands out".to_owned() } else { told.join(", ") };
+        line!(out, "  {:<32} {told}", shortened(path, 32));
+    }
+}
+
+fn events_section(out: &mut String, a: &Analysis) {
+    if a.events.is_empty() {
+        return;
+    }
+    line!(out, "\nEvents");
+    let mut kinds: Vec<&str> = Vec::new();
+    for e in &a.events {
+        if !kinds.contains(&e.kind) {
+            kinds.push(e.kind);
+        }
+    }
+    for kind in kinds {
+        let of_kind: Vec<_> = a.events.iter().filter(|e| e.kind == kind).collect();
+        let told = if of_kind.len() > MOST_EVENTS { 1 } else { of_kind.len() };
+        for e in &of_kind[..told] {
+            wrapped_after(out, &format!("  {:>9} s  {:<17} ", plain(e.t_s, 3), e.kind), &e.what);
+        }
+        if told < of_kind.len() {
+            let last = of_kind[of_kind.len() - 1];
+            line!(out, "  {:>11}  {kind:<17} … {} in all, the last at {} s", "", thousands(of_kind.len() as u64), plain(last.t_s, 3));
+        }
+    }
+}
+
+fn signals_section(out: &mut String, a: &Analysis, all: bool) {
+    if a.signals.is_empty() {
+        return;
+    }
+    let shown = if all { a.signals.len() } else { a.signals.len().min(MOST_SIGNALS) };
+    line!(out, "\n{:<41} {:>8} {:>8} {:>9} {:>9} {:>9} {:>9}", "Signals", "Hz", "min", "mean", "max", "SD", "peak Hz");
+    let cell = |x: Option<f64>| x.map_or("–".to_owned(), short);
+    for (path, s) in &a.signals[..shown] {
+        let name = if s.unit.is_empty() { path.clone() } else { format!("{path} [{}]", s.unit) };
+        line!(
+            out,
+            "  {:<39} {:>8} {:>8} {:>9} {:>9} {:>9} {:>9}",
+            shortened(&name, 39),
+            cell(s.hz),
+            cell(s.min),
+            cell(s.mean),
+            cell(s.max),
+            cell(s.sd),
+            cell(s.peak_hz)
+        );
+    }
+    if shown < a.signals.len() {
+        line!(out, "  … and {} more: --signal '*' lists all, --signal PATH some of them", a.signals.len() - shown);
+    }
+}
+
+fn quality_section(out: &mut String, a: &Analysis) {
+    if a.quality.is_empty() {
+        return;
+    }
+    line!(out, "\nQuality");
+    for q in &a.quality {
+        let at = q.t_s.map(|t| format!(" (first at {} s)", plain(t, 3))).unwrap_or_default();
+        let topic = if q.topic.is_empty() { String::new() } else { format!("{}: ", q.topic) };
+        wrapped(out, if q.loss { "  ! " } else { "  – " }, &format!("{topic}{}{at}", q.text));
+    }
+}
+
+/// Text after a first indent, broken at blanks before [`WIDTH`]; the following lines are indented as deep.
+fn wrapped(out: &mut String, indent: &str, text: &str) {
+    wrapped_after(out, indent, text);
+}
+
+fn wrapped_after(out: &mut String, indent: &str, text: &str) {
+    let depth = indent.chars().count();
+    let mut line = indent.to_owned();
+    let mut width = depth;
+    for word in text.split_whitespace() {
+        let n = word.chars().count();
+        if width + n > WIDTH && width > depth {
+            line!(out, "{}", line.trim_end());
+            line = " ".repeat(depth);
+            width = depth;
+        }
+        line.push_str(word);
+        line.push(' ');
+        width += n + 1;
+    }
+    line!(out, "{}", line.trim_end());
+}
+
+/// A number with so many decimals, without trailing zeros.
+fn plain(x: f64, decimals: usize) -> String {
+    let text = format!("{x:.decimals$}");
+    match text.contains('.') {
+        true => text.trim_end_matches('0').trim_end_matches('.').to_owned(),
+        false => text,
+    }
+}
+
+/// Five significant figures for a metric.
+pub(super) fn figures(x: f64) -> String {
+    if x == 0.0 {
+        return "0".into();
+    }
+    let size = x.abs().log10().floor() as i32;
+    match size {
+        -4..=5 => format!("{x:.*}", (4 - size).clamp(0, 6) as usize),
+        _ => format!("{x:.4e}"),
+    }
+}
+
+/// At most eight characters for a cell of the signals.
+fn short(x: f64) -> String {
+    if x == 0.0 {
+        return "0".into();
+    }
+    let size = x.abs().log10().floor() as i32;
+    match size {
+        -3..=5 => plain(x, (3 - size).clamp(0, 5) as usize),
+        _ => format!("{x:.1e}"),
+    }
+}
+
+pub(super) fn thousands(n: u64) -> String {
+    let digits = n.to_string();
+    let mut out = String::new();
+    for (k, c) in digits.chars().enumerate() {
+        if k > 0 && (digits.len() - k) % 3 == 0 {
+            out.push(',');
+        }
+        out.push(c);
+    }
+    out
+}
+
+/// The end of a path says more than its beginning.
+pub(super) fn shortened(path: &str, width: usize) -> String {
+    let n = path.chars().count();
+    match n > width {
+        true => format!("…{}", path.chars().skip(n - width + 1).collect::<String>()),
+        false => path.to_owned(),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn numbers_are_short_and_true() {
+        assert_eq!(figures(19.368460680515074), "19.368");
+        assert_eq!(figures(0.0315551), "0.031555");
+        assert_eq!(figures(294.9194), "294.92");
+        assert_eq!(short(-0.000123), "-1.2e-4");
+        assert_eq!(short(1234567.0), "1.2e6");
+        assert_eq!(plain(15.0, 3), "15");
+        assert_eq!(thousands(1840000), "1,840,000");
+        assert_eq!(shortened("/imu/rath.angular_velocity.x", 10), "…elocity.x");
+    }
+}

@@ -1,0 +1,324 @@
+//! Which signal is what: named by the user, inferred from schemas otherwise, printed always.
+
+use std::collections::BTreeMap;
+
+use serde::Deserialize;
+
+/// The columns that metrics are computed from.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash, serde::Serialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Role {
+    /// Height of the centre of mass [m].
+    Height,
+    /// Rotation about the pole [rad].
+    Roll,
+    /// Tilt of the pole [rad].
+    Pitch,
+    /// Heading [rad].
+    Yaw,
+    /// Normal force of one handle [N]; as many as there are handles.
+    Forces,
+    /// Gait phase of one carrier [rad]; as many as there are carriers.
+    Phases,
+    /// Phase of the beat [rad].
+    BeatPhase,
+    /// Topic of the IMU on what is carried.
+    Imu,
+    /// Topic of the IMU of one carrier.
+    Carriers,
+    /// Topic with one message per beat.
+    Beats,
+    /// Topic of a true pose, for judging estimates.
+    Truth,
+}
+
+impl Role {
+    /// All roles, in the order in which they are printed.
+    pub const ALL: [Role; 11] = [
+        Role::Height,
+        Role::Roll,
+        Role::Pitch,
+        Role::Yaw,
+        Role::Forces,
+        Role::Phases,
+        Role::BeatPhase,
+        Role::Imu,
+        Role::Carriers,
+        Role::Beats,
+        Role::Truth,
+    ];
+
+    /// Its name in a roles file and in JSON.
+    pub fn name(self) -> &'static str {
+        match self {
+            Role::Height => "height",
+            Role::Roll => "roll",
+            Role::Pitch => "pitch",
+            Role::Yaw => "yaw",
+            Role::Forces => "forces",
+            Role::Phases => "phases",
+            Role::BeatPhase => "beat_phase",
+            Role::Imu => "imu",
+            Role::Carriers => "carriers",
+            Role::Beats => "beats",
+            Role::Truth => "truth",
+        }
+    }
+
+    /// Whether the role is played by whole topics, not by single signals.
+    pub fn is_topic(self) -> bool {
+        matches!(self, Role::Imu | Role::Carriers | Role::Beats | Role::Truth)
+    }
+}
+
+/// What a `--roles` file may say: `height = "/odom.pose.pose.position.z"`, `forces = ["/left.wrench.force.z", ...]`, ...
+#[derive(Clone, Debug, Default, PartialEq, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct RolesFile {
+    height: Option<String>,
+    roll: Option<String>,
+    pitch: Option<String>,
+    yaw: Option<String>,
+    #[serde(default)]
+    forces: Vec<String>,
+    #[serde(default)]
+    phases: Vec<String>,
+    beat_phase: Option<String>,
+    imu: Option<String>,
+    #[serde(default)]
+    carriers: Vec<String>,
+    beats: Option<String>,
+    truth: Option<String>,
+    /// Mass of what is carried [kg]; stands over the recording's own.
+    pub mass_kg: Option<f64>,
+    /// Gravity [m/s²]; stands over the recording's own.
+    pub gravity_m_per_s2: Option<f64>,
+    /// Start of the analysis window [s], where `--window` does not say.
+    pub analysis_start_s: Option<f64>,
+}
+
+impl RolesFile {
+    fn patterns(&self, role: Role) -> Vec<String> {
+        match role {
+            Role::Height => self.height.iter().cloned().collect(),
+            Role::Roll => self.roll.iter().cloned().collect(),
+            Role::Pitch => self.pitch.iter().cloned().collect(),
+            Role::Yaw => self.yaw.iter().cloned().collect(),
+            Role::Forces => self.forces.clone(),
+            Role::Phases => self.phases.clone(),
+            Role::BeatPhase => self.beat_phase.iter().cloned().collect(),
+            Role::Imu => self.imu.iter().cloned().collect(),
+            Role::Carriers => self.carriers.clone(),
+            Role::Beats => self.beats.iter().cloned().collect(),
+            Role::Truth => self.truth.iter().cloned().collect(),
+        }
+    }
+}
+
+/// How a message type plays roles when nobody says otherwise: (schema, role, field pattern).
+const BY_SCHEMA: &[(&str, Role, &str)] = &[
+    ("rath.State", Role::Height, "position_m.z"),
+    ("rath.State", Role::Roll, "roll_rad"),
+    ("rath.State", Role::Pitch, "pitch_rad"),
+    ("rath.State", Role::Yaw, "yaw_rad"),
+    ("rath.HandleForces", Role::Forces, "normal_n[*]"),
+    ("rath.Phases", Role::Phases, "phase_rad[*]"),
+    ("rath.Phases", Role::BeatPhase, "beat_phase_rad"),
+    ("nav_msgs/Odometry", Role::Height, "pose.pose.position.z"),
+    ("nav_msgs/Odometry", Role::Roll, "pose.pose.orientation.roll"),
+    ("nav_msgs/Odometry", Role::Pitch, "pose.pose.orientation.pitch"),
+    ("nav_msgs/Odometry", Role::Yaw, "pose.pose.orientation.yaw"),
+    ("geometry_msgs/PoseStamped", Role::Height, "pose.position.z"),
+    ("geometry_msgs/PoseStamped", Role::Roll, "pose.orientation.roll"),
+    ("geometry_msgs/PoseStamped", Role::Pitch, "pose.orientation.pitch"),
+    ("geometry_msgs/PoseStamped", Role::Yaw, "pose.orientation.yaw"),
+    ("foxglove.PoseInFrame", Role::Height, "pose.position.z"),
+    ("foxglove.PoseInFrame", Role::Roll, "pose.orientation.roll"),
+    ("foxglove.PoseInFrame", Role::Pitch, "pose.orientation.pitch"),
+    ("foxglove.PoseInFrame", Role::Yaw, "pose.orientation.yaw"),
+    ("geometry_msgs/WrenchStamped", Role::Forces, "wrench.force.z"),
+];
+
+/// Which signals and topics play which role.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Roles {
+    patterns: BTreeMap<Role, Vec<String>>,
+}
+
+impl Roles {
+    /// From the channels (topic, schema) of a recording, and what the user says; the user's word stands over inference, role by role.
+    pub fn infer<'a>(channels: impl Iterator<Item = (&'a str, &'a str)>, user: Option<&RolesFile>) -> Self {
+        let mut channels: Vec<(&str, String)> = channels.map(|(topic, schema)| (topic, schema.replacen("/msg/", "/", 1))).collect();
+        channels.sort();
+        channels.dedup();
+        let mut roles = Roles::default();
+        for (schema, role, field) in BY_SCHEMA {
+            // Rows of one role stand in order of preference; forces may come from several topics of one type.
+            if roles.patterns.contains_key(role) {
+                continue;
+            }
+            let mut found: Vec<String> =
+                channels.iter().filter(|(t, s)| s == schema && !is_truth(t)).map(|(t, _)| format!("{t}.{field}")).collect();
+            if !matches!(role, Role::Forces) {
+                found.truncate(1);
+            }
+            if !found.is_empty() {
+                roles.patterns.insert(*role, found);
+            }
+        }
+        let of_type = |schemas: &[&str]| -> Vec<String> {
+            channels.iter().filter(|(_, s)| schemas.contains(&s.as_str())).map(|(t, _)| (*t).to_owned()).collect()
+        };
+        let (carriers, others): (Vec<String>, Vec<String>) = of_type(&["sensor_msgs/Imu"]).into_iter().partition(|t| is_carrier(t));
+        if !others.is_empty() {
+            roles.patterns.insert(Role::Imu, vec![preferred(&others)]);
+        }
+        if !carriers.is_empty() {
+            roles.patterns.insert(Role::Carriers, natural_order(carriers));
+        }
+        let beats = of_type(&["rath.Beat"]);
+        if !beats.is_empty() {
+            roles.patterns.insert(Role::Beats, beats[..1].to_vec());
+        }
+        let pose = ["geometry_msgs/PoseStamped", "nav_msgs/Odometry", "foxglove.PoseInFrame", "rath.State"];
+        if let Some(truth) = of_type(&pose).into_iter().find(|t| is_truth(t)) {
+            roles.patterns.insert(Role::Truth, vec![truth]);
+        } else if let Some(state) = of_type(&["rath.State"]).first() {
+            roles.patterns.insert(Role::Truth, vec![state.clone()]);
+        }
+        if let Some(user) = user {
+            for role in Role::ALL {
+                let said = user.patterns(role);
+                if !said.is_empty() {
+                    roles.patterns.insert(role, said);
+                }
+            }
+        }
+        roles
+    }
+
+    /// The patterns of a role: paths of signals, or topics, `*` standing for anything.
+    pub fn patterns(&self, role: Role) -> &[String] {
+        self.patterns.get(&role).map_or(&[], |p| &p[..])
+    }
+
+    /// The topic that plays a role.
+    pub fn topic(&self, role: Role) -> Option<&str> {
+        self.patterns(role).first().map(String::as_str)
+    }
+
+    /// The roles of signals that a path plays.
+    pub fn of_signal(&self, path: &str) -> Option<Role> {
+        let plays = |(role, patterns): (&Role, &Vec<String>)| {
+            (!role.is_topic() && patterns.iter().any(|p| matches(p, path))).then_some(*role)
+        };
+        self.patterns.iter().find_map(plays)
+    }
+
+    /// Role and patterns, in printing order.
+    pub fn iter(&self) -> impl Iterator<Item = (Role, &[String])> {
+        self.patterns.iter().map(|(r, p)| (*r, &p[..]))
+    }
+}
+
+fn is_truth(topic: &str) -> bool {
+    topic.to_lowercase().contains("truth")
+}
+
+fn is_carrier(topic: &str) -> bool {
+    let topic = topic.to_lowercase();
+    ["carrier", "bearer", "walker", "person"].iter().any(|word| topic.contains(word))
+}
+
+/// Of several IMUs the one whose name speaks of what is carried, else the first by name.
+fn preferred(topics: &[String]) -> String {
+    let about = ["rath", "palanquin", "palki", "pole", "load", "body"];
+    topics.iter().find(|t| about.iter().any(|word| t.to_lowercase().contains(word))).unwrap_or(&topics[0]).clone()
+}
+
+/// `carrier_2` before `carrier_10`.
+fn natural_order(mut names: Vec<String>) -> Vec<String> {
+    let number = |name: &str| -> u64 {
+        let digits: String = name.chars().filter(char::is_ascii_digit).take(18).collect();
+        digits.parse().unwrap_or(0)
+    };
+    names.sort_by(|a, b| (number(a), a).cmp(&(number(b), b)));
+    names
+}
+
+/// Whether `path` fits `pattern`, in which `*` stands for any characters, none included.
+pub fn matches(pattern: &str, path: &str) -> bool {
+    let (p, s) = (pattern.as_bytes(), path.as_bytes());
+    let (mut i, mut j, mut star, mut mark) = (0, 0, None, 0);
+    while j < s.len() {
+        if i < p.len() && p[i] == b'*' {
+            star = Some(i);
+            mark = j;
+            i += 1;
+        } else if i < p.len() && p[i] == s[j] {
+            i += 1;
+            j += 1;
+        } else if let Some(at) = star {
+            i = at + 1;
+            mark += 1;
+            j = mark;
+        } else {
+            return false;
+        }
+    }
+    p[i..].iter().all(|c| *c == b'*')
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn wildcards() {
+        for (pattern, path, fits) in [
+            ("/imu/rath.angular_velocity.x", "/imu/rath.angular_velocity.x", true),
+            ("/imu/*", "/imu/rath.angular_velocity.x", true),
+            ("*.x", "/imu/rath.angular_velocity.x", true),
+            ("*.x", "/imu/rath.angular_velocity.y", false),
+            ("/a.n[*]", "/a.n[12]", true),
+            ("/a.n[*]", "/a.n[12].x", false),
+            ("*a*b*", "xxaxxbxx", true),
+            ("*a*b*", "xxbxxaxx", false),
+            ("", "", true),
+            ("*", "", true),
+        ] {
+            assert_eq!(matches(pattern, path), fits, "{pattern} {path}");
+        }
+    }
+
+    #[test]
+    fn our_own_topics_are_recognised() {
+        let channels = [
+            ("/rath/state", "rath.State"),
+            ("/handles/forces", "rath.HandleForces"),
+            ("/carriers/phases", "rath.Phases"),
+            ("/imu/rath", "sensor_msgs/msg/Imu"),
+            ("/imu/carrier_10", "sensor_msgs/msg/Imu"),
+            ("/imu/carrier_2", "sensor_msgs/msg/Imu"),
+        ];
+        let roles = Roles::infer(channels.into_iter(), None);
+        assert_eq!(roles.of_signal("/rath/state.roll_rad"), Some(Role::Roll));
+        assert_eq!(roles.of_signal("/handles/forces.normal_n[3]"), Some(Role::Forces));
+        assert_eq!(roles.of_signal("/handles/forces.compression_m[3]"), None);
+        assert_eq!(roles.topic(Role::Imu), Some("/imu/rath"));
+        assert_eq!(roles.patterns(Role::Carriers), ["/imu/carrier_2", "/imu/carrier_10"]);
+        assert_eq!(roles.topic(Role::Truth), Some("/rath/state"));
+    }
+
+    #[test]
+    fn a_true_pose_is_no_measurement_and_the_user_is_right() {
+        let channels = [("/truth/pose", "geometry_msgs/msg/PoseStamped"), ("/imu/data", "sensor_msgs/msg/Imu")];
+        let roles = Roles::infer(channels.into_iter(), None);
+        assert_eq!(roles.patterns(Role::Height), [""; 0]);
+        assert_eq!(roles.topic(Role::Truth), Some("/truth/pose"));
+        let user = RolesFile { height: Some("/x.z".into()), ..RolesFile::default() };
+        let roles = Roles::infer(channels.into_iter(), Some(&user));
+        assert_eq!(roles.of_signal("/x.z"), Some(Role::Height));
+        assert_eq!(roles.topic(Role::Imu), Some("/imu/data"));
+    }
+}

@@ -1,0 +1,307 @@
+//! One line per signal of any recording: count, rate, jitter, range, mean, spread and strongest line, from batches as they
+//! come, in memory that does not grow with the file.
+
+use crate::spectrum::stream::WelchStream;
+use crate::spectrum::{DEFAULT_SEGMENT_S, Options, Spectrum};
+
+/// What a signal came to.
+#[derive(Clone, Debug, PartialEq, serde::Serialize)]
+pub struct Summary {
+    /// Finite values.
+    pub count: u64,
+    /// Mean rate: (messages − 1) / (last − first log time) [Hz]; `None` below two.
+    pub hz: Option<f64>,
+    /// Population standard deviation of the steps between log times [s].
+    pub jitter_s: Option<f64>,
+    /// Smallest value.
+    pub min: Option<f64>,
+    /// Largest value.
+    pub max: Option<f64>,
+    /// Mean.
+    pub mean: Option<f64>,
+    /// Population standard deviation.
+    pub sd: Option<f64>,
+    /// Strongest line of Welch's spectrum, constant part taken off [Hz].
+    pub peak_hz: Option<f64>,
+    /// Unit, where known.
+    pub unit: String,
+}
+
+/// Moments of a stream, merged batch by batch.
+///
+/// ```text
+/// mean ← mean + δ·n_b/n,   M₂ ← M₂ + M₂_b + δ²·n_a·n_b/n,   δ = mean_b − mean_a
+/// ```
+/// Source: Chan, Golub & LeVeque, Am. Stat. 37 (1983) 242. Non-finite values are left out.
+#[derive(Clone, Debug, Default)]
+pub struct Moments {
+    count: u64,
+    mean: f64,
+    m2: f64,
+    min: f64,
+    max: f64,
+}
+
+/// Lanes of the inner sums: as many independent additions as keep the processor busy.
+const LANES: usize = 8;
+
+impl Moments {
+    /// The next values, all finite.
+    pub fn push_finite(&mut self, x: &[f64]) {
+        let Some(&shift) = x.first() else { return };
+        let (mut sum, mut squares) = ([0.0f64; LANES], [0.0f64; LANES]);
+        let (mut low, mut high) = ([shift; LANES], [shift; LANES]);
+        let chunks = x.chunks_exact(LANES);
+        let rest = chunks.remainder();
+        for chunk in chunks {
+            for l in 0..LANES {
+                let d = chunk[l] - shift;
+                sum[l] += d;
+                squares[l] += d * d;
+                low[l] = if chunk[l] < low[l] { chunk[l] } else { low[l] };
+                high[l] = if chunk[l] > high[l] { chunk[l] } else { high[l] };
+            }
+        }
+        for (l, x) in rest.iter().enumerate() {
+            let d = x - shift;
+            sum[l] += d;
+            squares[l] += d * d;
+            low[l] = low[l].min(*x);
+            high[l] = high[l].max(*x);
+        }
+        let n = x.len() as f64;
+        let (sum, squares): (f64, f64) = (sum.iter().sum(), squares.iter().sum());
+        self.merge(&Moments {
+            count: x.len() as u64,
+            mean: shift + sum / n,
+            m2: (squares - sum * sum / n).max(0.0),
+            min: low.iter().copied().fold(shift, f64::min),
+            max: high.iter().copied().fold(shift, f64::max),
+        });
+    }
+
+    /// Joins the moments of other values to these.
+    pub fn merge(&mut self, other: &Moments) {
+        if other.count == 0 {
+            return;
+        }
+        if self.count == 0 {
+            *self = other.clone();
+            return;
+        }
+        let (a, b) = (self.count as f64, other.count as f64);
+        let delta = other.mean - self.mean;
+        self.count += other.count;
+        self.mean += delta * b / (a + b);
+        self.m2 += other.m2 + delta * delta * a * b / (a + b);
+        self.min = self.min.min(other.min);
+        self.max = self.max.max(other.max);
+    }
+
+    /// How many values.
+    pub fn count(&self) -> u64 {
+        self.count
+    }
+
+    /// Mean of the values; `None` for none, or where it is beyond what a float can hold.
+    pub fn mean(&self) -> Option<f64> {
+        (self.count > 0 && self.mean.is_finite()).then_some(self.mean)
+    }
+
+    /// Population standard deviation.
+    pub fn sd(&self) -> Option<f64> {
+        let sd = (self.m2 / self.count as f64).sqrt();
+        (self.count > 0 && sd.is_finite()).then_some(sd)
+    }
+
+    /// Smallest and largest value.
+    pub fn range(&self) -> Option<(f64, f64)> {
+        (self.count > 0).then_some((self.min, self.max))
+    }
+}
+
+/// The times of a topic's messages: rate and jitter.
+#[derive(Clone, Debug, Default)]
+pub struct Times {
+    count: u64,
+    first_ns: i64,
+    last_ns: i64,
+    earliest_ns: i64,
+    latest_ns: i64,
+    steps: Moments,
+    buffer: Vec<f64>,
+}
+
+impl Times {
+    /// The next log times.
+    pub fn push(&mut self, times_ns: &[i64]) {
+        let (Some(&first), Some(&last)) = (times_ns.first(), times_ns.last()) else { return };
+        self.buffer.clear();
+        if self.count == 0 {
+            (self.first_ns, self.earliest_ns, self.latest_ns) = (first, first, first);
+        } else {
+            self.buffer.push(seconds(self.last_ns, first));
+        }
+        self.buffer.extend(times_ns.windows(2).map(|w| seconds(w[0], w[1])));
+        for t in times_ns {
+            self.earliest_ns = self.earliest_ns.min(*t);
+            self.latest_ns = self.latest_ns.max(*t);
+        }
+        self.count += times_ns.len() as u64;
+        self.last_ns = last;
+        self.steps.push_finite(&self.buffer);
+    }
+
+    /// Messages so far.
+    pub fn count(&self) -> u64 {
+        self.count
+    }
+
+    /// Mean rate [Hz].
+    pub fn hz(&self) -> Option<f64> {
+        let span_s = seconds(self.earliest_ns, self.latest_ns);
+        (self.count > 1 && span_s > 0.0).then(|| (self.count - 1) as f64 / span_s)
+    }
+
+    /// Population standard deviation of the steps [s].
+    pub fn jitter_s(&self) -> Option<f64> {
+        self.steps.sd()
+    }
+}
+
+/// `to − from` in seconds, without overflow.
+fn seconds(from_ns: i64, to_ns: i64) -> f64 {
+    (i128::from(to_ns) - i128::from(from_ns)) as f64 / 1e9
+}
+
+/// One signal's moments and spectrum while the recording streams by.
+pub struct Stream {
+    moments: Moments,
+    welch: Option<WelchStream>,
+    held: f64,
+    filled: Vec<f64>,
+}
+
+/// The segment for a signal of about `hz` and `messages` values: a power of two near [`DEFAULT_SEGMENT_S`], never longer than the signal.
+pub fn segment(hz: f64, messages: u64) -> usize {
+    let wanted = (hz * DEFAULT_SEGMENT_S).clamp(16.0, 1e6) as usize;
+    let longest = (messages.max(2) as usize).min(1 << 20);
+    // The power of two below: 10 to 20 s.
+    let power = if wanted.is_power_of_two() { wanted } else { wanted.next_power_of_two() / 2 };
+    power.min(longest)
+}
+
+impl Stream {
+    /// For a signal of about `hz`; `nperseg` 0 leaves the spectrum out.
+    pub fn new(hz: f64, nperseg: usize) -> Self {
+        let options = Options { nperseg, ..Options::default() };
+        let welch = (nperseg > 1 && hz > 0.0).then(|| WelchStream::new(hz, &options).ok()).flatten();
+        Stream { moments: Moments::default(), welch, held: 0.0, filled: Vec::new() }
+    }
+
+    /// The next values. Non-finite ones do not count; in the spectrum the last finite one stands for them.
+    pub fn push(&mut self, x: &[f64]) {
+        if x.iter().all(|x| x.is_finite()) {
+            self.moments.push_finite(x);
+            if let Some(last) = x.last() {
+                self.held = *last;
+            }
+            if let Some(welch) = &mut self.welch {
+                welch.push(x);
+            }
+            return;
+        }
+        self.filled.clear();
+        self.filled.extend(x.iter().copied().filter(|x| x.is_finite()));
+        self.moments.push_finite(&self.filled);
+        self.filled.clear();
+        for x in x {
+            if x.is_finite() {
+                self.held = *x;
+            }
+            self.filled.push(self.held);
+        }
+        if let Some(welch) = &mut self.welch {
+            welch.push(&self.filled);
+        }
+    }
+
+    /// The spectrum, its frequencies scaled to the rate `hz` that was found in the end.
+    pub fn spectrum(&self, hz: f64) -> Option<Spectrum> {
+        self.welch.as_ref()?.finish_at(hz).ok()
+    }
+
+    /// The line of the table.
+    pub fn summary(&self, times: &Times, unit: &str) -> Summary {
+        let range = self.moments.range();
+        let hz = times.hz();
+        let moves = range.is_some_and(|(low, high)| high > low);
+        Summary {
+            count: self.moments.count(),
+            hz,
+            jitter_s: times.jitter_s(),
+            min: range.map(|r| r.0),
+            max: range.map(|r| r.1),
+            mean: self.moments.mean(),
+            sd: self.moments.sd(),
+            peak_hz: hz.filter(|_| moves).and_then(|hz| self.spectrum(hz)).and_then(|s| s.peak_hz()),
+            unit: unit.to_owned(),
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn moments_do_not_depend_on_the_batches() {
+        let x: Vec<f64> = (0..1000).map(|k| 1e6 + (k as f64 * 0.37).sin()).collect();
+        let mean = x.iter().sum::<f64>() / 1000.0;
+        let sd = (x.iter().map(|x| (x - mean).powi(2)).sum::<f64>() / 1000.0).sqrt();
+        for batch in [1, 3, 8, 100, 1000] {
+            let mut m = Moments::default();
+            x.chunks(batch).for_each(|c| m.push_finite(c));
+            assert!((m.mean().unwrap() - mean).abs() < 1e-9 && (m.sd().unwrap() / sd - 1.0).abs() < 1e-9, "{batch}");
+            let range = m.range().unwrap();
+            assert_eq!(range.0, x.iter().copied().fold(f64::INFINITY, f64::min));
+            assert_eq!(range.1, x.iter().copied().fold(f64::NEG_INFINITY, f64::max));
+        }
+        assert_eq!(Moments::default().mean(), None);
+    }
+
+    #[test]
+    fn rate_and_jitter_come_from_the_times() {
+        let mut times = Times::default();
+        times.push(&[0, 10_000_000]);
+        times.push(&[20_000_000, 31_000_000, 40_000_000]);
+        assert_eq!(times.hz(), Some(100.0));
+        // Steps 10, 10, 11, 9 ms.
+        assert!((times.jitter_s().unwrap() - (0.5f64).sqrt() * 1e-3).abs() < 1e-12);
+        let mut odd = Times::default();
+        odd.push(&[i64::MIN, i64::MAX, 5]);
+        assert!(odd.hz().unwrap() > 0.0);
+    }
+
+    #[test]
+    fn nan_is_left_out_of_the_moments_and_held_in_the_spectrum() {
+        let mut s = Stream::new(100.0, 128);
+        let mut times = Times::default();
+        let x: Vec<f64> =
+            (0..1000).map(|k| if k % 100 == 7 { f64::NAN } else { (std::f64::consts::TAU * 5.0 * k as f64 / 100.0).sin() }).collect();
+        s.push(&x);
+        times.push(&(0..1000).map(|k| k * 10_000_000).collect::<Vec<_>>());
+        let summary = s.summary(&times, "m");
+        assert_eq!(summary.count, 990);
+        assert!((summary.peak_hz.unwrap() - 5.0).abs() < 0.1);
+    }
+
+    #[test]
+    fn a_constant_has_no_peak() {
+        let mut s = Stream::new(100.0, 128);
+        let mut times = Times::default();
+        s.push(&[9.81; 500]);
+        times.push(&(0..500).map(|k| k * 10_000_000).collect::<Vec<_>>());
+        assert_eq!(s.summary(&times, "").peak_hz, None);
+    }
+}

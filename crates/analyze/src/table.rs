@@ -1,0 +1,255 @@
+//! `--out`: the signals as one table, a row per time, a column per signal named by its path.
+
+use std::io::Write;
+use std::path::Path;
+
+use recording::Signal;
+use recording::read::{ReadError, Recording};
+
+use crate::examine::Request;
+use crate::quaternion::{ANGLES, angles};
+use crate::report::quoted;
+
+/// Why a table could not be written. Nothing is left under the final name.
+#[derive(Debug, thiserror::Error)]
+pub enum TableError {
+    /// The name says neither CSV nor Parquet.
+    #[error("{0}: cannot tell what kind of table to write; name it .csv or .parquet")]
+    Kind(String),
+    /// This program was built without Parquet.
+    #[error("{0}: this program was built without Parquet (feature `tables`); write .csv instead")]
+    Without(String),
+    /// No signal fits.
+    #[error("{0}: no signal fits, so there is no table to write")]
+    Empty(String),
+    /// The recording cannot be read.
+    #[error(transparent)]
+    Read(#[from] ReadError),
+    /// The file cannot be written.
+    #[error("{name}: cannot be written: {source}; no file of that name was made or changed")]
+    Io {
+        /// The file.
+        name: String,
+        /// What the system said.
+        source: std::io::Error,
+    },
+    /// The table's library refused.
+    #[error("{name}: cannot be written: {problem}; no file of that name was made or changed")]
+    Format {
+        /// The file.
+        name: String,
+        /// What the library said.
+        problem: String,
+    },
+}
+
+/// Columns on one time axis: the union of the signals' times. NaN stands for "no value" and "not a number" alike.
+pub struct Columns {
+    /// Log time of each row, nanoseconds, ascending.
+    pub time_ns: Vec<i64>,
+    /// The same in seconds after the recording's first message.
+    pub t_s: Vec<f64>,
+    /// Path, unit and values; `None` where the signal has no value at that time.
+    pub columns: Vec<(String, String, Vec<Option<f64>>)>,
+}
+
+/// Writes the signals that `request` names, all of them where it names none, in the window it names; one row in `downsample`.
+///
+/// # Errors
+/// [`TableError`]; nothing is left under the final name then.
+pub fn write(recording: &Recording, request: &Request, downsample: u64, out: &Path) -> Result<(), TableError> {
+    let name = out.display().to_string();
+    let kind = out.extension().and_then(|e| e.to_str()).unwrap_or("").to_lowercase();
+    if !matches!(kind.as_str(), "csv" | "parquet") {
+        return Err(TableError::Kind(name));
+    }
+    let columns = collect(recording, request, downsample)?;
+    if columns.columns.is_empty() {
+        return Err(TableError::Empty(name));
+    }
+    let io = |source| TableError::Io { name: name.clone(), source };
+    let folder = out.parent().filter(|p| !p.as_os_str().is_empty()).unwrap_or(Path::new("."));
+    let mut file = tempfile::Builder::new().prefix(".analyze-").suffix(".part").tempfile_in(folder).map_err(io)?;
+    match kind.as_str() {
+        "csv" => csv(&columns, &mut file).map_err(io)?,
+        _ => parquet(&columns, &mut file, &name)?,
+    }
+    file.persist(out).map_err(|e| io(e.error))?;
+    Ok(())
+}
+
+/// Reads the wanted signals and joins them by time.
+fn collect(recording: &Recording, request: &Request, downsample: u64) -> Result<Columns, ReadError> {
+    let lists = |path: &str| {
+        let topic = request.topics.is_empty() || request.topics.iter().any(|t| crate::roles::matches(&format!("{t}.*"), path));
+        topic && (request.signals.is_empty() || request.signals.iter().any(|p| crate::roles::matches(p, path)))
+    };
+    let select = |path: &str| {
+        lists(path)
+            || path
+                .rsplit_once('.')
+                .filter(|(_, last)| matches!(*last, "x" | "y" | "z" | "w"))
+                .is_some_and(|(prefix, _)| ANGLES.iter().any(|a| lists(&format!("{prefix}.{a}"))))
+    };
+    let (mut signals, _) = recording.signals(&select)?;
+    let derived: Vec<Signal> = quaternions(&signals);
+    signals.extend(derived);
+    signals.retain(|s| lists(&s.path));
+    signals.sort_by(|a, b| a.path.cmp(&b.path));
+    let start_ns = recording.info().start_ns;
+    let seconds = |t: i64| (i128::from(t) - i128::from(start_ns)) as f64 / 1e9;
+    let inside = |t: i64| {
+        request.window.0.is_none_or(|a| seconds(t) >= a) && request.window.1.is_none_or(|b| seconds(t) <= b)
+    };
+    let mut time_ns: Vec<i64> = Vec::new();
+    let mut axes: Vec<*const i64> = Vec::new();
+    for s in &signals {
+        // Signals of one topic share their axis: take it once.
+        if !axes.contains(&s.times_ns.as_ptr()) {
+            axes.push(s.times_ns.as_ptr());
+            time_ns.extend(s.times_ns.iter().filter(|t| inside(**t)));
+        }
+    }
+    time_ns.sort_unstable();
+    time_ns.dedup();
+    let step = usize::try_from(downsample).unwrap_or(usize::MAX).max(1);
+    let time_ns: Vec<i64> = time_ns.into_iter().step_by(step).collect();
+    let columns = signals.into_iter().map(|s| (s.path.clone(), s.unit.clone(), on_axis(&s, &time_ns))).collect();
+    Ok(Columns { t_s: time_ns.iter().map(|t| seconds(*t)).collect(), time_ns, columns })
+}
+
+/// The signal's last value at each time of the axis, where it has one there.
+fn on_axis(s: &Signal, axis: &[i64]) -> Vec<Option<f64>> {
+    let mut k = 0;
+    axis.iter()
+        .map(|at| {
+            while k < s.times_ns.len() && s.times_ns[k] < *at {
+                k += 1;
+            }
+            let mut value = None;
+            while k < s.times_ns.len() && s.times_ns[k] == *at {
+                value = Some(s.values[k]);
+                k += 1;
+            }
+            value.filter(|x| x.is_finite())
+        })
+        .collect()
+}
+
+/// Roll, pitch and yaw of every quaternion among the signals.
+fn quaternions(signals: &[Signal]) -> Vec<Signal> {
+    let at = |path: String| signals.iter().find(|s| s.path == path);
+    let mut out = Vec::new();
+    for w in signals {
+        let Some(prefix) = w.path.strip_suffix(".w") else { continue };
+        let (Some(x), Some(y), Some(z)) = (at(format!("{prefix}.x")), at(format!("{prefix}.y")), at(format!("{prefix}.z"))) else {
+            continue;
+        };
+        let n = w.values.len();
+        if [x, y, z].iter().any(|s| s.values.len() != n) {
+            continue;
+        }
+        let all: Vec<[f64; 3]> = (0..n).map(|k| angles(x.values[k], y.values[k], z.values[k], w.values[k])).collect();
+        if all.iter().all(|a| a[0].is_nan()) {
+            continue;
+        }
+        for (k, angle) in ANGLES.iter().enumerate() {
+            out.push(Signal {
+                path: format!("{prefix}.{angle}"),
+                unit: "rad".into(),
+                times_ns: w.times_ns.clone(),
+                values: all.iter().map(|a| a[k]).collect(),
+            });
+        }
+    }
+    out
+}
+
+fn csv(table: &Columns, out: &mut impl Write) -> std::io::Result<()> {
+    let mut out = std::io::BufWriter::with_capacity(1 << 20, out);
+    write!(out, "time_ns,t_s")?;
+    for (path, unit, _) in &table.columns {
+        let name = if unit.is_empty() { path.clone() } else { format!("{path} [{unit}]") };
+        write!(out, ",{}", quoted(&name))?;
+    }
+    writeln!(out)?;
+    for (row, (time_ns, t_s)) in table.time_ns.iter().zip(&table.t_s).enumerate() {
+        write!(out, "{time_ns},{t_s}")?;
+        for (_, _, values) in &table.columns {
+            match values[row] {
+                Some(x) => write!(out, ",{x}")?,
+                None => write!(out, ",")?,
+            }
+        }
+        writeln!(out)?;
+    }
+    out.flush()
+}
+
+#[cfg(not(feature = "tables"))]
+fn parquet(_: &Columns, _: &mut impl Write, name: &str) -> Result<(), TableError> {
+    Err(TableError::Without(name.to_owned()))
+}
+
+#[cfg(feature = "tables")]
+fn parquet(table: &Columns, out: &mut (impl Write + Send), name: &str) -> Result<(), TableError> {
+    use std::sync::Arc;
+
+    use parquet::basic::{Compression, Repetition, Type as Physical, ZstdLevel};
+    use parquet::data_type::{DoubleType, Int64Type};
+    use parquet::file::metadata::KeyValue;
+    use parquet::file::properties::WriterProperties;
+    use parquet::file::writer::SerializedFileWriter;
+    use parquet::schema::types::Type;
+
+    let problem = |e: parquet::errors::ParquetError| TableError::Format { name: name.to_owned(), problem: e.to_string() };
+    let field = |path: &str, physical, repetition| {
+        Type::primitive_type_builder(path, physical).with_repetition(repetition).build().map(Arc::new)
+    };
+    let mut fields = vec![
+        field("time_ns", Physical::INT64, Repetition::REQUIRED).map_err(problem)?,
+        field("t_s", Physical::DOUBLE, Repetition::REQUIRED).map_err(problem)?,
+    ];
+    for (path, _, _) in &table.columns {
+        fields.push(field(path, Physical::DOUBLE, Repetition::OPTIONAL).map_err(problem)?);
+    }
+    let schema = Arc::new(Type::group_type_builder("signals").with_fields(fields).build().map_err(problem)?);
+    // Units travel as metadata of the file, so that columns are named by their paths alone.
+    let units = table
+        .columns
+        .iter()
+        .filter(|(_, unit, _)| !unit.is_empty())
+        .map(|(path, unit, _)| KeyValue::new(format!("unit:{path}"), unit.clone()))
+        .collect();
+    let properties = WriterProperties::builder()
+        .set_compression(Compression::ZSTD(ZstdLevel::default()))
+        .set_key_value_metadata(Some(units))
+        .set_created_by(concat!("rath ", env!("CARGO_PKG_VERSION")).to_owned())
+        .build();
+    let mut file = SerializedFileWriter::new(out, schema, Arc::new(properties)).map_err(problem)?;
+    let rows = table.time_ns.len();
+    // Row groups of a size that readers like; an empty table still has one.
+    let group_rows = 1 << 20;
+    for start in (0..rows.max(1)).step_by(group_rows) {
+        let range = start..(start + group_rows).min(rows);
+        let mut group = file.next_row_group().map_err(problem)?;
+        let mut column = 0;
+        while let Some(mut writer) = group.next_column().map_err(problem)? {
+            match column {
+                0 => drop(writer.typed::<Int64Type>().write_batch(&table.time_ns[range.clone()], None, None).map_err(problem)?),
+                1 => drop(writer.typed::<DoubleType>().write_batch(&table.t_s[range.clone()], None, None).map_err(problem)?),
+                k => {
+                    let values = &table.columns[k - 2].2[range.clone()];
+                    let present: Vec<f64> = values.iter().flatten().copied().collect();
+                    let levels: Vec<i16> = values.iter().map(|v| i16::from(v.is_some())).collect();
+                    writer.typed::<DoubleType>().write_batch(&present, Some(&levels), None).map_err(problem)?;
+                }
+            }
+            writer.close().map_err(problem)?;
+            column += 1;
+        }
+        group.close().map_err(problem)?;
+    }
+    file.close().map_err(problem)?;
+    Ok(())
+}
