@@ -1,0 +1,108 @@
+//! Sling: a sideways restoring force that grows with the load, as of a handle that hangs in straps.
+//!
+//! ```text
+//! T = (N/L) (d + τ ḋ)        [N], in x and y
+//! ```
+//! N normal force [N], taken as 0 where it would pull; d shoulder minus handle in the plane normal to z [m]; L length of
+//! the strap [m]: the force keeps pointing along a strap of that length, small angles; τ damping time [s]. A slack handle is
+//! free sideways. The force is conservative at constant N only: where N changes with d held, the load does the work, so
+//! the account books no stored energy and everything absorbed as dissipated (it may be given back).
+//!
+//! Source: the paper's logs. In its music runs the centre of mass swings sideways as −(0.0995 m) sin(roll) with y to the
+//! left, the same ratio at every amplitude, and is free in flight: a force in proportion to the load does that (with
+//! h = 0.1 m, M = 60 kg and a = 0.04795 it asks for L = 0.70 m and I_xx = 2.68 kg·m²), a spring of its own does not.
+
+use crate::lanes::{f64x2, sum};
+use crate::model::{Account, Model, Pair, Power, Stage, Term, Workspace};
+use crate::scene::{Checker, Problem, Scene};
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+
+/// `[effects.sling]`
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(default, deny_unknown_fields)]
+pub struct Sling {
+    /// L, m.
+    pub length_m: f64,
+    /// τ, s.
+    pub damping_s: f64,
+}
+
+impl Default for Sling {
+    fn default() -> Self {
+        Self { length_m: 0.7, damping_s: 0.0 }
+    }
+}
+
+impl Sling {
+    pub(super) fn check(&self, _scene: &Scene) -> Result<(), Problem> {
+        Checker::positive("effects.sling.length_m", self.length_m)?;
+        Checker::not_negative("effects.sling.damping_s", self.damping_s)
+    }
+
+    pub(super) fn build(&self, scene: &Scene, model: &mut Model) {
+        let law = Strap {
+            per_length: 1.0 / self.length_m,
+            damping_s: self.damping_s,
+        };
+        if scene.effects.hold.is_some() {
+            // The hold has set its force already, and its account books all that there is sideways.
+            model.add(Stage::Handles, Beside(law));
+        } else {
+            model.add(Stage::Handles, law.clone());
+            model.add_account("sling", law);
+        }
+    }
+}
+
+#[derive(Clone, Debug)]
+struct Strap {
+    per_length: f64,
+    damping_s: f64,
+}
+
+impl Strap {
+    #[inline(always)]
+    fn force(&self, p: &Pair) -> [f64x2; 2] {
+        let load = p.normal.fast_max(f64x2::ZERO) * self.per_length;
+        [0, 1].map(|axis| load * (p.gap[axis] + p.gap_rate[axis] * self.damping_s))
+    }
+}
+
+impl Term for Strap {
+    fn apply(&self, _t_s: f64, w: &mut Workspace) {
+        for p in &mut w.pair {
+            p.tangential = self.force(p);
+        }
+    }
+}
+
+/// The same, added to the force of a hold.
+#[derive(Debug)]
+struct Beside(Strap);
+
+impl Term for Beside {
+    fn apply(&self, _t_s: f64, w: &mut Workspace) {
+        for p in &mut w.pair {
+            let [x, y] = self.0.force(p);
+            p.tangential[0] += x;
+            p.tangential[1] += y;
+        }
+    }
+}
+
+impl Account for Strap {
+    fn power(&self, w: &Workspace) -> Power {
+        let (mut work, mut absorbed) = (f64x2::ZERO, f64x2::ZERO);
+        for p in &w.pair {
+            for (axis, force) in self.force(p).into_iter().enumerate() {
+                work += force * p.base_rate[axis];
+                absorbed += force * p.gap_rate[axis];
+            }
+        }
+        Power {
+            work_w: sum(work),
+            dissipated_w: sum(absorbed),
+        }
+    }
+}
