@@ -10,6 +10,7 @@ const MESSAGES: &[(&str, &str)] = &[
     ("rath", "Energy"),
     ("rath", "Beat"),
     ("foxglove", "SceneUpdate"),
+    ("foxglove", "RawAudio"),
 ];
 
 fn main() -> Result<(), Box<dyn std::error::Error>> {

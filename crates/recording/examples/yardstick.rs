@@ -21,19 +21,33 @@ struct Noise(u64);
 
 impl Noise {
     fn next(&mut self) -> f64 {
-        self.0 = self.0.wrapping_mul(6364136223846793005).wrapping_add(1442695040888963407);
+        self.0 = self
+            .0
+            .wrapping_mul(6364136223846793005)
+            .wrapping_add(1442695040888963407);
         // The high bits are the good ones; two draws fill the mantissa.
         let high = self.0 >> 37;
-        self.0 = self.0.wrapping_mul(6364136223846793005).wrapping_add(1442695040888963407);
+        self.0 = self
+            .0
+            .wrapping_mul(6364136223846793005)
+            .wrapping_add(1442695040888963407);
         ((high << 26 | self.0 >> 38) as f64) / (1u64 << 52) as f64 - 1.0
     }
 }
 
 fn main() -> Result<(), Box<dyn std::error::Error>> {
     let arguments: Vec<String> = std::env::args().collect();
-    let path = arguments.get(1).ok_or("usage: yardstick OUT.mcap [MESSAGES]")?;
-    let messages: usize = arguments.get(2).map_or(Ok(1_840_000), |count| count.parse())?;
-    let options = WriterOptions { chunk_bytes: 1 << 20, chunk_ns: i64::MAX, zstd_level: 3 };
+    let path = arguments
+        .get(1)
+        .ok_or("usage: yardstick OUT.mcap [MESSAGES]")?;
+    let messages: usize = arguments
+        .get(2)
+        .map_or(Ok(1_840_000), |count| count.parse())?;
+    let options = WriterOptions {
+        chunk_bytes: 1 << 20,
+        chunk_ns: i64::MAX,
+        zstd_level: 3,
+    };
     let mut writer = RecordingWriter::create(Path::new(path), &options)?;
     let mut channels = Vec::new();
     for device in 0..DEVICES {
@@ -44,12 +58,17 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
         let (sample, device) = (index / DEVICES, index % DEVICES);
         let t_ns = 1_700_000_000_000_000_000 + sample as i64 * 1_000_000 + device as i64 * 1_000;
         let phase = sample as f64 * 1e-3 * std::f64::consts::TAU * 2.0 + device as f64;
-        let rate = std::array::from_fn(|axis| 0.3 * (phase + axis as f64).sin() + 0.05 * noise.next());
+        let rate =
+            std::array::from_fn(|axis| 0.3 * (phase + axis as f64).sin() + 0.05 * noise.next());
         let force = std::array::from_fn(|axis| {
             let rest = if axis == 2 { 9.81 } else { 0.0 };
             rest + (phase * (axis + 1) as f64).cos() + 0.2 * noise.next()
         });
-        writer.message(channels[device], t_ns, &cdr::Imu::raw(t_ns, "imu_link", rate, force))?;
+        writer.message(
+            channels[device],
+            t_ns,
+            &cdr::Imu::raw(t_ns, "imu_link", rate, force),
+        )?;
     }
     writer.finish()?;
     Ok(())

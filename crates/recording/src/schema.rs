@@ -6,7 +6,7 @@ pub mod rath {
     include!(concat!(env!("OUT_DIR"), "/rath.rs"));
 }
 
-/// Foxglove's messages (MIT): what a `SceneUpdate` needs.
+/// Foxglove's messages (MIT): what `SceneUpdate` and `RawAudio` need.
 #[allow(missing_docs, clippy::doc_markdown, clippy::doc_lazy_continuation)]
 pub mod foxglove {
     include!(concat!(env!("OUT_DIR"), "/foxglove.rs"));
@@ -31,4 +31,5 @@ descriptor_sets!(
     "rath.Energy",
     "rath.Beat",
     "foxglove.SceneUpdate",
+    "foxglove.RawAudio",
 );

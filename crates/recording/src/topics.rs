@@ -17,6 +17,8 @@ pub enum MessageKind {
     Beat,
     /// `foxglove.SceneUpdate`.
     SceneUpdate,
+    /// `foxglove.RawAudio`.
+    RawAudio,
     /// `sensor_msgs/msg/Imu`.
     Imu,
     /// `sensor_msgs/msg/MagneticField`.
@@ -45,6 +47,7 @@ impl MessageKind {
             MessageKind::Energy => "rath.Energy",
             MessageKind::Beat => "rath.Beat",
             MessageKind::SceneUpdate => "foxglove.SceneUpdate",
+            MessageKind::RawAudio => "foxglove.RawAudio",
             MessageKind::Imu => "sensor_msgs/msg/Imu",
             MessageKind::MagneticField => "sensor_msgs/msg/MagneticField",
             MessageKind::Tf => "tf2_msgs/msg/TFMessage",
@@ -111,6 +114,8 @@ pub const ROBOT_DESCRIPTION: &str = "/robot_description";
 pub const SCENE: &str = "/scene";
 /// The body's IMU.
 pub const IMU_RATH: &str = "/imu/rath";
+/// What a microphone beside the drum hears.
+pub const AUDIO_DRUM: &str = "/audio/drum";
 /// One message on every beat.
 pub const BEAT: &str = "/beat";
 
@@ -174,6 +179,12 @@ pub const TOPICS: &[Topic] = &[
         kind: MessageKind::Imu,
         content: "specific force m/s^2, angular velocity rad/s (REP-145)",
         frame: "carrier_*",
+    },
+    Topic {
+        name: AUDIO_DRUM,
+        kind: MessageKind::RawAudio,
+        content: "sound, 16-bit PCM, one channel",
+        frame: "",
     },
     Topic {
         name: BEAT,

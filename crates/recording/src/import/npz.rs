@@ -5,9 +5,14 @@
 //! turns about its vertical and is our yaw; the tilt of the pole is not logged and follows from the quaternion, with
 //! R = R_z(γ) R_y(β) R_x(α) in the archive's axes: pitch = −γ = −atan2(R₂₁, R₁₁).
 
-use std::{collections::BTreeMap, fs::File, io::BufReader, path::Path};
+use std::{
+    collections::BTreeMap,
+    fs::File,
+    io::{BufReader, Read as _},
+    path::Path,
+};
 
-use npyz::npz::NpzArchive;
+use zip::{ZipArchive, result::ZipError};
 
 use super::ImportError;
 use crate::{
@@ -21,6 +26,9 @@ use crate::{
 const MASS_KG: f64 = 60.0;
 /// Where the archive's statistics begin, s.
 const ANALYSIS_START_S: f64 = 15.0;
+
+/// A larger array is no log of a walk.
+const MAX_ARRAY_BYTES: u64 = 1 << 30;
 
 /// One run as the archive logs it, in the archive's axes.
 struct Log {
@@ -71,7 +79,7 @@ fn metadata(path: &Path) -> BTreeMap<String, String> {
 /// A column of the archive as rows of `width` numbers.
 struct Columns<'a> {
     name: &'a str,
-    archive: NpzArchive<BufReader<File>>,
+    archive: ZipArchive<BufReader<File>>,
 }
 
 impl Columns<'_> {
@@ -88,15 +96,19 @@ impl Columns<'_> {
         key: &str,
         shape: &[Option<u64>],
     ) -> Result<(Vec<u64>, Vec<f64>), ImportError> {
-        let mut names: Vec<String> = self.archive.array_names().map(str::to_owned).collect();
+        let mut names: Vec<String> = self
+            .archive
+            .file_names()
+            .map(|file| file.trim_end_matches(".npy").to_owned())
+            .collect();
         let name = self.name;
         let problem = |problem: String| ImportError::Content {
             name: name.to_owned(),
             problem,
         };
-        let array = match self.archive.by_name(key) {
-            Ok(Some(array)) => array,
-            Ok(None) => {
+        let entry = match self.archive.by_name(&format!("{key}.npy")) {
+            Ok(entry) => entry,
+            Err(ZipError::FileNotFound) => {
                 names.sort_unstable();
                 return Err(problem(format!(
                     "has no array {key:?}; found {}",
@@ -105,6 +117,8 @@ impl Columns<'_> {
             }
             Err(error) => return Err(problem(format!("array {key:?} cannot be read: {error}"))),
         };
+        let array = npyz::NpyFile::new(entry.take(MAX_ARRAY_BYTES))
+            .map_err(|error| problem(format!("array {key:?} cannot be read: {error}")))?;
         let lengths = array.shape().to_vec();
         let fits = lengths.len() == shape.len()
             && lengths
@@ -124,6 +138,16 @@ impl Columns<'_> {
         if lengths.len() > 1 && array.order() != npyz::Order::C {
             return Err(problem(format!(
                 "array {key:?} is in Fortran order; expected C order"
+            )));
+        }
+        // A header may claim any shape: what is not there is found out before memory is taken for it.
+        let count = lengths
+            .iter()
+            .try_fold(1u64, |count, &length| count.checked_mul(length));
+        if count.is_none_or(|count| count > MAX_ARRAY_BYTES / 8) {
+            return Err(problem(format!(
+                "array {key:?} has the shape {lengths:?}; at most {} numbers can be read",
+                MAX_ARRAY_BYTES / 8
             )));
         }
         match array.into_vec::<f64>() {
@@ -163,7 +187,7 @@ fn read(path: &Path) -> Result<Log, ImportError> {
         name: name.clone(),
         source,
     })?;
-    let archive = NpzArchive::new(BufReader::new(file)).map_err(|error| ImportError::Content {
+    let archive = ZipArchive::new(BufReader::new(file)).map_err(|error| ImportError::Content {
         name: name.clone(),
         problem: format!("is not a NumPy archive (.npz): {error}"),
     })?;

@@ -120,11 +120,23 @@ impl Order {
         }
     }
 
-    /// Says what was odd. `what` names the times ("log times", "header stamps").
-    pub fn report(&mut self, topic: &str, what: &str, start_ns: i64, findings: &mut Vec<Finding>) {
+    /// Whether there are gaps.
+    pub fn has_gaps(&mut self) -> bool {
         if !self.learned {
             self.learn();
         }
+        self.gaps.count > 0
+    }
+
+    /// Forgets the gaps, where another clock has told of them.
+    pub fn forget_gaps(&mut self) {
+        self.has_gaps();
+        self.gaps = Count::default();
+    }
+
+    /// Says what was odd. `what` names the times ("log times", "header stamps").
+    pub fn report(&mut self, topic: &str, what: &str, start_ns: i64, findings: &mut Vec<Finding>) {
+        self.has_gaps();
         let mut say = |kind, count: Count, text| {
             if count.count > 0 {
                 let t_s = Some(seconds(count.first, start_ns));

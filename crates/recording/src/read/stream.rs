@@ -392,6 +392,9 @@ impl<'a> Taker<'a> {
                 .report(topic, "log times", start_ns, &mut self.findings);
             watch.clocks.report(topic, start_ns, &mut self.findings);
             if !watch.clocks.same() {
+                if watch.log.has_gaps() {
+                    watch.stamps.forget_gaps();
+                }
                 watch
                     .stamps
                     .report(topic, "header stamps", start_ns, &mut self.findings);

@@ -1,0 +1,223 @@
+//! Files and messages changed at random: nothing panics, hangs or fills the memory. The quick, stable cousin of `fuzz/`.
+//!
+//! `RATH_HOSTILE_ROUNDS=100000 cargo test --release -p recording --test hostile` goes on for longer.
+
+use std::{
+    collections::BTreeMap,
+    io::{self, Write},
+    path::PathBuf,
+    sync::{Arc, Mutex},
+    time::Instant,
+};
+
+use recording::{
+    read::{ReadOptions, Recording},
+    write::{RawChannel, RecordingWriter, WriterOptions},
+};
+
+fn rounds() -> usize {
+    let usual = if cfg!(debug_assertions) { 300 } else { 3000 };
+    std::env::var("RATH_HOSTILE_ROUNDS")
+        .ok()
+        .and_then(|rounds| rounds.parse().ok())
+        .unwrap_or(usual)
+}
+
+fn data(name: &str) -> Vec<u8> {
+    std::fs::read(
+        PathBuf::from(env!("CARGO_MANIFEST_DIR"))
+            .join("tests/data")
+            .join(name),
+    )
+    .expect("test data")
+}
+
+/// A 64-bit congruence (Knuth's MMIX).
+struct Random(u64);
+
+impl Random {
+    fn below(&mut self, bound: usize) -> usize {
+        self.0 = self
+            .0
+            .wrapping_mul(6364136223846793005)
+            .wrapping_add(1442695040888963407);
+        (self.0 >> 33) as usize % bound.max(1)
+    }
+
+    /// Flips, overwrites, cuts, repeats: one to eight of them.
+    fn change(&mut self, bytes: &mut Vec<u8>) {
+        const ODD: &[u8] = &[0x00, 0x01, 0x7f, 0x80, 0xfe, 0xff, 0x05, 0x06];
+        for _ in 0..=self.below(8) {
+            if bytes.is_empty() {
+                return;
+            }
+            let at = self.below(bytes.len());
+            match self.below(6) {
+                0 => bytes[at] ^= 1 << self.below(8),
+                1 => bytes[at] = ODD[self.below(ODD.len())],
+                2 => {
+                    let end = (at + 1 + self.below(8)).min(bytes.len());
+                    bytes[at..end].fill(ODD[self.below(ODD.len())]);
+                }
+                3 => bytes.truncate(at),
+                4 => {
+                    let end = (at + self.below(64)).min(bytes.len());
+                    let piece = bytes[at..end].to_vec();
+                    let to = self.below(bytes.len());
+                    bytes.splice(to..to, piece);
+                }
+                _ => {
+                    let end = (at + self.below(64)).min(bytes.len());
+                    bytes.drain(at..end);
+                }
+            }
+        }
+    }
+}
+
+fn read(bytes: Vec<u8>) {
+    let options = ReadOptions {
+        threads: 1,
+        max_chunk_bytes: 64 << 20,
+        ..ReadOptions::default()
+    };
+    let Ok(recording) = Recording::from_bytes(bytes, &options) else {
+        return;
+    };
+    recording.signals(&|_| true).expect("reads");
+    recording.messages(&|_| true, &mut |_| {}).expect("reads");
+}
+
+#[test]
+fn files_changed_at_random() {
+    let mut random = Random(11);
+    for name in [
+        "zstd.mcap",
+        "lz4.mcap",
+        "none.mcap",
+        "no_crc.mcap",
+        "tiny_chunks.mcap",
+        "unchunked.mcap",
+    ] {
+        let good = data(name);
+        let mut slowest = (0.0, 0);
+        for round in 0..rounds() / 6 {
+            let mut bytes = good.clone();
+            random.change(&mut bytes);
+            let started = Instant::now();
+            read(bytes);
+            let taken_s = started.elapsed().as_secs_f64();
+            if taken_s > slowest.0 {
+                slowest = (taken_s, round);
+            }
+        }
+        assert!(
+            slowest.0 < 10.0,
+            "{name}: round {} took {:.1} s",
+            slowest.1,
+            slowest.0
+        );
+    }
+}
+
+#[derive(Clone, Default)]
+struct Shared(Arc<Mutex<Vec<u8>>>);
+
+impl Write for Shared {
+    fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
+        self.0.lock().expect("unpoisoned").extend_from_slice(bytes);
+        Ok(bytes.len())
+    }
+
+    fn flush(&mut self) -> io::Result<()> {
+        Ok(())
+    }
+}
+
+/// Schemas and messages changed at random, in a container that is sound: what every decoder is up against.
+#[test]
+fn schemas_and_messages_changed_at_random() {
+    let recording =
+        Recording::from_bytes(data("zstd.mcap"), &ReadOptions::default()).expect("opens");
+    let mut messages: Vec<Vec<Vec<u8>>> = vec![Vec::new(); recording.info().channels.len()];
+    recording
+        .messages(&|_| true, &mut |message| {
+            messages[message.channel].push(message.data.to_vec())
+        })
+        .expect("reads");
+    let mut random = Random(12);
+    let metadata = BTreeMap::new();
+    for _ in 0..rounds() / 3 {
+        let shared = Shared::default();
+        let mut writer =
+            RecordingWriter::to_stream(shared.clone(), &WriterOptions::default()).expect("begins");
+        for (info, messages) in recording.info().channels.iter().zip(&messages) {
+            let mut schema_data = info.schema_data.clone();
+            if random.below(2) == 0 {
+                random.change(&mut schema_data);
+            }
+            let channel = RawChannel {
+                topic: &info.topic,
+                message_encoding: &info.encoding,
+                schema_name: &info.schema,
+                schema_encoding: &info.schema_encoding,
+                schema_data: &schema_data,
+                metadata: &metadata,
+            };
+            let channel = writer.raw_channel(&channel).expect("opens");
+            for message in messages.iter().take(4) {
+                let mut message = message.clone();
+                random.change(&mut message);
+                writer
+                    .message(channel, 5, message.as_slice())
+                    .expect("writes");
+            }
+        }
+        writer.finish().expect("finishes");
+        let bytes = shared.0.lock().expect("unpoisoned").clone();
+        read(bytes);
+    }
+}
+
+/// Definitions that would multiply without end.
+#[test]
+fn schemas_that_explode_are_refused() {
+    let nest = |depth: usize, brackets: &str| {
+        let mut text = format!("p/T1{brackets} a\n");
+        for level in 1..depth {
+            text += &format!("===\nMSG: p/T{level}\np/T{}{brackets} a\n", level + 1);
+        }
+        text + &format!("===\nMSG: p/T{depth}\nfloat64 x\n")
+    };
+    for (schema, data, wanted) in [
+        (
+            nest(6, "[60]"),
+            vec![0u8; 64],
+            "has more than 100000 fields",
+        ),
+        (nest(70, ""), vec![0u8; 64], "nested more than 64 deep"),
+    ] {
+        let shared = Shared::default();
+        let mut writer =
+            RecordingWriter::to_stream(shared.clone(), &WriterOptions::default()).expect("begins");
+        let channel = RawChannel {
+            topic: "/a",
+            message_encoding: "cdr",
+            schema_name: "p/msg/Top",
+            schema_encoding: "ros2msg",
+            schema_data: schema.as_bytes(),
+            metadata: &BTreeMap::new(),
+        };
+        let channel = writer.raw_channel(&channel).expect("opens");
+        let message = [&[0, 1, 0, 0], data.as_slice()].concat();
+        writer
+            .message(channel, 0, message.as_slice())
+            .expect("writes");
+        writer.finish().expect("finishes");
+        let bytes = shared.0.lock().expect("unpoisoned").clone();
+        let recording = Recording::from_bytes(bytes, &ReadOptions::default()).expect("opens");
+        let (signals, findings) = recording.signals(&|_| true).expect("reads");
+        assert!(signals.is_empty());
+        assert!(findings[0].text.contains(wanted), "{findings:?}");
+    }
+}

@@ -1,0 +1,215 @@
+//! Sound files with strange content: each oddity is said once, with topic, count and time; and files at the edges of the format.
+
+use std::{
+    collections::BTreeMap,
+    io::{self, Write},
+    sync::{Arc, Mutex},
+};
+
+use recording::{
+    cdr::{Header, Imu, PoseStamped, Time},
+    read::{ReadOptions, Recording},
+    topics::MessageKind,
+    write::{RawChannel, RecordingWriter, WriterOptions},
+};
+
+#[derive(Clone, Default)]
+struct Shared(Arc<Mutex<Vec<u8>>>);
+
+impl Write for Shared {
+    fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
+        self.0.lock().expect("unpoisoned").extend_from_slice(bytes);
+        Ok(bytes.len())
+    }
+
+    fn flush(&mut self) -> io::Result<()> {
+        Ok(())
+    }
+}
+
+fn recording(options: &WriterOptions, fill: impl FnOnce(&mut RecordingWriter)) -> Recording {
+    let shared = Shared::default();
+    let mut writer = RecordingWriter::to_stream(shared.clone(), options).expect("begins");
+    fill(&mut writer);
+    writer.finish().expect("finishes");
+    let bytes = shared.0.lock().expect("unpoisoned").clone();
+    Recording::from_bytes(bytes, &ReadOptions::default()).expect("opens")
+}
+
+fn lines(recording: &Recording) -> Vec<String> {
+    let (_, findings) = recording.signals(&|_| true).expect("reads");
+    findings
+        .iter()
+        .map(|finding| format!("{} {finding}", finding.kind))
+        .collect()
+}
+
+const START_NS: i64 = 1_700_000_000_000_000_000;
+
+#[test]
+fn oddities_are_said() {
+    let found = recording(&WriterOptions::default(), |writer| {
+        let imu = writer.channel("/imu", MessageKind::Imu).expect("opens");
+        let pose = writer
+            .channel("/pose", MessageKind::PoseStamped)
+            .expect("opens");
+        for i in 0..2000i64 {
+            // A quarter of a second is missing from message 1000 on.
+            let t_ns = START_NS + i * 10_000_000 + if i >= 1000 { 250_000_000 } else { 0 };
+            let mut message = Imu::raw(t_ns, "imu", [0.0; 3], [0.0, 0.0, 9.81]);
+            if i == 500 || i == 501 {
+                message.angular_velocity.y = f64::INFINITY;
+            }
+            // The log's clock is 0.5 s late and runs 200 ppm fast, but for the missing quarter.
+            let log_ns = t_ns + 500_000_000 + i * 2_000;
+            writer.message(imu, log_ns, &message).expect("writes");
+            let pose_ns = match i {
+                7 => log_ns - 20_000_000,
+                9 => log_ns - 10_000_000 - 2_000,
+                _ => log_ns,
+            };
+            let stamp = if i == 3 {
+                Time::default()
+            } else {
+                Time::from_ns(pose_ns)
+            };
+            let message = PoseStamped {
+                header: Header {
+                    stamp,
+                    frame_id: "map".to_owned(),
+                },
+                ..PoseStamped::default()
+            };
+            writer.message(pose, pose_ns, &message).expect("writes");
+        }
+    });
+    assert_eq!(
+        lines(&found),
+        [
+            "gap /imu: 1 gaps in the log times (usual interval 0.010002 s), the longest 0.260 s at 9.992 s",
+            "clock_offset /imu: log time lies 0.502 s after the header stamp on average",
+            "clock_drift /imu: log time runs 196 ppm faster than the header stamp (3.9 ms over 20.1 s)",
+            "nan /imu: 2 values of angular_velocity.y are NaN or infinite, first at 5.001 s",
+            "absent_field /imu: orientation is declared as not given (covariance -1)",
+            "duplicate /pose: 1 log times repeat the one before, first at 0.080 s",
+            "backward /pose: 1 log times lie before the one before, first at 0.050 s",
+            "gap /pose: 1 gaps in the log times (usual interval 0.010002 s), the longest 0.260 s at 9.992 s",
+            "zero_stamp /pose: 1 header stamps are zero, first at 0.030 s",
+        ]
+    );
+}
+
+#[test]
+fn signals_come_sorted_from_chunks_that_are_not() {
+    let options = WriterOptions {
+        chunk_bytes: 400,
+        ..WriterOptions::default()
+    };
+    let found = recording(&options, |writer| {
+        let value = writer.channel("/a", MessageKind::Float64).expect("opens");
+        for i in 0..1000i64 {
+            let scattered = (i * 617) % 1000;
+            writer
+                .message(
+                    value,
+                    scattered,
+                    &recording::cdr::Float64 {
+                        data: scattered as f64,
+                    },
+                )
+                .expect("writes");
+        }
+    });
+    let (signals, _) = found.signals(&|_| true).expect("reads");
+    assert_eq!(signals.len(), 1);
+    assert!(
+        (0..1000).all(|i| signals[0].times_ns[i] == i as i64 && signals[0].values[i] == i as f64)
+    );
+}
+
+#[test]
+fn two_thousand_channels_and_two_of_one_topic() {
+    let found = recording(&WriterOptions::default(), |writer| {
+        let channels: Vec<_> = (0..2000)
+            .map(|i| {
+                writer
+                    .channel(&format!("/topic_{i}"), MessageKind::Float64)
+                    .expect("opens")
+            })
+            .collect();
+        for (i, channel) in channels.iter().enumerate() {
+            writer
+                .message(
+                    *channel,
+                    i as i64,
+                    &recording::cdr::Float64 { data: i as f64 },
+                )
+                .expect("writes");
+        }
+        let metadata = BTreeMap::from([("publisher".to_owned(), "second".to_owned())]);
+        let again = RawChannel {
+            topic: "/topic_7",
+            message_encoding: "json",
+            schema_name: "",
+            schema_encoding: "",
+            schema_data: b"",
+            metadata: &metadata,
+        };
+        let again = writer.raw_channel(&again).expect("opens");
+        writer
+            .message(again, 3, b"{\"data\": 0.5}".as_slice())
+            .expect("writes");
+    });
+    assert_eq!(found.info().channels.len(), 2001);
+    let (signals, findings) = found.signals(&|_| true).expect("reads");
+    assert_eq!(findings, []);
+    assert_eq!(signals.len(), 2000);
+    let seven = signals
+        .iter()
+        .find(|signal| signal.path == "/topic_7.data")
+        .expect("a signal");
+    assert_eq!(
+        (seven.times_ns.as_ref(), seven.values.as_slice()),
+        ([3, 7].as_slice(), [0.5, 7.0].as_slice())
+    );
+}
+
+/// Wide text in the two widths that implementations use, told apart by the message being used up.
+#[test]
+fn wide_text_of_either_width() {
+    for width in [2usize, 4] {
+        let found = recording(&WriterOptions::default(), |writer| {
+            let channel = RawChannel {
+                topic: "/w",
+                message_encoding: "cdr",
+                schema_name: "p/msg/W",
+                schema_encoding: "ros2msg",
+                schema_data: b"wstring text\nfloat64 x\nuint32[8] tail\n",
+                metadata: &BTreeMap::new(),
+            };
+            let channel = writer.raw_channel(&channel).expect("opens");
+            for i in 0..20u32 {
+                let mut body = i.to_le_bytes().to_vec();
+                body.resize(4 + i as usize * width, b'w');
+                body.resize(body.len().next_multiple_of(8), 0);
+                body.extend_from_slice(&f64::from(i).to_le_bytes());
+                body.extend((0..8).flat_map(|k| (k * i).to_le_bytes()));
+                let message = [[0, 1, 0, 0].as_slice(), &body].concat();
+                writer
+                    .message(channel, i64::from(i), message.as_slice())
+                    .expect("writes");
+            }
+        });
+        let (signals, findings) = found.signals(&|_| true).expect("reads");
+        assert_eq!(findings, [], "{width}");
+        let x = signals
+            .iter()
+            .find(|signal| signal.path == "/w.x")
+            .expect("a signal");
+        assert!(
+            x.values.iter().enumerate().all(|(i, x)| *x == i as f64),
+            "{width}: {:?}",
+            x.values
+        );
+    }
+}
