@@ -18,6 +18,7 @@ pub mod music;
 pub mod noise;
 pub mod path;
 pub mod pole_friction;
+pub mod sling;
 
 use crate::model::Model;
 use crate::scene::Scene;
@@ -32,6 +33,7 @@ pub struct Effects {
     pub contact: Option<contact::Contact>,
     pub hold: Option<hold::Hold>,
     pub friction: Option<friction::Friction>,
+    pub sling: Option<sling::Sling>,
     pub pole_friction: Option<pole_friction::PoleFriction>,
     pub gait: Option<gait::Gait>,
     pub lift: Option<lift::Lift>,
@@ -89,6 +91,10 @@ pub const TABLE: &[Entry] = &[
     entry!(contact, "handles rest on shoulders: spring and damper"),
     entry!(hold, "hands hold the handles sideways: spring and damper"),
     entry!(friction, "sideways force at a handle is limited by Coulomb friction"),
+    entry!(
+        sling,
+        "straps pull a handle back sideways, in proportion to the load"
+    ),
     entry!(pole_friction, "turning about the pole rubs on the shoulders, saturating"),
     entry!(feedback, "the load that a carrier feels shifts the gait's phase"),
     entry!(path, "the way slopes and turns"),
