@@ -1,0 +1,90 @@
+//! Phases on the unit circle: every carrier a point, the order parameter an arrow from the centre, the beat a mark outside.
+
+use std::f32::consts::TAU;
+
+use re_sdk_types::archetypes::{Arrows2D, LineStrips2D, Points2D};
+
+use crate::blueprint::View;
+use crate::palette;
+use crate::store::Store;
+use crate::take::Take;
+
+/// Radius at which the beat runs.
+const BEAT_RADIUS: f64 = 1.18;
+
+/// Draws the circle where there are phases.
+pub fn draw(store: &mut Store<'_>, take: &Take) -> anyhow::Result<Option<View>> {
+    let phases = &take.inputs.phase_rad;
+    let (rows, carriers) = (take.phase_ns.len(), phases.len());
+    if rows == 0 || carriers == 0 || phases.iter().any(|p| p.len() != rows) {
+        return Ok(None);
+    }
+    let ring: Vec<[f32; 2]> = (0..=128)
+        .map(|k| {
+            let (sin, cos) = (k as f32 / 128.0 * TAU).sin_cos();
+            [cos, sin]
+        })
+        .collect();
+    let cross = vec![vec![[-1.0, 0.0], [1.0, 0.0]], vec![[0.0, -1.0], [0.0, 1.0]]];
+    let lines = LineStrips2D::new(std::iter::once(ring).chain(cross))
+        .with_radii([0.008f32, 0.003, 0.003])
+        .with_colors([palette::AXIS, palette::GRID, palette::GRID]);
+    store.fixed("/phases/circle", &lines)?;
+
+    let mut points: Vec<[f32; 2]> = Vec::with_capacity(rows * carriers);
+    let mut resultants: Vec<[f32; 2]> = Vec::with_capacity(rows);
+    for k in 0..rows {
+        let mut sum = [0.0f64; 2];
+        for phase in phases {
+            let place = on_circle(phase[k], 1.0);
+            sum = [sum[0] + f64::from(place[0]), sum[1] + f64::from(place[1])];
+            points.push(place);
+        }
+        resultants.push(sum.map(|x| (x / carriers as f64) as f32));
+    }
+    let arrows = Arrows2D::from_vectors(resultants).columns_of_unit_batches()?;
+    store.rows("/phases/order", &take.phase_ns, arrows)?;
+    let arrow = Arrows2D::update_fields()
+        .with_origins([[0.0f32, 0.0]])
+        .with_radii([0.03f32])
+        .with_colors([palette::WHITE]);
+    store.fixed("/phases/order", &arrow)?;
+
+    let columns = Points2D::new(points).columns(std::iter::repeat_n(carriers, rows))?;
+    store.rows("/phases/carriers", &take.phase_ns, columns)?;
+    let style = Points2D::update_fields()
+        .with_radii([0.075f32])
+        .with_colors((0..carriers).map(|i| palette::carrier(i).0))
+        .with_labels((1..=carriers).map(|i| i.to_string()))
+        .with_show_labels(carriers <= 12);
+    store.fixed("/phases/carriers", &style)?;
+
+    let beat = &take.inputs.beat_phase_rad;
+    let heard = beat.len() == rows && beat.iter().any(|psi| psi.is_finite());
+    if heard {
+        let sounding: Vec<usize> = (0..rows).filter(|k| beat[*k].is_finite()).collect();
+        let times: Vec<i64> = sounding.iter().map(|k| take.phase_ns[*k]).collect();
+        let places = sounding.iter().map(|k| on_circle(beat[*k], BEAT_RADIUS));
+        let columns = Points2D::new(places).columns_of_unit_batches()?;
+        store.rows("/phases/beat", &times, columns)?;
+        let style = Points2D::update_fields()
+            .with_radii([0.055f32])
+            .with_colors([palette::WHITE])
+            .with_labels(["beat"])
+            .with_show_labels(true);
+        store.fixed("/phases/beat", &style)?;
+    }
+    let title = if heard { "Phases and beat" } else { "Phases" };
+    Ok(Some(View::plane(
+        title,
+        "/phases",
+        [-1.4, 1.4],
+        [-1.4, 1.4],
+    )))
+}
+
+/// Where a phase stands; y points down in a drawing, and phases turn counter-clockwise.
+fn on_circle(phase_rad: f64, radius: f64) -> [f32; 2] {
+    let (sin, cos) = phase_rad.sin_cos();
+    [(radius * cos) as f32, (-radius * sin) as f32]
+}

@@ -1,0 +1,49 @@
+//! Events and the reader's remarks as lines of text on the timeline.
+
+use re_sdk_types::archetypes::TextLog;
+
+use crate::blueprint::View;
+use crate::palette;
+use crate::store::Store;
+use crate::take::Take;
+
+/// Sends the log where there is anything to say.
+pub fn draw(store: &mut Store<'_>, take: &Take) -> anyhow::Result<Option<View>> {
+    let mut lines: Vec<(i64, String, &'static str, u32)> = Vec::new();
+    // OK because event times lie inside the recording, whose length fits.
+    let at = |t_s: f64| take.start_ns.saturating_add((t_s * 1e9).round() as i64);
+    for event in &take.events {
+        let (level, color) = match event.kind {
+            "onset" => ("CRITICAL", palette::VERMILION),
+            "contact_lost" | "jump" => ("WARN", palette::YELLOW),
+            _ => ("INFO", palette::BLUE),
+        };
+        lines.push((
+            at(event.t_s),
+            format!("{:.2} s  {}", event.t_s, event.what),
+            level,
+            color,
+        ));
+    }
+    for (t_s, text) in &take.remarks {
+        let when = t_s.map(|t_s| format!("{t_s:.2} s  ")).unwrap_or_default();
+        lines.push((
+            at(t_s.unwrap_or(0.0)),
+            format!("{when}{text}"),
+            "WARN",
+            palette::ORANGE,
+        ));
+    }
+    if lines.is_empty() {
+        return Ok(None);
+    }
+    lines.sort_by_key(|line| line.0);
+    let times: Vec<i64> = lines.iter().map(|line| line.0).collect();
+    let columns = TextLog::update_fields()
+        .with_many_text(lines.iter().map(|line| line.1.as_str()))
+        .with_many_level(lines.iter().map(|line| line.2))
+        .with_many_color(lines.iter().map(|line| line.3))
+        .columns_of_unit_batches()?;
+    store.rows("/events", &times, columns)?;
+    Ok(Some(View::log("Events", "/events")))
+}

@@ -1,0 +1,181 @@
+//! Inertial sensors, a tab each: angular velocity, specific force, estimated roll and pitch, and both spectra. Other topics: their curves.
+
+use analyze::spectrum::Spectrum;
+
+use super::Panel;
+use super::series::{Line, lines};
+use super::spectra::{self, Curve};
+use crate::blueprint::View;
+use crate::palette;
+use crate::store::Store;
+use crate::take::{self, Sensor, Take};
+
+/// Up to this frequency a sensor's spectra are drawn: people move below it.
+const TOP_HZ: f64 = 8.0;
+/// Where the line of a gait or of a shaken load is looked for, Hz.
+const GAIT_HZ: [f64; 2] = [0.5, 4.0];
+
+/// Draws sensors and other topics; a panel for each.
+pub fn draw(store: &mut Store<'_>, take: &Take) -> anyhow::Result<Vec<Panel>> {
+    let mut out = Vec::new();
+    // What `analyze` estimates from the only sensor stands over the display's own estimate.
+    let estimated = take.imus.len() == 1 && !take.inputs.roll_rad.is_empty();
+    for sensor in &take.imus {
+        out.extend(self::sensor(store, sensor, !estimated)?);
+    }
+    for topic in &take.topics {
+        out.push(self::topic(store, topic)?);
+    }
+    Ok(out)
+}
+
+/// A topic's place in the entity tree.
+fn place(topic: &str) -> String {
+    let clean: String = topic
+        .chars()
+        .map(|c| {
+            if c.is_alphanumeric() || "/_-".contains(c) {
+                c
+            } else {
+                '_'
+            }
+        })
+        .collect();
+    format!("/topics/{}", clean.trim_matches('/'))
+}
+
+fn sensor(store: &mut Store<'_>, sensor: &Sensor, attitude: bool) -> anyhow::Result<Option<Panel>> {
+    let origin = place(&sensor.topic);
+    let xyz = "x vermilion, y green, z blue";
+    let mut plots: Vec<View> = Vec::new();
+    let groups: [(&str, &[take::Curve], String); 3] = [
+        (
+            "gyro",
+            &sensor.gyro,
+            format!("{}: angular velocity [rad/s] ({xyz})", sensor.topic),
+        ),
+        (
+            "accel",
+            &sensor.accel,
+            format!("Specific force [m/s²] ({xyz})"),
+        ),
+        (
+            "attitude",
+            &sensor.attitude,
+            "Estimated roll (vermilion), pitch (blue) [deg]".to_owned(),
+        ),
+    ];
+    for (name, curves, title) in groups {
+        let colors = if name == "attitude" {
+            [palette::VERMILION, palette::BLUE, palette::WHITE]
+        } else {
+            palette::XYZ.map(|(color, _)| color)
+        };
+        let made: Vec<Line<'_>> = curves
+            .iter()
+            .zip(colors)
+            .filter_map(|(c, color)| Line::new(&c.name, &c.name, color, &c.times_ns, &c.values[..]))
+            .collect();
+        if made.is_empty() || (name == "attitude" && !attitude) {
+            continue;
+        }
+        let path = format!("{origin}/{name}");
+        lines(store, &path, made)?;
+        plots.push(View::plot(title, path));
+    }
+    let f_hz = gait_line(&sensor.accel_spectra).or_else(|| gait_line(&sensor.gyro_spectra));
+    let mut small: Vec<View> = Vec::new();
+    let groups = [
+        (
+            "gyro_spectra",
+            &sensor.gyro_spectra,
+            "Spectra of angular velocity",
+        ),
+        (
+            "accel_spectra",
+            &sensor.accel_spectra,
+            "Spectra of specific force",
+        ),
+    ];
+    for (name, found, title) in groups {
+        let curves: Vec<Curve<'_>> = found
+            .iter()
+            .zip(["x", "y", "z"])
+            .zip(palette::XYZ)
+            .map(|((spectrum, entity), (color, _))| Curve {
+                entity,
+                spectrum,
+                color,
+            })
+            .collect();
+        let path = format!("{origin}/{name}");
+        small.extend(spectra::drawing(
+            store, &path, title, &curves, f_hz, TOP_HZ,
+        )?);
+    }
+    Ok((!plots.is_empty() || !small.is_empty()).then_some(Panel { plots, small }))
+}
+
+/// The strongest line of all three axes together between 0.5 and 4 Hz, Hz; `None` where nothing stands out tenfold above the median there.
+fn gait_line(spectra: &[Spectrum]) -> Option<f64> {
+    let first = spectra.first()?;
+    let sum: Vec<f64> = (0..first.hz.len())
+        .map(|k| spectra.iter().filter_map(|s| s.power.get(k)).sum())
+        .collect();
+    let band: Vec<usize> = (0..first.hz.len())
+        .filter(|k| (GAIT_HZ[0]..=GAIT_HZ[1]).contains(&first.hz[*k]))
+        .collect();
+    let best = *band.iter().max_by(|a, b| sum[**a].total_cmp(&sum[**b]))?;
+    let mut sorted: Vec<f64> = band.iter().map(|k| sum[*k]).collect();
+    sorted.sort_by(f64::total_cmp);
+    (sum[best] > 10.0 * sorted[sorted.len() / 2]).then(|| {
+        let all = Spectrum {
+            power: sum,
+            ..first.clone()
+        };
+        all.refine(best)
+    })
+}
+
+fn topic(store: &mut Store<'_>, topic: &take::Topic) -> anyhow::Result<Panel> {
+    let mut plots = Vec::new();
+    for (unit, curves) in &topic.plots {
+        let path = match unit.as_str() {
+            "" => place(&topic.name),
+            unit => format!(
+                "{}/{}",
+                place(&topic.name),
+                unit.replace(['/', '^', '.'], "_")
+            ),
+        };
+        let mut names = Vec::new();
+        let mut made = Vec::new();
+        for (i, c) in curves.iter().enumerate() {
+            let (color, word) = palette::carrier(i);
+            let entity = format!("f{i}");
+            if let Some(line) = Line::new(entity, &c.name, color, &c.times_ns, &c.values[..]) {
+                names.push(format!("{} ({word})", c.name));
+                made.push(line);
+            }
+        }
+        let paths: Vec<String> = made
+            .iter()
+            .map(|l| format!("{path}/{}", l.entity))
+            .collect();
+        lines(store, &path, made)?;
+        let shown = match names.len() {
+            0..=4 => names.join(", "),
+            n => format!("{n} fields"),
+        };
+        let unit = if unit.is_empty() {
+            String::new()
+        } else {
+            format!(" [{unit}]")
+        };
+        plots.push(View::plot(format!("{}: {shown}{unit}", topic.name), path).contents(paths));
+    }
+    Ok(Panel {
+        plots,
+        small: Vec::new(),
+    })
+}

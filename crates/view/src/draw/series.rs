@@ -1,0 +1,359 @@
+//! Curves over time: height, roll and tilt, forces, order parameter, energy. One function for each plot, all in [`PLOTS`].
+
+use analyze::phase;
+use re_sdk_types::archetypes::{Scalars, SeriesLines};
+
+use crate::blueprint::View;
+use crate::palette;
+use crate::store::Store;
+use crate::take::Take;
+
+/// A curve and how it is drawn.
+pub struct Line<'a> {
+    /// Its place below the plot's origin.
+    pub entity: String,
+    /// What the viewer calls it.
+    pub name: String,
+    /// Colour.
+    pub color: u32,
+    /// Width in points of the screen.
+    pub width: f32,
+    /// Log times, ns.
+    pub times_ns: std::borrow::Cow<'a, [i64]>,
+    /// Values.
+    pub values: std::borrow::Cow<'a, [f64]>,
+}
+
+impl<'a> Line<'a> {
+    /// A curve of usual width; `None` without values.
+    pub fn new(
+        entity: impl Into<String>,
+        name: impl Into<String>,
+        color: u32,
+        times_ns: &'a [i64],
+        values: impl Into<std::borrow::Cow<'a, [f64]>>,
+    ) -> Option<Self> {
+        let values = values.into();
+        let any = values.iter().any(|x| x.is_finite());
+        (times_ns.len() == values.len() && any).then(|| Line {
+            entity: entity.into(),
+            name: name.into(),
+            color,
+            width: 1.5,
+            times_ns: times_ns.into(),
+            values,
+        })
+    }
+
+    /// A level from the first to the last of `times_ns`.
+    pub fn level(
+        entity: impl Into<String>,
+        name: impl Into<String>,
+        color: u32,
+        times_ns: &[i64],
+        value: f64,
+    ) -> Option<Self> {
+        let (first, last) = (*times_ns.first()?, *times_ns.last()?);
+        Some(Line {
+            entity: entity.into(),
+            name: name.into(),
+            color,
+            width: 1.0,
+            times_ns: vec![first, last].into(),
+            values: vec![value; 2].into(),
+        })
+    }
+}
+
+/// Sends the curves of a plot.
+pub fn lines(store: &mut Store<'_>, origin: &str, lines: Vec<Line<'_>>) -> anyhow::Result<()> {
+    for line in lines {
+        let path = format!("{origin}/{}", line.entity);
+        let style = SeriesLines::new()
+            .with_names([line.name])
+            .with_colors([line.color])
+            .with_widths([line.width]);
+        store.fixed(&path, &style)?;
+        let values = line.values.iter().copied();
+        let columns = Scalars::new(values).columns_of_unit_batches()?;
+        store.rows(&path, &line.times_ns, columns)?;
+    }
+    Ok(())
+}
+
+/// A plot: where its curves are, and what makes them and the title.
+struct Plot {
+    origin: &'static str,
+    make: for<'a> fn(&'a Take) -> Option<(String, Vec<Line<'a>>)>,
+    range: Option<(f64, f64)>,
+}
+
+/// The plots, from top to bottom.
+const PLOTS: &[Plot] = &[
+    Plot {
+        origin: "/plots/height",
+        make: height,
+        range: None,
+    },
+    Plot {
+        origin: "/plots/angles",
+        make: angles,
+        range: None,
+    },
+    Plot {
+        origin: "/plots/forces",
+        make: forces,
+        range: None,
+    },
+    Plot {
+        origin: "/plots/synchrony",
+        make: synchrony,
+        range: Some((0.0, 1.05)),
+    },
+    Plot {
+        origin: "/plots/energy",
+        make: stored,
+        range: None,
+    },
+    Plot {
+        origin: "/plots/ledger",
+        make: ledger,
+        range: None,
+    },
+];
+
+/// Draws every plot that has a curve.
+pub fn draw(store: &mut Store<'_>, take: &Take) -> anyhow::Result<Vec<View>> {
+    let mut views = Vec::new();
+    for plot in PLOTS {
+        let Some((title, curves)) = (plot.make)(take) else {
+            continue;
+        };
+        lines(store, plot.origin, curves)?;
+        let view = View::plot(title, plot.origin);
+        views.push(match plot.range {
+            Some((low, high)) => view.range(low, high),
+            None => view,
+        });
+    }
+    Ok(views)
+}
+
+/// What is said of columns that sensors gave.
+fn estimated(source: &str) -> &'static str {
+    if source == "imu" {
+        ", estimated from the IMU"
+    } else {
+        ""
+    }
+}
+
+fn height(take: &Take) -> Option<(String, Vec<Line<'_>>)> {
+    let height = &take.inputs.height_m;
+    let line = Line::new("z", "height", palette::BLUE, &take.state_ns, &height[..])?;
+    let title = match estimated(&take.inputs.sources.height) {
+        "" => "Height of the centre of mass [m]".to_owned(),
+        from => format!("Height about its mean [m]{from}"),
+    };
+    Some((title, vec![line]))
+}
+
+fn angles(take: &Take) -> Option<(String, Vec<Line<'_>>)> {
+    let deg = |x: &[f64]| x.iter().map(|x| x.to_degrees()).collect::<Vec<f64>>();
+    let (roll, tilt) = (&take.inputs.roll_rad, &take.inputs.pitch_rad);
+    let roll = Line::new(
+        "roll",
+        "roll",
+        palette::VERMILION,
+        &take.state_ns,
+        deg(roll),
+    );
+    let tilt = Line::new(
+        "tilt",
+        "tilt of the pole",
+        palette::BLUE,
+        &take.state_ns,
+        deg(tilt),
+    );
+    let title = match (&roll, &tilt) {
+        (Some(_), Some(_)) => "Roll (vermilion) and tilt (blue) [deg]",
+        (Some(_), None) => "Roll [deg]",
+        (None, Some(_)) => "Tilt of the pole [deg]",
+        (None, None) => return None,
+    };
+    let from = estimated(&take.inputs.sources.attitude);
+    Some((
+        format!("{title}{from}"),
+        roll.into_iter().chain(tilt).collect(),
+    ))
+}
+
+fn forces(take: &Take) -> Option<(String, Vec<Line<'_>>)> {
+    if take.inputs.normal_n.is_empty() {
+        return support(take);
+    }
+    let (scale_n, unit) = take.force_scale()?;
+    let share = |x: &[f64]| x.iter().map(|n| n / scale_n).collect::<Vec<f64>>();
+    let times = &take.force_ns;
+    // The viewer draws in the order of the names: the handles lie above the sum.
+    let total = take.inputs.total_force_n();
+    let mut lines = Vec::new();
+    lines.extend(Line::new(
+        "all",
+        format!("N_tot/{unit}"),
+        palette::WHITE,
+        times,
+        share(&total),
+    ));
+    let handles = take.inputs.normal_n.len();
+    for (i, normal_n) in take.inputs.normal_n.iter().enumerate() {
+        let (color, _) = palette::carrier(i);
+        let name = format!("N_{}/{unit}", i + 1);
+        lines.extend(Line::new(
+            format!("handle_{}", i + 1),
+            name,
+            color,
+            times,
+            share(normal_n),
+        ));
+    }
+    let floating = analyze::metrics::FLOAT_SHARE;
+    let limit = Line::level(
+        "unloaded",
+        format!("{floating}"),
+        palette::VERMILION,
+        times,
+        floating,
+    );
+    lines.extend(limit);
+    let colours = match handles {
+        1 => palette::carrier(0).1.to_owned(),
+        2..=3 => (0..handles)
+            .map(|i| palette::carrier(i).1)
+            .collect::<Vec<_>>()
+            .join(", "),
+        _ => "carriers' colours".to_owned(),
+    };
+    let title =
+        format!("Support over {unit}: N_tot (white), N_i ({colours}), {floating} (vermilion)");
+    Some((title, lines))
+}
+
+/// The support where it is measured as such.
+fn support(take: &Take) -> Option<(String, Vec<Line<'_>>)> {
+    let (ratio, floating) = (&take.inputs.support_ratio, analyze::metrics::FLOAT_SHARE);
+    let line = Line::new(
+        "all",
+        "N_tot/Mg",
+        palette::WHITE,
+        &take.state_ns,
+        &ratio[..],
+    )?;
+    let limit = Line::level(
+        "unloaded",
+        format!("{floating}"),
+        palette::VERMILION,
+        &take.state_ns,
+        floating,
+    );
+    let from = estimated(&take.inputs.sources.forces);
+    Some((
+        format!("N_tot/Mg (white), {floating} (vermilion){from}"),
+        std::iter::once(line).chain(limit).collect(),
+    ))
+}
+
+fn synchrony(take: &Take) -> Option<(String, Vec<Line<'_>>)> {
+    let phases: Vec<&[f64]> = take.inputs.phase_rad.iter().map(|p| &p[..]).collect();
+    if phases.is_empty() {
+        return None;
+    }
+    let r = phase::order_parameter(&phases);
+    let times = &take.phase_ns;
+    let mut title = "Order parameter r (green)".to_owned();
+    let mut lines = Vec::new();
+    // Measured phases have a chance level of their own, by surrogates: the metric knows.
+    if let Some(chance) = take.metrics.get("synchrony_chance")
+        && let Some(mean) = chance.as_f64()
+    {
+        // For two the band is nearly everything.
+        let band = if phases.len() > 2 {
+            &chance.per[..]
+        } else {
+            &[]
+        };
+        for (entity, value) in ["band_low", "band_high"].into_iter().zip(band) {
+            lines.extend(Line::level(
+                entity,
+                "95 % of chance",
+                palette::GRID,
+                times,
+                *value,
+            ));
+        }
+        lines.extend(Line::level(
+            "chance",
+            "mean by chance",
+            palette::LIMIT,
+            times,
+            mean,
+        ));
+        title += &format!("; by chance {mean:.3} (grey)");
+    }
+    lines.push(Line::new("r", "r", palette::GREEN, times, r)?);
+    title += estimated(&take.inputs.sources.phases);
+    Some((title, lines))
+}
+
+fn stored(take: &Take) -> Option<(String, Vec<Line<'_>>)> {
+    energies(
+        take,
+        "Stored energy [J]",
+        &[
+            ("kinetic", palette::BLUE, "blue"),
+            ("potential about its mean", palette::YELLOW, "yellow"),
+            ("elastic", palette::ORANGE, "orange"),
+        ],
+    )
+}
+
+fn ledger(take: &Take) -> Option<(String, Vec<Line<'_>>)> {
+    energies(
+        take,
+        "Energy ledger [J]",
+        &[
+            ("work in", palette::GREEN, "green"),
+            ("dissipated", palette::VERMILION, "vermilion"),
+            ("unexplained", palette::WHITE, "white"),
+        ],
+    )
+}
+
+fn energies<'a>(
+    take: &'a Take,
+    title: &str,
+    wanted: &[(&str, u32, &str)],
+) -> Option<(String, Vec<Line<'a>>)> {
+    let ledger = take.energy.as_ref()?;
+    let mut lines = Vec::new();
+    let mut names = Vec::new();
+    for (name, color, word) in wanted {
+        let Some((_, values)) = ledger.columns.iter().find(|(known, _)| known == name) else {
+            continue;
+        };
+        if let Some(line) = Line::new(
+            name.split(" about")
+                .next()
+                .unwrap_or(name)
+                .replace(' ', "_"),
+            *name,
+            *color,
+            &ledger.times_ns,
+            &values[..],
+        ) {
+            names.push(format!("{name} ({word})"));
+            lines.push(line);
+        }
+    }
+    (!lines.is_empty()).then(|| (format!("{title}: {}", names.join(", ")), lines))
+}

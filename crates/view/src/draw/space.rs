@@ -1,0 +1,416 @@
+//! The scene: the body on its poles, the carriers walking under it, contact forces as arrows, the ground they walk over.
+//!
+//! The view's origin is an entity that walks along, so that the camera does and the ground passes by.
+
+use re_sdk_types::archetypes::{
+    Arrows3D, Boxes3D, Capsules3D, Ellipsoids3D, LineStrips3D, Points3D, Transform3D,
+    ViewCoordinates,
+};
+use re_sdk_types::components::FillMode;
+use re_sdk_types::datatypes::Quaternion;
+
+use crate::blueprint::View;
+use crate::palette;
+use crate::store::Store;
+use crate::take::{Carriers, Load, Pose, Take};
+
+/// How long the trail of the centre of mass is, s.
+const TRAIL_S: f64 = 5.0;
+/// Length of the arrow of a handle that carries its fair share M·g/N, m.
+const FAIR_SHARE_M: f64 = 0.5;
+/// Reach of the ground beyond the path, m.
+const MARGIN_M: f32 = 7.0;
+/// Half the width of the ground, m.
+const HALF_WIDTH_M: f32 = 14.0;
+
+/// Draws the scene where there is a pose.
+pub fn draw(store: &mut Store<'_>, take: &Take) -> anyhow::Result<Option<View>> {
+    let Some(pose) = take.pose.as_ref().filter(|pose| !pose.times_ns.is_empty()) else {
+        return Ok(None);
+    };
+    for entity in ["/world", "/world/follow"] {
+        store.fixed(entity, &ViewCoordinates::FLU())?;
+    }
+    ground(store, take, pose)?;
+    body(store, take, pose)?;
+    trail(store, pose)?;
+    if let Some(carriers) = &take.carriers {
+        people(store, take, pose, carriers)?;
+    }
+    let forces = forces(store, take, pose)?;
+    let level_m = follow(store, pose)?;
+
+    // Far enough to see the longest pole whole, a little from above and ahead.
+    let reach_m = take
+        .shape
+        .handles_m
+        .iter()
+        .map(|h| h[0].abs().max(1.4 * h[1].abs()))
+        .fold(1.2, f64::max) as f32;
+    let eye = [0.55 * reach_m, -1.45 * reach_m - 0.7, 0.25 * reach_m + 0.45];
+    let target = [0.0, 0.0, 0.78 - level_m];
+    let title = match forces {
+        Some(unit) => format!(
+            "Scene: {FAIR_SHARE_M} m of arrow = {unit}/{}; blue loaded, yellow nearly unloaded, vermilion slack",
+            take.inputs.normal_n.len()
+        ),
+        None => "Scene".to_owned(),
+    };
+    let view = View::space(title, "/world/follow", eye, target)
+        .contents(["/world/**".to_owned()])
+        .trail("/world/trail", TRAIL_S);
+    Ok(Some(view))
+}
+
+fn f32s(v: &[f64; 3]) -> [f32; 3] {
+    v.map(|x| x as f32)
+}
+
+/// The frame that walks along at the mean height; gives that height.
+fn follow(store: &mut Store<'_>, pose: &Pose) -> anyhow::Result<f32> {
+    let heights: Vec<f64> = pose
+        .position_m
+        .iter()
+        .map(|p| p[2])
+        .filter(|z| z.is_finite())
+        .collect();
+    let level_m = (heights.iter().sum::<f64>() / heights.len().max(1) as f64) as f32;
+    let places = pose
+        .position_m
+        .iter()
+        .map(|p| [p[0] as f32, p[1] as f32, level_m]);
+    let columns = Transform3D::update_fields()
+        .with_many_translation(places)
+        .columns_of_unit_batches()?;
+    store.rows("/world/follow", &pose.times_ns, columns)?;
+    Ok(level_m)
+}
+
+/// A strip of ground under the whole path, with a line at every metre.
+fn ground(store: &mut Store<'_>, take: &Take, pose: &Pose) -> anyhow::Result<()> {
+    let (mut low, mut high) = ([f32::INFINITY; 2], [f32::NEG_INFINITY; 2]);
+    for p in pose
+        .position_m
+        .iter()
+        .filter(|p| p.iter().all(|x| x.is_finite()))
+    {
+        for axis in 0..2 {
+            low[axis] = low[axis].min(p[axis] as f32);
+            high[axis] = high[axis].max(p[axis] as f32);
+        }
+    }
+    if low[0] > high[0] {
+        return Ok(());
+    }
+    let reach = take
+        .shape
+        .handles_m
+        .iter()
+        .map(|h| h[0].abs())
+        .fold(0.0, f64::max) as f32;
+    let (x0, x1) = (
+        (low[0] - reach - MARGIN_M).floor(),
+        (high[0] + reach + MARGIN_M).ceil(),
+    );
+    let (y0, y1) = (
+        (low[1] - HALF_WIDTH_M).floor(),
+        (high[1] + HALF_WIDTH_M).ceil(),
+    );
+    let plane = Boxes3D::from_centers_and_half_sizes(
+        [[0.5 * (x0 + x1), 0.5 * (y0 + y1), -0.03]],
+        [[0.5 * (x1 - x0), 0.5 * (y1 - y0), 0.02]],
+    )
+    .with_colors([palette::GROUND])
+    .with_fill_mode(FillMode::Solid);
+    store.fixed("/world/ground/plane", &plane)?;
+    // At most some hundred lines, on whole metres, tens or hundreds.
+    let step = |from: f32, to: f32| {
+        let mut step = 1.0f32;
+        while (to - from) / step > 400.0 {
+            step *= 10.0;
+        }
+        (0..=((to - from) / step) as usize).map(move |k| from + k as f32 * step)
+    };
+    let mut strips: Vec<Vec<[f32; 3]>> = step(x0, x1)
+        .map(|x| vec![[x, y0, 0.0], [x, y1, 0.0]])
+        .collect();
+    strips.extend(step(y0, y1).map(|y| vec![[x0, y, 0.0], [x1, y, 0.0]]));
+    let lines = LineStrips3D::new(strips)
+        .with_radii([0.008f32])
+        .with_colors([palette::GRID]);
+    store.fixed("/world/ground/metres", &lines)
+}
+
+/// The body with its poles, moving as the state says.
+fn body(store: &mut Store<'_>, take: &Take, pose: &Pose) -> anyhow::Result<()> {
+    let turns = pose
+        .orientation
+        .iter()
+        .map(|q| Quaternion::from_xyzw(q.map(|x| x as f32)));
+    let columns = Transform3D::update_fields()
+        .with_many_translation(pose.position_m.iter().map(f32s))
+        .with_many_quaternion(turns)
+        .columns_of_unit_batches()?;
+    store.rows("/world/rath", &pose.times_ns, columns)?;
+    let half = take.shape.box_m.map(|x| 0.5 * x as f32);
+    let body = Boxes3D::from_half_sizes([half])
+        .with_colors([palette::BODY])
+        .with_fill_mode(FillMode::Solid);
+    store.fixed("/world/rath/body", &body)?;
+    let edges = Boxes3D::from_half_sizes([half])
+        .with_colors([palette::POLE])
+        .with_radii([0.008f32]);
+    store.fixed("/world/rath/edges", &edges)?;
+    let poles = poles(&take.shape.handles_m);
+    if !poles.is_empty() {
+        let strips = poles.into_iter().map(|ends| ends.to_vec());
+        let poles = LineStrips3D::new(strips)
+            .with_radii([0.04f32])
+            .with_colors([palette::POLE]);
+        store.fixed("/world/rath/poles", &poles)?;
+    }
+    Ok(())
+}
+
+/// One pole along x for every (y, z) at which there are handles, a little longer than they need.
+fn poles(handles_m: &[[f64; 3]]) -> Vec<[[f32; 3]; 2]> {
+    let mut poles: Vec<[f64; 4]> = Vec::new();
+    for &[x, y, z] in handles_m {
+        match poles
+            .iter_mut()
+            .find(|p| (p[0] - y).abs() < 0.01 && (p[1] - z).abs() < 0.01)
+        {
+            Some(pole) => (pole[2], pole[3]) = (pole[2].min(x), pole[3].max(x)),
+            None => poles.push([y, z, x, x]),
+        }
+    }
+    let end = |x: f64, y: f64, z: f64| f32s(&[x, y, z]);
+    poles
+        .iter()
+        .map(|&[y, z, from, to]| [end(from - 0.3, y, z), end(to + 0.3, y, z)])
+        .collect()
+}
+
+fn trail(store: &mut Store<'_>, pose: &Pose) -> anyhow::Result<()> {
+    // Pieces of line, each from the last moment to this one: the view shows those of the last seconds.
+    let pairs: Vec<usize> = (1..pose.position_m.len()).collect();
+    let times: Vec<i64> = pairs.iter().map(|k| pose.times_ns[*k]).collect();
+    let strips = pairs
+        .iter()
+        .map(|k| vec![f32s(&pose.position_m[k - 1]), f32s(&pose.position_m[*k])]);
+    let columns = LineStrips3D::new(strips).columns_of_unit_batches()?;
+    store.rows("/world/trail", &times, columns)?;
+    let style = LineStrips3D::update_fields()
+        .with_radii([0.012f32])
+        .with_colors([palette::PURPLE]);
+    store.fixed("/world/trail", &style)
+}
+
+/// Lift of a foot in its swing, m, and half the stride, m: for the eye alone.
+const FOOT_LIFT_M: f64 = 0.10;
+const HALF_STRIDE_M: f64 = 0.27;
+/// The pole lies on one shoulder: the figure stands so far beside it, m.
+const BESIDE_M: f64 = 0.17;
+/// Shoulder to hip, m.
+const TORSO_M: f64 = 0.52;
+
+/// Figures whose shoulders move as the carriers' points do and whose feet step once per gait cycle.
+fn people(
+    store: &mut Store<'_>,
+    take: &Take,
+    pose: &Pose,
+    carriers: &Carriers,
+) -> anyhow::Result<()> {
+    let (rows, count) = (carriers.times_ns.len(), carriers.points_m.len());
+    if rows == 0 || count == 0 || carriers.points_m.iter().any(|p| p.len() != rows) {
+        return Ok(());
+    }
+    // Where a log gives another point of the carriers than the shoulder, the figures are moved by a constant up or down so that their
+    // shoulders are at the handles on average.
+    let mean = |x: &mut dyn Iterator<Item = f64>| {
+        let (sum, n) = x
+            .filter(|x| x.is_finite())
+            .fold((0.0, 0usize), |(s, n), x| (s + x, n + 1));
+        sum / n.max(1) as f64
+    };
+    let handle_m = mean(&mut pose.position_m.iter().map(|p| p[2]))
+        + mean(&mut take.shape.handles_m.iter().map(|h| h[2]));
+    let shoulder_m = mean(&mut carriers.points_m.iter().flatten().map(|p| p[2]));
+    let shift_m = if (shoulder_m - handle_m).abs() > 0.25 {
+        handle_m - shoulder_m
+    } else {
+        0.0
+    };
+    let hip_m = (handle_m - TORSO_M).max(0.3);
+
+    let phase_at: Vec<Vec<f64>> = (0..count)
+        .map(|i| match take.inputs.phase_rad.get(i) {
+            Some(phase) if take.phase_ns == carriers.times_ns => analyze::phase::unwrap(phase),
+            Some(phase) if !take.phase_ns.is_empty() && phase.len() == take.phase_ns.len() => {
+                let s = |t: &[i64]| recording::signal::seconds_since(t, take.start_ns);
+                let unwrapped = analyze::phase::unwrap(phase);
+                analyze::inputs::interpolate(&s(&take.phase_ns), &unwrapped, &s(&carriers.times_ns))
+            }
+            _ => vec![0.0; rows],
+        })
+        .collect();
+    let mut legs: Vec<Vec<[f32; 3]>> = Vec::with_capacity(rows * count);
+    for k in 0..rows {
+        for (points, phase) in carriers.points_m.iter().zip(&phase_at) {
+            let [x, y, z] = points[k];
+            let y = y + BESIDE_M;
+            let hip = [x, y, (z + shift_m - TORSO_M).max(0.2)];
+            // A gait cycle of the model is one step; the same foot swings every other.
+            let (sin, cos) = (0.5 * phase[k]).sin_cos();
+            let foot = |side: f64| {
+                let swing = (side * cos).max(0.0);
+                f32s(&[
+                    x + side * HALF_STRIDE_M * sin,
+                    y + side * 0.1,
+                    0.04 + FOOT_LIFT_M * swing,
+                ])
+            };
+            legs.push(vec![foot(1.0), f32s(&hip), foot(-1.0)]);
+        }
+    }
+    let colors = || (0..count).map(|i| palette::carrier(i).0);
+    let columns = LineStrips3D::new(legs).columns(std::iter::repeat_n(count, rows))?;
+    store.rows("/world/legs", &carriers.times_ns, columns)?;
+    let style = LineStrips3D::update_fields()
+        .with_radii([0.055f32])
+        .with_colors(colors());
+    store.fixed("/world/legs", &style)?;
+    for (i, points) in carriers.points_m.iter().enumerate() {
+        let path = format!("/world/carrier_{}", i + 1);
+        let places = points.iter().map(|p| f32s(&[p[0], p[1], p[2] + shift_m]));
+        let columns = Transform3D::update_fields()
+            .with_many_translation(places)
+            .columns_of_unit_batches()?;
+        store.rows(&path, &carriers.times_ns, columns)?;
+        let color = palette::carrier(i).0;
+        let length = (handle_m - hip_m - 0.12).max(0.1) as f32;
+        let torso = Capsules3D::from_lengths_and_radii([length], [0.13f32])
+            .with_translations([[0.0f32, BESIDE_M as f32, -(TORSO_M as f32) + 0.02]])
+            .with_colors([color])
+            .with_fill_mode(FillMode::Solid);
+        store.fixed(&format!("{path}/torso"), &torso)?;
+        let head = Ellipsoids3D::from_centers_and_half_sizes(
+            [[0.0f32, BESIDE_M as f32, 0.2]],
+            [[0.1f32, 0.09, 0.13]],
+        )
+        .with_colors([color])
+        .with_fill_mode(FillMode::Solid);
+        store.fixed(&format!("{path}/head"), &head)?;
+    }
+    Ok(())
+}
+
+/// Arrows and handle marks; gives the name of what they are scaled by.
+fn forces(store: &mut Store<'_>, take: &Take, pose: &Pose) -> anyhow::Result<Option<&'static str>> {
+    let handles = take.shape.handles_m.len();
+    let normal_n = &take.inputs.normal_n;
+    let Some((scale_n, unit)) = take.force_scale() else {
+        return Ok(None);
+    };
+    if handles == 0 || normal_n.len() != handles || take.force_ns.is_empty() {
+        return Ok(None);
+    }
+    let rows = take.force_ns.len();
+    let lengths = || std::iter::repeat_n(handles, rows);
+    let metres_per_newton = FAIR_SHARE_M * handles as f64 / scale_n;
+    let mut colors = Vec::with_capacity(rows * handles);
+    let mut radii = Vec::with_capacity(rows * handles);
+    let mut vectors = Vec::with_capacity(rows * handles);
+    let mut origins = Vec::with_capacity(rows * handles);
+    let mut at = 0;
+    for k in 0..rows {
+        // The pose in force at this moment: the last one not after it.
+        while at + 1 < pose.times_ns.len() && pose.times_ns[at + 1] <= take.force_ns[k] {
+            at += 1;
+        }
+        for (handle, force) in take.shape.handles_m.iter().zip(normal_n) {
+            let load = Load::of(force[k], scale_n, handles);
+            let (color, radius) = match load {
+                Load::Loaded => (palette::DEEP, 0.06f32),
+                Load::NearlyUnloaded => (palette::YELLOW, 0.085),
+                Load::Slack => (palette::VERMILION, 0.12),
+            };
+            colors.push(color);
+            radii.push(radius);
+            let length = if force[k].is_finite() {
+                force[k].max(0.0) * metres_per_newton
+            } else {
+                0.0
+            };
+            vectors.push([0.0f32, 0.0, length as f32]);
+            let turned = rotate(&pose.orientation[at], handle);
+            let place = pose.position_m[at];
+            origins.push(f32s(&[
+                place[0] + turned[0],
+                place[1] + turned[1],
+                place[2] + turned[2],
+            ]));
+        }
+    }
+    let marks = Points3D::new(origins.iter().copied())
+        .with_colors(colors.iter().copied())
+        .with_radii(radii)
+        .columns(lengths())?;
+    store.rows("/world/handles", &take.force_ns, marks)?;
+    let arrows = Arrows3D::from_vectors(vectors)
+        .with_origins(origins)
+        .with_colors(colors)
+        .columns(lengths())?;
+    store.rows("/world/forces", &take.force_ns, arrows)?;
+    store.fixed(
+        "/world/forces",
+        &Arrows3D::update_fields().with_radii([0.03f32]),
+    )?;
+    Ok(Some(unit))
+}
+
+/// A vector turned by a unit quaternion (x, y, z, w): v + 2w(u × v) + 2u × (u × v).
+fn rotate(q: &[f64; 4], v: &[f64; 3]) -> [f64; 3] {
+    let cross = |a: [f64; 3], b: [f64; 3]| {
+        [
+            a[1] * b[2] - a[2] * b[1],
+            a[2] * b[0] - a[0] * b[2],
+            a[0] * b[1] - a[1] * b[0],
+        ]
+    };
+    let u = [q[0], q[1], q[2]];
+    let once = cross(u, *v);
+    let twice = cross(u, once);
+    [0, 1, 2].map(|i| v[i] + 2.0 * (q[3] * once[i] + twice[i]))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_quarter_turn_about_x_takes_y_to_z() {
+        let h = 0.5f64.sqrt();
+        let v = rotate(&[h, 0.0, 0.0, h], &[1.0, 2.0, 0.0]);
+        for (got, expected) in v.iter().zip([1.0, 0.0, 2.0]) {
+            assert!((got - expected).abs() < 1e-12, "{v:?}");
+        }
+    }
+
+    #[test]
+    fn handles_on_one_line_share_a_pole() {
+        let two = poles(&[[2.45, 0.0, 0.1], [-2.45, 0.0, 0.1]]);
+        assert_eq!(two, [[[-2.75, 0.0, 0.1], [2.75, 0.0, 0.1]]]);
+        let eight: Vec<[f64; 3]> = (0..8)
+            .map(|i| {
+                [
+                    f64::from(i / 2) - 1.5,
+                    if i % 2 == 0 { 0.4 } else { -0.4 },
+                    0.1,
+                ]
+            })
+            .collect();
+        assert_eq!(poles(&eight).len(), 2);
+        assert!(poles(&[]).is_empty());
+    }
+}

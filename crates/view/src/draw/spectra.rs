@@ -1,0 +1,291 @@
+//! Power spectra as drawings with axes: frequency linear, power in dB below each curve's own peak, lines at f/2, f and 2f.
+//!
+//! Rerun plots over timelines only, and its bar charts have no logarithm; hence lines in a plane with ticks of their own.
+
+use analyze::spectrum::{DEFAULT_SEGMENT_S, Options, Spectrum, welch};
+use re_sdk_types::archetypes::{LineStrips2D, Points2D};
+use re_sdk_types::components::Radius;
+
+use crate::blueprint::View;
+use crate::palette;
+use crate::store::Store;
+use crate::take::Take;
+
+/// Size of the drawn frame, in units of the drawing.
+const WIDTH: f64 = 1.5;
+/// Its height.
+const HEIGHT: f64 = 1.0;
+/// The lowest power that is drawn, dB below the peak.
+const FLOOR_DB: f64 = -60.0;
+
+/// One curve.
+pub struct Curve<'a> {
+    /// Its name in the entity tree.
+    pub entity: &'a str,
+    /// The spectrum.
+    pub spectrum: &'a Spectrum,
+    /// Its colour.
+    pub color: u32,
+}
+
+/// Draws the spectra of height and roll where there are both or one of them.
+pub fn draw(store: &mut Store<'_>, take: &Take) -> anyhow::Result<Option<View>> {
+    let inputs = &take.inputs;
+    let window = take.window;
+    let of = |x: &[f64]| -> Option<Spectrum> {
+        if x.len() != inputs.t_s.len() {
+            return None;
+        }
+        let range = window.range(&inputs.t_s);
+        let step_s = analyze::inputs::mean_step_s(&inputs.t_s[range.clone()])?;
+        let options = Options::seconds(DEFAULT_SEGMENT_S, 1.0 / step_s);
+        // Non-finite samples have no spectrum: the curve is left out.
+        welch(&x[range], 1.0 / step_s, &options).ok()
+    };
+    let (height, roll) = (of(&inputs.height_m), of(&inputs.roll_rad));
+    // f is the metric, from the same code as in every table.
+    let f_hz = take.metrics.number("peak_hz");
+    let mut curves = Vec::new();
+    if let Some(spectrum) = &height {
+        curves.push(Curve {
+            entity: "height",
+            spectrum,
+            color: palette::BLUE,
+        });
+    }
+    if let Some(spectrum) = &roll {
+        curves.push(Curve {
+            entity: "roll",
+            spectrum,
+            color: palette::VERMILION,
+        });
+    }
+    let title = match curves.len() {
+        2 => "Spectra of height (blue), roll (vermilion)",
+        1 if height.is_some() => "Spectrum of the height",
+        1 => "Spectrum of the roll",
+        _ => return Ok(None),
+    };
+    let top_hz = f_hz.map_or(6.0, |f| 2.6 * f);
+    drawing(store, "/spectra/rath", title, &curves, f_hz, top_hz)
+}
+
+/// Sends a drawing of `curves` from 0 to `top_hz` and gives its view; `None` where no curve has power.
+pub fn drawing(
+    store: &mut Store<'_>,
+    origin: &str,
+    title: &str,
+    curves: &[Curve<'_>],
+    f_hz: Option<f64>,
+    top_hz: f64,
+) -> anyhow::Result<Option<View>> {
+    let nyquist = curves
+        .iter()
+        .filter_map(|c| c.spectrum.hz.last())
+        .copied()
+        .fold(0.0, f64::max);
+    let top_hz = top_hz.min(nyquist);
+    let mut any = false;
+    for curve in curves {
+        let Some(points) = polyline(curve.spectrum, top_hz) else {
+            continue;
+        };
+        any = true;
+        let line = LineStrips2D::new([points])
+            .with_radii([Radius::new_ui_points(1.0)])
+            .with_colors([curve.color])
+            .with_draw_order(20.0);
+        store.fixed(&format!("{origin}/{}", curve.entity), &line)?;
+    }
+    if !any {
+        return Ok(None);
+    }
+    axes(store, origin, top_hz)?;
+    if let Some(f_hz) = f_hz {
+        marks(store, origin, f_hz, top_hz)?;
+    }
+    Ok(Some(View::plane(
+        title,
+        origin,
+        [-0.16, WIDTH + 0.08],
+        [-HEIGHT - 0.16, 0.17],
+    )))
+}
+
+/// Where a frequency and a power are drawn.
+fn place(hz: f64, db: f64, top_hz: f64) -> [f32; 2] {
+    let db = db.clamp(FLOOR_DB, 0.0);
+    [
+        (WIDTH * hz / top_hz) as f32,
+        (-HEIGHT * (1.0 - db / FLOOR_DB)) as f32,
+    ]
+}
+
+/// The curve, without 0 Hz, in dB below its peak; `None` where there is no power.
+fn polyline(spectrum: &Spectrum, top_hz: f64) -> Option<Vec<[f32; 2]>> {
+    let bins = || {
+        spectrum
+            .hz
+            .iter()
+            .zip(&spectrum.power)
+            .skip(1)
+            .filter(|(hz, _)| **hz <= top_hz)
+    };
+    let peak = bins().map(|(_, p)| *p).fold(0.0, f64::max);
+    if !(peak > 0.0 && top_hz > 0.0) {
+        return None;
+    }
+    Some(
+        bins()
+            .map(|(hz, p)| place(*hz, 10.0 * (p / peak).log10(), top_hz))
+            .collect(),
+    )
+}
+
+fn axes(store: &mut Store<'_>, origin: &str, top_hz: f64) -> anyhow::Result<()> {
+    // Steps of 1, 2 or 5 that give four to eight ticks.
+    let step = [
+        0.1, 0.2, 0.5, 1.0, 2.0, 5.0, 10.0, 20.0, 50.0, 100.0, 200.0, 500.0,
+    ]
+    .into_iter()
+    .find(|step| top_hz / step <= 8.0)
+    .unwrap_or(1000.0);
+    let ticks: Vec<f64> = (0..=(top_hz / step + 1e-9) as usize)
+        .map(|k| k as f64 * step)
+        .collect();
+    let levels = [0.0, -20.0, -40.0, -60.0];
+    let mut strips = vec![vec![
+        place(0.0, 0.0, top_hz),
+        place(0.0, FLOOR_DB, top_hz),
+        place(top_hz, FLOOR_DB, top_hz),
+    ]];
+    let mut colors = vec![palette::AXIS];
+    for hz in &ticks[1..] {
+        strips.push(vec![place(*hz, FLOOR_DB, top_hz), place(*hz, 0.0, top_hz)]);
+        colors.push(palette::GROUND);
+    }
+    for db in &levels[..3] {
+        strips.push(vec![place(0.0, *db, top_hz), place(top_hz, *db, top_hz)]);
+        colors.push(palette::GROUND);
+    }
+    let lines = LineStrips2D::new(strips)
+        .with_radii([Radius::new_ui_points(0.5)])
+        .with_colors(colors)
+        .with_draw_order(1.0);
+    store.fixed(&format!("{origin}/axes"), &lines)?;
+    let below = |hz: f64| {
+        let [x, y] = place(hz, FLOOR_DB, top_hz);
+        [x, y + 0.02]
+    };
+    let number = |x: f64| {
+        if step < 1.0 {
+            format!("{x:.1}")
+        } else {
+            format!("{x:.0}")
+        }
+    };
+    let last = ticks.len() - 1;
+    let mut labels: Vec<String> = ticks.iter().map(|hz| number(*hz)).collect();
+    labels[last] += " Hz";
+    let mut places: Vec<[f32; 2]> = ticks.iter().map(|hz| below(*hz)).collect();
+    for db in levels {
+        let [x, y] = place(0.0, db, top_hz);
+        places.push([x - 0.09, y - 0.045]);
+        labels.push(if db == 0.0 {
+            "0 dB".into()
+        } else {
+            format!("{db:.0}")
+        });
+    }
+    text(
+        store,
+        &format!("{origin}/ticks"),
+        places,
+        labels,
+        palette::AXIS,
+    )
+}
+
+/// Lines at f/2, f and 2f, named above the frame.
+fn marks(store: &mut Store<'_>, origin: &str, f_hz: f64, top_hz: f64) -> anyhow::Result<()> {
+    let marks: Vec<(f64, String)> = [(0.5, "f/2"), (1.0, "f"), (2.0, "2f")]
+        .into_iter()
+        .map(|(times, name)| (times * f_hz, format!("{name} {:.2}", times * f_hz)))
+        .filter(|(hz, _)| *hz <= top_hz)
+        .collect();
+    if marks.is_empty() {
+        return Ok(());
+    }
+    // Dashes: a whole line would hide the curve's peak.
+    let dashes = marks.iter().flat_map(|(hz, _)| {
+        let x = (WIDTH * hz / top_hz) as f32;
+        let y = |k: f32| -(HEIGHT as f32) * k / 20.0;
+        (0..20u8).map(move |k| vec![[x, y(f32::from(k))], [x, y(f32::from(k) + 0.5)]])
+    });
+    let lines = LineStrips2D::new(dashes)
+        .with_radii([Radius::new_ui_points(0.6)])
+        .with_colors([palette::WHITE])
+        .with_draw_order(10.0);
+    store.fixed(&format!("{origin}/lines"), &lines)?;
+    let places = marks
+        .iter()
+        .map(|(hz, _)| [(WIDTH * hz / top_hz) as f32, -HEIGHT as f32 - 0.13])
+        .collect();
+    let labels = marks.into_iter().map(|(_, label)| label).collect();
+    text(
+        store,
+        &format!("{origin}/names"),
+        places,
+        labels,
+        palette::WHITE,
+    )
+}
+
+/// Words at places, as labels of points without size.
+fn text(
+    store: &mut Store<'_>,
+    path: &str,
+    places: Vec<[f32; 2]>,
+    labels: Vec<String>,
+    color: u32,
+) -> anyhow::Result<()> {
+    let points = Points2D::new(places)
+        .with_radii([Radius::new_ui_points(0.0)])
+        .with_labels(labels)
+        .with_show_labels(true)
+        .with_colors([color])
+        .with_draw_order(30.0);
+    store.fixed(path, &points)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_line_is_drawn_at_its_frequency_and_at_the_top() {
+        let fs = 30.0;
+        let x: Vec<f64> = (0..1800)
+            .map(|k| (std::f64::consts::TAU * 2.0 * f64::from(k) / fs).sin())
+            .collect();
+        let spectrum = welch(&x, fs, &Options::seconds(20.0, fs)).unwrap();
+        let points = polyline(&spectrum, 5.0).unwrap();
+        let top = points.iter().min_by(|a, b| a[1].total_cmp(&b[1])).unwrap();
+        assert!(
+            (f64::from(top[0]) / WIDTH * 5.0 - 2.0).abs() < 1e-6,
+            "{top:?}"
+        );
+        assert_eq!(top[1], -HEIGHT as f32);
+        assert!(
+            points
+                .iter()
+                .all(|p| p[1] <= 0.0 && p[1] >= -HEIGHT as f32 && p[0] <= WIDTH as f32)
+        );
+    }
+
+    #[test]
+    fn nothing_comes_of_no_power() {
+        let spectrum = welch(&[1.0; 100], 10.0, &Options::seconds(5.0, 10.0)).unwrap();
+        assert!(polyline(&spectrum, 5.0).is_none());
+    }
+}

@@ -1,0 +1,83 @@
+//! A page with the metrics, from the same table as every other output of them.
+
+use std::fmt::Write;
+
+use analyze::metrics::{Datum, METRICS, Metric, Value};
+use re_sdk_types::archetypes::TextDocument;
+
+use crate::blueprint::View;
+use crate::store::Store;
+use crate::take::Take;
+
+/// Sends the page.
+pub fn draw(store: &mut Store<'_>, take: &Take) -> anyhow::Result<View> {
+    let page = page(take);
+    store.fixed("/summary", &TextDocument::from_markdown(page))?;
+    Ok(View::text("Summary", "/summary"))
+}
+
+fn page(take: &Take) -> String {
+    let mut text = format!("## {}\n\n{:.3} s", take.name, take.duration_s());
+    let rows: Vec<(&Metric, &Value)> = METRICS
+        .iter()
+        .filter_map(|metric| Some((metric, take.metrics.get(metric.name)?)))
+        .filter(|(_, value)| value.datum != Datum::Missing)
+        .collect();
+    if !rows.is_empty() {
+        if take.window.start_s > 0.0 {
+            let _ = write!(text, ", metrics from {} s on", take.window.start_s);
+        }
+        text += "\n\n| | |\n|---|---|\n";
+        for (metric, value) in rows {
+            let shown = match &value.datum {
+                Datum::Number(x) => number(*x, metric.unit),
+                Datum::Bool(x) => {
+                    if *x {
+                        "yes".to_owned()
+                    } else {
+                        "no".to_owned()
+                    }
+                }
+                Datum::Word(word) => (*word).to_owned(),
+                Datum::Missing => continue,
+            };
+            let _ = writeln!(text, "| {} | {shown} |", metric.label.replace('|', "/"));
+        }
+    }
+    for note in &take.notes {
+        let _ = write!(text, "\n\n{note}");
+    }
+    text
+}
+
+/// Four significant digits and the unit.
+fn number(x: f64, unit: &str) -> String {
+    let digits = if x == 0.0 {
+        3
+    } else {
+        (3 - x.abs().log10().floor() as i32).clamp(0, 6) as usize
+    };
+    let unit = match unit {
+        "1" | "-" | "bool" => String::new(),
+        unit => format!(" {unit}"),
+    };
+    format!("{x:.digits$}{unit}")
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn numbers_have_four_digits() {
+        for (x, unit, shown) in [
+            (18.3871, "deg", "18.39 deg"),
+            (0.14812, "deg", "0.1481 deg"),
+            (0.0, "1", "0.000"),
+            (1234.56, "N", "1235 N"),
+            (0.990_12, "1", "0.9901"),
+        ] {
+            assert_eq!(number(x, unit), shown);
+        }
+    }
+}

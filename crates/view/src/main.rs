@@ -1,0 +1,233 @@
+//! `view`: opens a recording in the Rerun viewer, or writes what it would show.
+
+use std::fs::File;
+use std::io::{BufWriter, Read, Write};
+use std::path::{Path, PathBuf};
+use std::process::ExitCode;
+use std::time::Duration;
+
+use anyhow::{Context, anyhow, bail};
+use clap::Parser;
+use recording::Finding;
+use recording::read::{ReadOptions, Recording};
+use view::load::{Detail, load};
+use view::store::{Encoded, Sink};
+use view::take::Take;
+use view::viewer::{self, Kind};
+
+/// Look at a recording in the Rerun viewer: the scene in space, phases on the circle, forces, angles, spectra and events.
+#[derive(Parser)]
+#[command(version, about)]
+struct Arguments {
+    /// The recording (MCAP), or - for one that comes through standard input and is shown while it grows
+    #[arg(value_name = "FILE.mcap|-")]
+    file: PathBuf,
+    /// Write what would be shown as a Rerun file, and open nothing
+    #[arg(long, value_name = "FILE.rrd", group = "target")]
+    save: Option<PathBuf>,
+    /// Serve the viewer as a web page from this machine until interrupted
+    #[arg(long, group = "target")]
+    web: bool,
+    /// Send to a viewer or server that runs already, such as rerun+http://127.0.0.1:9876/proxy
+    #[arg(long, value_name = "URL", group = "target")]
+    connect: Option<String>,
+}
+
+/// Exit code where the input was damaged and what could be saved was used.
+const DAMAGED: u8 = 3;
+
+fn main() -> ExitCode {
+    match run(&Arguments::parse()) {
+        Ok(findings) => report(&findings),
+        Err(error) => {
+            eprintln!("view: {error:#}");
+            ExitCode::FAILURE
+        }
+    }
+}
+
+/// Says what was lost of the input.
+fn report(findings: &[Finding]) -> ExitCode {
+    let lost: Vec<&Finding> = findings.iter().filter(|f| f.kind.is_loss()).collect();
+    for finding in &lost {
+        eprintln!("view: {finding}");
+    }
+    if lost.is_empty() {
+        ExitCode::SUCCESS
+    } else {
+        ExitCode::from(DAMAGED)
+    }
+}
+
+fn run(arguments: &Arguments) -> anyhow::Result<Vec<Finding>> {
+    if let Some(path) = &arguments.save {
+        return save(&arguments.file, path);
+    }
+    if let Some(url) = &arguments.connect {
+        return connect(&arguments.file, url);
+    }
+    let kind = if arguments.web {
+        Kind::Web
+    } else {
+        Kind::Window
+    };
+    show(&arguments.file, kind)
+}
+
+fn is_stdin(file: &Path) -> bool {
+    file.as_os_str() == "-"
+}
+
+/// Opens a recording that is complete.
+fn open(file: &Path) -> anyhow::Result<Recording> {
+    if !is_stdin(file) {
+        return Ok(Recording::open(file, &ReadOptions::default())?);
+    }
+    let mut bytes = Vec::new();
+    std::io::stdin()
+        .lock()
+        .read_to_end(&mut bytes)
+        .context("standard input: cannot be read")?;
+    Ok(Recording::from_bytes(bytes, &ReadOptions::default())?)
+}
+
+/// Name for people: the file's, without folders.
+fn name(file: &Path) -> String {
+    if is_stdin(file) {
+        return "standard input".to_owned();
+    }
+    file.file_stem().map_or_else(
+        || file.display().to_string(),
+        |stem| stem.to_string_lossy().into_owned(),
+    )
+}
+
+/// Sends a recording that is complete, or one that comes through standard input as it comes.
+fn send(file: &Path, sink: &mut dyn Sink) -> anyhow::Result<Vec<Finding>> {
+    let (take, findings) = if is_stdin(file) {
+        view::live::follow(std::io::stdin(), sink)?
+    } else {
+        let recording = open(file)?;
+        let (take, findings) = load(&name(file), &recording, Detail::Thinned)?;
+        check(file, &take)?;
+        view::send(
+            sink,
+            &view::recording_id(&take.name, recording.info()),
+            &take,
+        )?;
+        (take, findings)
+    };
+    check(file, &take)?;
+    Ok(findings)
+}
+
+/// A recording without any number has nothing to look at.
+fn check(file: &Path, take: &Take) -> anyhow::Result<()> {
+    let nothing = take.state_ns.is_empty()
+        && take.force_ns.is_empty()
+        && take.phase_ns.is_empty()
+        && take.energy.is_none()
+        && take.imus.is_empty()
+        && take.topics.is_empty();
+    if nothing {
+        bail!(
+            "{}: has no signal that can be shown; expected numbers in protobuf, CDR, ROS 1 or JSON messages (`analyze` lists what is in it)",
+            name(file)
+        );
+    }
+    Ok(())
+}
+
+/// Writes an .rrd that appears whole or not at all.
+fn save(file: &Path, path: &Path) -> anyhow::Result<Vec<Finding>> {
+    let cannot =
+        |error: &dyn std::fmt::Display| anyhow!("{}: cannot be written: {error}", path.display());
+    let recording = open(file)?;
+    let (take, findings) = load(&name(file), &recording, Detail::Thinned)?;
+    check(file, &take)?;
+    let folder = match path.parent() {
+        Some(folder) if !folder.as_os_str().is_empty() => folder,
+        _ => Path::new("."),
+    };
+    if path.is_dir() {
+        return Err(cannot(&"it is a folder"));
+    }
+    let mut temporary = tempfile::Builder::new()
+        .prefix(".view-")
+        .suffix(".rrd")
+        .permissions(permissions())
+        .tempfile_in(folder)
+        .map_err(|e| cannot(&e))?;
+    {
+        let mut encoded = Encoded::new(BufWriter::with_capacity(1 << 20, temporary.as_file_mut()))?;
+        view::send(
+            &mut encoded,
+            &view::recording_id(&take.name, recording.info()),
+            &take,
+        )
+        .map_err(|e| cannot(&e))?;
+        encoded
+            .finish()
+            .map_err(|e| cannot(&e))?
+            .flush()
+            .map_err(|e| cannot(&e))?;
+    }
+    temporary.persist(path).map_err(|e| cannot(&e.error))?;
+    Ok(findings)
+}
+
+/// What a new file may be used for: the system's habit, which a temporary file does not follow by itself.
+#[cfg(unix)]
+fn permissions() -> std::fs::Permissions {
+    std::os::unix::fs::PermissionsExt::from_mode(0o666)
+}
+
+#[cfg(not(unix))]
+fn permissions() -> std::fs::Permissions {
+    std::fs::metadata(".")
+        .map(|m| m.permissions())
+        .expect("the working folder exists")
+}
+
+/// Sends to a viewer or server that runs already.
+fn connect(file: &Path, url: &str) -> anyhow::Result<Vec<Finding>> {
+    let parsed = url
+        .parse()
+        .map_err(|error| anyhow!("--connect: {url:?} is no address of Rerun ({error}); expected one such as rerun+http://127.0.0.1:9876/proxy"))?;
+    let mut client =
+        re_grpc_client::write::Client::new(parsed, re_grpc_client::write::Options::default());
+    let findings = send(file, &mut client)?;
+    client
+        .flush_blocking(Duration::from_secs(20))
+        .map_err(|error| {
+            anyhow!("{url}: did not take what was sent ({error}); is a viewer running there?")
+        })?;
+    Ok(findings)
+}
+
+/// Starts the viewer, sends the recording into it and waits until it is closed.
+fn show(file: &Path, kind: Kind) -> anyhow::Result<Vec<Finding>> {
+    if !is_stdin(file) {
+        // A file that is not there should not open a window first.
+        File::open(file).map_err(|error| anyhow!("{}: cannot be read: {error}", file.display()))?;
+    }
+    let (mut child, stdin) = viewer::start(kind)?;
+    let sent = Encoded::new(BufWriter::with_capacity(1 << 16, stdin)).and_then(|mut encoded| {
+        let findings = send(file, &mut encoded)?;
+        encoded.finish()?.flush()?;
+        Ok(findings)
+    });
+    if sent.is_err() && child.try_wait()?.is_none() {
+        // It would wait for ever with nothing to show.
+        child.kill()?;
+    }
+    let status = child.wait()?;
+    match sent {
+        Ok(findings) if status.success() => Ok(findings),
+        Ok(_) => bail!("the Rerun viewer ended with {status}; its own messages stand above"),
+        Err(error) if status.code().is_some_and(|code| code != 0) => {
+            Err(error.context(format!("the Rerun viewer ended with {status}")))
+        }
+        Err(error) => Err(error),
+    }
+}

@@ -1,0 +1,222 @@
+//! What there is to draw: columns on the time axes of their topics, and what the scene says about the things carried.
+
+use analyze::events::Event;
+use analyze::{Inputs, Metrics, Window};
+
+/// Everything that is drawn of one recording. What is not known is empty or `None`, and is then not drawn.
+#[derive(Clone, Debug)]
+pub struct Take {
+    /// What it is called.
+    pub name: String,
+    /// Log time of the first message, ns.
+    pub start_ns: i64,
+    /// Log time of the last message, ns.
+    pub end_ns: i64,
+    /// The columns that `analyze` computes from.
+    pub inputs: Inputs,
+    /// Log times of height and angles, ns: what `inputs` has in seconds.
+    pub state_ns: Vec<i64>,
+    /// Log times of the forces, ns.
+    pub force_ns: Vec<i64>,
+    /// Log times of the phases, ns.
+    pub phase_ns: Vec<i64>,
+    /// The window that the metrics are computed in.
+    pub window: Window,
+    /// The metrics.
+    pub metrics: Metrics,
+    /// Where the body is.
+    pub pose: Option<Pose>,
+    /// Where the carriers are.
+    pub carriers: Option<Carriers>,
+    /// Handles and body.
+    pub shape: Shape,
+    /// The energy ledger.
+    pub energy: Option<Ledger>,
+    /// Inertial sensors.
+    pub imus: Vec<Sensor>,
+    /// Every other topic with numbers.
+    pub topics: Vec<Topic>,
+    /// What happened when.
+    pub events: Vec<Event>,
+    /// What the reader remarked, one line each with its time in seconds where it has one.
+    pub remarks: Vec<(Option<f64>, String)>,
+    /// What the user should know of file, analysis and drawing, in sentences.
+    pub notes: Vec<String>,
+}
+
+/// Where the body is over time.
+#[derive(Clone, Debug, Default)]
+pub struct Pose {
+    /// Log times, ns.
+    pub times_ns: Vec<i64>,
+    /// Centre of mass in the world, m.
+    pub position_m: Vec<[f64; 3]>,
+    /// Body in the world, quaternion x, y, z, w.
+    pub orientation: Vec<[f64; 4]>,
+}
+
+/// The carriers' points over time.
+#[derive(Clone, Debug, Default)]
+pub struct Carriers {
+    /// Log times, ns.
+    pub times_ns: Vec<i64>,
+    /// One path per carrier, m.
+    pub points_m: Vec<Vec<[f64; 3]>>,
+}
+
+/// Where the body is held, and what it looks like.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Shape {
+    /// Handles in body coordinates, m.
+    pub handles_m: Vec<[f64; 3]>,
+    /// Box around the centre of mass, m, for the eye alone.
+    pub box_m: [f64; 3],
+}
+
+/// The energy ledger.
+#[derive(Clone, Debug, Default)]
+pub struct Ledger {
+    /// Log times, ns.
+    pub times_ns: Vec<i64>,
+    /// Name and values in J.
+    pub columns: Vec<(&'static str, Vec<f64>)>,
+}
+
+/// One curve: its own times, because it may have been thinned.
+#[derive(Clone, Debug, Default)]
+pub struct Curve {
+    /// What it is, as the viewer shows it.
+    pub name: String,
+    /// Log times, ns.
+    pub times_ns: Vec<i64>,
+    /// Values.
+    pub values: Vec<f64>,
+}
+
+/// An inertial sensor.
+#[derive(Clone, Debug, Default)]
+pub struct Sensor {
+    /// Its topic.
+    pub topic: String,
+    /// Angular velocity, rad/s; three curves or none.
+    pub gyro: Vec<Curve>,
+    /// Specific force, m/s²; three curves or none.
+    pub accel: Vec<Curve>,
+    /// Estimated roll and pitch, deg; two curves or none.
+    pub attitude: Vec<Curve>,
+    /// Spectra of the angular velocity, (rad/s)²/Hz, x y z.
+    pub gyro_spectra: Vec<analyze::spectrum::Spectrum>,
+    /// Spectra of the specific force, (m/s²)²/Hz, x y z.
+    pub accel_spectra: Vec<analyze::spectrum::Spectrum>,
+}
+
+/// A topic that is nothing in particular.
+#[derive(Clone, Debug, Default)]
+pub struct Topic {
+    /// Its name.
+    pub name: String,
+    /// Curves by unit: those of one unit share a plot.
+    pub plots: Vec<(String, Vec<Curve>)>,
+}
+
+impl Take {
+    /// Weight M·g, N, where the mass is known.
+    pub fn weight_n(&self) -> Option<f64> {
+        self.inputs
+            .mass_kg
+            .map(|mass_kg| mass_kg * self.inputs.gravity_m_per_s2)
+            .filter(|weight_n| *weight_n > 0.0)
+    }
+
+    /// What forces are scaled by, N, and its name: the weight, or the mean support where the mass is not known (over many strides
+    /// what is carried neither rises nor falls). `None` without forces.
+    pub fn force_scale(&self) -> Option<(f64, &'static str)> {
+        if let Some(weight_n) = self.weight_n() {
+            return Some((weight_n, "Mg"));
+        }
+        let total = self.inputs.total_force_n();
+        let finite: Vec<f64> = total.into_iter().filter(|n| n.is_finite()).collect();
+        let mean = finite.iter().sum::<f64>() / finite.len() as f64;
+        (mean > 0.0).then_some((mean, "mean support"))
+    }
+
+    /// Length, s.
+    pub fn duration_s(&self) -> f64 {
+        (i128::from(self.end_ns) - i128::from(self.start_ns)) as f64 / 1e9
+    }
+}
+
+impl Default for Take {
+    /// Nothing.
+    fn default() -> Self {
+        Take {
+            name: String::new(),
+            start_ns: 0,
+            end_ns: 0,
+            inputs: Inputs::default(),
+            state_ns: Vec::new(),
+            force_ns: Vec::new(),
+            phase_ns: Vec::new(),
+            window: Window::ALL,
+            metrics: Metrics(Vec::new()),
+            pose: None,
+            carriers: None,
+            shape: Shape::default(),
+            energy: None,
+            imus: Vec::new(),
+            topics: Vec::new(),
+            events: Vec::new(),
+            remarks: Vec::new(),
+            notes: Vec::new(),
+        }
+    }
+}
+
+/// How a handle is loaded.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Load {
+    /// It carries.
+    Loaded,
+    /// It carries less than a tenth of its fair share M·g/N: for two handles, the paper's 0.05·M·g.
+    NearlyUnloaded,
+    /// It does not touch.
+    Slack,
+}
+
+impl Load {
+    /// The state of a handle that presses with `normal_n`, of `handles` that share `weight_n`.
+    pub fn of(normal_n: f64, weight_n: f64, handles: usize) -> Self {
+        if normal_n.is_nan() || normal_n <= 0.0 {
+            Load::Slack
+        } else if normal_n < 0.1 * weight_n / handles.max(1) as f64 {
+            Load::NearlyUnloaded
+        } else {
+            Load::Loaded
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn load_has_the_papers_line_for_two_handles() {
+        let weight_n = 600.0;
+        for (normal_n, handles, load) in [
+            (0.0, 2, Load::Slack),
+            (-1.0, 2, Load::Slack),
+            (f64::NAN, 2, Load::Slack),
+            (29.9, 2, Load::NearlyUnloaded),
+            (30.0, 2, Load::Loaded),
+            (7.4, 8, Load::NearlyUnloaded),
+            (7.6, 8, Load::Loaded),
+        ] {
+            assert_eq!(
+                Load::of(normal_n, weight_n, handles),
+                load,
+                "{normal_n} N of {handles}"
+            );
+        }
+    }
+}

@@ -1,0 +1,160 @@
+//! What is drawn of which recording: entities, timelines, rows, views.
+
+mod common;
+
+use common::{ROWS, imus, run, taken};
+
+#[test]
+fn a_run_of_two_shows_everything() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("run.mcap");
+    run(&path, 2);
+    let (sent, titles) = taken(&path);
+    let rows = sent.rows();
+    for entity in [
+        "/world/rath",
+        "/world/follow",
+        "/world/forces",
+        "/world/handles",
+        "/world/legs",
+        "/world/carrier_1",
+        "/world/carrier_2",
+        "/phases/carriers",
+        "/phases/order",
+        "/plots/height/z",
+        "/plots/angles/roll",
+        "/plots/angles/tilt",
+        "/plots/forces/all",
+        "/plots/forces/handle_1",
+        "/plots/forces/handle_2",
+        "/plots/synchrony/r",
+        "/plots/energy/kinetic",
+        "/plots/energy/potential",
+        "/plots/ledger/work_in",
+    ] {
+        assert_eq!(rows.get(entity), Some(&ROWS), "{entity}");
+    }
+    assert_eq!(rows["/world/trail"], ROWS - 1);
+    // The beat sounds from 5 s on.
+    assert_eq!(rows["/phases/beat"], ROWS - 150);
+    assert_eq!(rows["/plots/forces/unloaded"], 2);
+    assert_eq!(rows["/plots/synchrony/chance"], 2);
+    assert!(rows["/events"] > 20, "{}", rows["/events"]);
+    for entity in [
+        "/spectra/rath/height",
+        "/spectra/rath/roll",
+        "/spectra/rath/lines",
+        "/world/ground/plane",
+        "/summary",
+    ] {
+        assert!(sent.entities().contains(entity), "{entity}");
+    }
+    // A simulated run has no wall-clock time.
+    assert_eq!(sent.timelines().into_iter().collect::<Vec<_>>(), ["time"]);
+    for word in [
+        "Scene",
+        "Phases and beat",
+        "Spectra",
+        "Height",
+        "Roll",
+        "N_tot",
+        "Order parameter",
+        "Energy",
+        "Events",
+        "Summary",
+    ] {
+        assert!(
+            titles.iter().any(|title| title.contains(word)),
+            "{word}: {titles:?}"
+        );
+    }
+    let roll = sent.scalars("/plots/angles/roll");
+    for (t_ns, deg) in roll {
+        let expected = (0.3 * (std::f64::consts::TAU * t_ns as f64 / 1e9).sin()).to_degrees();
+        assert!((deg - expected).abs() < 1e-9, "{t_ns}: {deg} {expected}");
+    }
+}
+
+#[test]
+fn there_may_be_any_number_of_carriers() {
+    let folder = tempfile::tempdir().unwrap();
+    for carriers in [1, 3, 8, 17] {
+        let path = folder.path().join("run.mcap");
+        run(&path, carriers);
+        let (sent, _) = taken(&path);
+        let rows = sent.rows();
+        for i in 1..=carriers {
+            assert_eq!(
+                rows.get(&format!("/plots/forces/handle_{i}")),
+                Some(&ROWS),
+                "{carriers}: {i}"
+            );
+            assert_eq!(
+                rows.get(&format!("/world/carrier_{i}")),
+                Some(&ROWS),
+                "{carriers}: {i}"
+            );
+        }
+        assert!(!rows.contains_key(&format!("/world/carrier_{}", carriers + 1)));
+    }
+}
+
+#[test]
+fn sensors_alone_show_sensors_alone() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("imu.mcap");
+    imus(&path, 2, 30, 100);
+    let (sent, titles) = taken(&path);
+    let rows = sent.rows();
+    for sensor in ["s0", "s1"] {
+        for axis in ["x", "y", "z"] {
+            assert_eq!(
+                rows.get(&format!("/topics/imu/{sensor}/gyro/{axis}")),
+                Some(&3000)
+            );
+            assert_eq!(
+                rows.get(&format!("/topics/imu/{sensor}/accel/{axis}")),
+                Some(&3000)
+            );
+        }
+        assert_eq!(
+            rows.get(&format!("/topics/imu/{sensor}/attitude/roll")),
+            Some(&3000)
+        );
+    }
+    let entities = sent.entities();
+    assert!(entities.contains("/topics/imu/s0/accel_spectra/z"));
+    assert!(
+        !entities.iter().any(|e| e.starts_with("/world")
+            || e.starts_with("/phases")
+            || e.starts_with("/plots")),
+        "{entities:?}"
+    );
+    assert!(
+        !titles
+            .iter()
+            .any(|t| t.starts_with("Scene") || t.starts_with("Phases")),
+        "{titles:?}"
+    );
+    assert_eq!(
+        sent.timelines().into_iter().collect::<Vec<_>>(),
+        ["time", "utc"]
+    );
+}
+
+#[test]
+fn many_samples_are_thinned_to_their_extremes() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("imu.mcap");
+    // 40 sensors of 12000 samples: more curves than can have all their points.
+    imus(&path, 40, 24, 500);
+    let (sent, _) = taken(&path);
+    let z = sent.scalars("/topics/imu/s7/accel/z");
+    assert!(z.len() < 9000 && z.len() > 5000, "{}", z.len());
+    let (low, high) = z.iter().fold((f64::MAX, f64::MIN), |(l, h), (_, x)| {
+        (l.min(*x), h.max(*x))
+    });
+    // The true extremes of the samples, 9.81 ± 1 up to the nearest sample of a period of 250.
+    let near = (std::f64::consts::TAU / 1000.0).cos();
+    assert!(low <= 9.81 - near && high >= 9.81 + near, "{low} {high}");
+}

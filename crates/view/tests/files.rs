@@ -1,0 +1,197 @@
+//! What lands on disk: the same bytes for the same recording, whole or not at all, and good to Rerun's own tools.
+
+mod common;
+
+use std::process::Command;
+
+use common::{ROWS, Taken, imus, rerun, run, taken, view};
+
+#[test]
+fn the_same_recording_gives_the_same_bytes() {
+    let folder = tempfile::tempdir().unwrap();
+    let (mcap, a, b) = (
+        folder.path().join("run.mcap"),
+        folder.path().join("a.rrd"),
+        folder.path().join("b.rrd"),
+    );
+    run(&mcap, 2);
+    for out in [&a, &b] {
+        let output = view(&[mcap.to_str().unwrap(), "--save", out.to_str().unwrap()]);
+        assert!(
+            output.status.success(),
+            "{}",
+            String::from_utf8_lossy(&output.stderr)
+        );
+        assert!(output.stdout.is_empty());
+    }
+    assert_eq!(std::fs::read(&a).unwrap(), std::fs::read(&b).unwrap());
+}
+
+#[test]
+fn nothing_is_left_where_it_cannot_be_done() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = |name: &str| folder.path().join(name).to_str().unwrap().to_owned();
+    std::fs::write(path("not.mcap"), b"this is no recording").unwrap();
+    std::fs::write(path("empty.mcap"), b"").unwrap();
+    run(path("run.mcap").as_ref(), 2);
+    let before: usize = std::fs::read_dir(folder.path()).unwrap().count();
+    for (arguments, words) in [
+        (
+            vec![path("none.mcap"), "--save".into(), path("out.rrd")],
+            "none.mcap: cannot be read",
+        ),
+        (
+            vec![path("not.mcap"), "--save".into(), path("out.rrd")],
+            "not.mcap: is not an MCAP recording",
+        ),
+        (
+            vec![path("empty.mcap"), "--save".into(), path("out.rrd")],
+            "empty.mcap: is empty",
+        ),
+        (
+            vec![path("run.mcap"), "--save".into(), path("no/folder.rrd")],
+            "cannot be written",
+        ),
+        (
+            vec![path("run.mcap"), "--connect".into(), "nonsense".into()],
+            "is no address of Rerun",
+        ),
+    ] {
+        let output = view(&arguments.iter().map(String::as_str).collect::<Vec<_>>());
+        let said = String::from_utf8_lossy(&output.stderr).into_owned();
+        assert_eq!(output.status.code(), Some(1), "{arguments:?}: {said}");
+        assert!(said.contains(words), "{arguments:?}: {said}");
+        assert_eq!(said.trim_end().lines().count(), 1, "{said}");
+    }
+    assert_eq!(std::fs::read_dir(folder.path()).unwrap().count(), before);
+    assert_eq!(view(&[]).status.code(), Some(2));
+    assert_eq!(view(&["x", "--web", "--save", "y"]).status.code(), Some(2));
+}
+
+#[test]
+fn without_a_viewer_the_install_command_is_given() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("run.mcap");
+    run(&path, 2);
+    let output = Command::new(env!("CARGO_BIN_EXE_view"))
+        .arg(&path)
+        .env("PATH", folder.path())
+        .output()
+        .unwrap();
+    let said = String::from_utf8_lossy(&output.stderr).into_owned();
+    assert_eq!(output.status.code(), Some(1));
+    assert!(said.contains(view::viewer::INSTALL), "{said}");
+    assert_eq!(said.trim_end().lines().count(), 1, "{said}");
+}
+
+#[test]
+fn a_damaged_recording_is_shown_as_far_as_it_goes() {
+    let folder = tempfile::tempdir().unwrap();
+    let (whole, cut, out) = (
+        folder.path().join("run.mcap"),
+        folder.path().join("cut.mcap"),
+        folder.path().join("cut.rrd"),
+    );
+    run(&whole, 2);
+    let bytes = std::fs::read(&whole).unwrap();
+    std::fs::write(&cut, &bytes[..bytes.len() * 2 / 3]).unwrap();
+    let output = view(&[cut.to_str().unwrap(), "--save", out.to_str().unwrap()]);
+    let said = String::from_utf8_lossy(&output.stderr).into_owned();
+    assert_eq!(output.status.code(), Some(3), "{said}");
+    assert!(!said.is_empty());
+    assert!(out.is_file());
+    let rows = taken(&cut).0.rows();
+    assert!(rows["/plots/height/z"] > 10 && rows["/plots/height/z"] < ROWS);
+}
+
+/// A pipe that gives a few bytes at a time, slowly.
+struct Slow(std::io::Cursor<Vec<u8>>);
+
+impl std::io::Read for Slow {
+    fn read(&mut self, buffer: &mut [u8]) -> std::io::Result<usize> {
+        std::thread::sleep(std::time::Duration::from_millis(20));
+        let most = buffer.len().min(9000);
+        self.0.read(&mut buffer[..most])
+    }
+}
+
+#[test]
+fn what_comes_in_pieces_is_shown_once_and_whole() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("run.mcap");
+    run(&path, 2);
+    let (whole, _) = taken(&path);
+    let mut live = Taken::default();
+    let bytes = std::fs::read(&path).unwrap();
+    view::live::follow(Slow(std::io::Cursor::new(bytes)), &mut live).unwrap();
+    let (mut a, mut b) = (live.rows(), whole.rows());
+    // A level is drawn from the first to the last moment known, so it grows by a row with every piece.
+    for rows in [&mut a, &mut b] {
+        rows.retain(|entity, _| {
+            !["unloaded", "chance"]
+                .iter()
+                .any(|level| entity.ends_with(level))
+        });
+    }
+    assert_eq!(a, b);
+    assert_eq!(
+        live.scalars("/plots/angles/roll"),
+        whole.scalars("/plots/angles/roll")
+    );
+    assert!(live.0.len() > whole.0.len(), "it came in one piece");
+}
+
+#[test]
+fn reruns_own_tools_agree() {
+    let Some(rerun) = rerun() else { return };
+    let folder = tempfile::tempdir().unwrap();
+    for (kind, entity) in [
+        ("run", "/plots/angles/roll"),
+        ("imu", "/topics/imu/s0/gyro/x"),
+    ] {
+        let (mcap, rrd) = (
+            folder.path().join(format!("{kind}.mcap")),
+            folder.path().join(format!("{kind}.rrd")),
+        );
+        match kind {
+            "run" => run(&mcap, 8),
+            _ => imus(&mcap, 2, 10, 100),
+        }
+        let output = view(&[mcap.to_str().unwrap(), "--save", rrd.to_str().unwrap()]);
+        assert!(
+            output.status.success(),
+            "{}",
+            String::from_utf8_lossy(&output.stderr)
+        );
+        let tool = |arguments: &[&str]| {
+            let output = Command::new(&rerun)
+                .arg("rrd")
+                .args(arguments)
+                .arg(&rrd)
+                .output()
+                .unwrap();
+            let said = format!(
+                "{}{}",
+                String::from_utf8_lossy(&output.stdout),
+                String::from_utf8_lossy(&output.stderr)
+            );
+            assert!(output.status.success(), "{arguments:?}: {said}");
+            said
+        };
+        tool(&["verify"]);
+        let stats = tool(&["stats"]);
+        assert!(stats.contains("time"), "{stats}");
+        let printed = tool(&["print"]);
+        let line = printed.lines().find(|line| {
+            line.contains(&format!(" - {entity} - ")) && !line.contains("with 1 rows")
+        });
+        let rows = if kind == "run" { ROWS } else { 1000 };
+        assert!(
+            line.is_some_and(|line| line.contains(&format!("with {rows} rows"))),
+            "{entity}: {line:?}"
+        );
+        for part in ["/viewport", "/time_panel", "/ViewContents"] {
+            assert!(printed.contains(part), "{part}");
+        }
+    }
+}
