@@ -404,15 +404,15 @@ impl<'a> ChannelState<'a> {
 
 /// Counts values that are not finite.
 fn not_finite(values: &[f64], rows: &[u32]) -> Option<(u64, u32)> {
-    // v − v is zero for what is finite and NaN for the rest: sums in lanes, which the compiler makes quick.
+    // v · 0 is zero for what is finite and NaN for the rest: sums in lanes, which the compiler makes quick.
     let mut lanes = [0.0f64; 8];
     let (whole, rest) = values.as_chunks::<8>();
     for chunk in whole {
         for (lane, value) in lanes.iter_mut().zip(chunk) {
-            *lane += value - value;
+            *lane += value * 0.0;
         }
     }
-    let sum: f64 = lanes.iter().sum::<f64>() + rest.iter().map(|value| value - value).sum::<f64>();
+    let sum: f64 = lanes.iter().sum::<f64>() + rest.iter().map(|value| value * 0.0).sum::<f64>();
     if sum == 0.0 {
         return None;
     }

@@ -129,7 +129,7 @@ struct Lz4<'a> {
 impl Read for Lz4<'_> {
     fn read(&mut self, buffer: &mut [u8]) -> io::Result<usize> {
         loop {
-            let count = self.decoder.read(buffer).map_err(io::Error::from)?;
+            let count = self.decoder.read(buffer)?;
             if count > 0 || buffer.is_empty() || self.decoder.get_ref().is_empty() {
                 return Ok(count);
             }

@@ -53,7 +53,7 @@ pub(super) fn signals(
     })?;
 
     // Times of a channel are sorted once and shared.
-    let shared: Vec<(Arc<[i64]>, Option<Vec<usize>>)> = times.into_iter().map(sorted).collect();
+    let shared: Vec<Sorted> = times.into_iter().map(sorted).collect();
     let mut signals: Vec<Signal> = Vec::with_capacity(parts.len());
     let mut by_path: HashMap<String, usize> = HashMap::new();
     for mut part in parts {
@@ -95,8 +95,11 @@ pub(super) fn signals(
     Ok((signals, findings))
 }
 
+/// Times in order, and where each stood before if they were not.
+type Sorted = (Arc<[i64]>, Option<Vec<usize>>);
+
 /// The times in order, and the permutation where they were not.
-fn sorted(times: Vec<i64>) -> (Arc<[i64]>, Option<Vec<usize>>) {
+fn sorted(times: Vec<i64>) -> Sorted {
     if times.is_sorted() {
         return (times.into(), None);
     }
@@ -109,10 +112,7 @@ fn sorted(times: Vec<i64>) -> (Arc<[i64]>, Option<Vec<usize>>) {
 }
 
 /// Times of the first `length` messages of a channel, in order.
-fn continue_short(
-    (times, order): &(Arc<[i64]>, Option<Vec<usize>>),
-    length: usize,
-) -> (Arc<[i64]>, Option<Vec<usize>>) {
+fn continue_short((times, order): &Sorted, length: usize) -> Sorted {
     match order {
         None => (times[..length].into(), None),
         Some(order) => {

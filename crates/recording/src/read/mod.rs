@@ -422,7 +422,7 @@ fn info(container: &Container, definitions: &Definitions, tally: &Tally, trusted
         start_ns: time(tally.start),
         end_ns: time(tally.end),
         messages: tally.per_channel.values().sum(),
-        salvaged: !trusted && !(container.complete && container.damage.is_empty()),
+        salvaged: !(trusted || container.complete && container.damage.is_empty()),
         skipped_messages: 0,
         warnings: container
             .damage
