@@ -165,7 +165,13 @@ pub fn examine(file: &str, recording: &Recording, request: &Request) -> Result<A
     let duration_s = ((i128::from(info.end_ns) - i128::from(info.start_ns)) as f64 / 1e9).max(0.0);
     let said = request.roles.as_ref();
     let mut inputs = pass.inputs(&metadata, said);
-    let mut field = Field::read(recording, &roles, inputs.gravity_m_per_s2, request.truth)?;
+    let mut field = match estimates(recording, &roles, request) {
+        Ok(()) => Field::read(recording, &roles, inputs.gravity_m_per_s2, request.truth)?,
+        Err(why) => {
+            warnings.extend(why);
+            Field::default()
+        }
+    };
     field.fill(&mut inputs);
     quality.extend(field.quality());
     let window = window(request, &metadata, said, duration_s, &mut warnings);
@@ -205,6 +211,26 @@ pub fn examine(file: &str, recording: &Recording, request: &Request) -> Result<A
         inputs,
         traces: pass.traces(),
     })
+}
+
+/// Inertial samples up to which motion is estimated: estimates hold all of them in memory, the rest of the reading does not.
+const MOST_INERTIAL: u64 = 4_000_000;
+
+/// Whether motion is estimated from inertial sensors; where there are some and it is not, the reason.
+fn estimates(recording: &Recording, roles: &Roles, request: &Request) -> Result<(), Option<String>> {
+    let sensors = |topic: &str| roles.patterns(Role::Imu).iter().chain(roles.patterns(Role::Carriers)).any(|t| t == topic);
+    let samples: u64 = recording.info().channels.iter().filter(|c| sensors(&c.topic)).map(|c| c.messages).sum();
+    match samples {
+        0 => Ok(()),
+        _ if request.truth => Ok(()),
+        _ if !request.signals.is_empty() => {
+            Err(Some("motion is not estimated from the inertial sensors where --signal narrows what is read".into()))
+        }
+        n if n > MOST_INERTIAL => Err(Some(format!(
+            "motion is not estimated from {n} inertial samples (at most {MOST_INERTIAL}): name fewer sensors in a roles file"
+        ))),
+        _ => Ok(()),
+    }
 }
 
 /// Whether a field has to be decoded: it is listed, plays a role, or is part of a quaternion whose angles are or do.
@@ -414,7 +440,13 @@ impl<'a> Pass<'a> {
 
     /// Outlines of moving signals without a role, those of one vector together.
     fn traces(&self) -> Vec<Trace> {
-        let mut drawn: Vec<&Entry> = self.entries.iter().filter(|e| e.role.is_none() && e.outline.is_some()).collect();
+        // Topics that play a role are drawn as that; transforms and scenes repeat them.
+        let known = |channel: usize| {
+            let schema = &self.recording.info().channels[channel].schema;
+            let repeats = ["TFMessage", "SceneUpdate", "FrameTransform", "FrameTransforms"].iter().any(|s| schema.ends_with(s));
+            repeats || self.entries.iter().any(|e| e.channel == channel && e.role.is_some())
+        };
+        let mut drawn: Vec<&Entry> = self.entries.iter().filter(|e| e.outline.is_some() && !known(e.channel)).collect();
         drawn.sort_by(|a, b| natural(&a.path, &b.path));
         let mut traces: Vec<Trace> = Vec::new();
         for entry in drawn {

@@ -83,6 +83,10 @@ impl SpectrumSummary {
         }
         let range = window.range(t_s);
         let (t_s, x) = (&t_s[range.clone()], &x[range]);
+        // An estimated column may have no values at its ends.
+        let first = x.iter().position(|x| x.is_finite())?;
+        let last = x.iter().rposition(|x| x.is_finite())? + 1;
+        let (t_s, x) = (&t_s[first..last], &x[first..last]);
         if x.len() < 16 || x.iter().any(|x| !x.is_finite()) {
             return None;
         }
@@ -104,7 +108,8 @@ fn peaks(s: &Spectrum, f_hz: Option<f64>) -> Vec<Peak> {
     let floor = (ABOVE_MEDIAN * median).max(BELOW_PEAK * largest);
     // Maxima of five bins: the taper's main lobe is four wide.
     let is_top = |k: &usize| (k.saturating_sub(2).max(1)..(k + 3).min(p.len())).all(|j| j == *k || p[j] < p[*k]);
-    let mut tops: Vec<usize> = (1..p.len()).filter(|k| p[*k] > floor).filter(is_top).collect();
+    // The first bins hold what is left of drifts, not lines.
+    let mut tops: Vec<usize> = (3..p.len()).filter(|k| p[*k] > floor).filter(is_top).collect();
     tops.sort_by(|a, b| p[*b].total_cmp(&p[*a]));
     let mut kept: Vec<usize> = Vec::new();
     for k in tops {

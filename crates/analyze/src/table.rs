@@ -68,14 +68,27 @@ pub fn write(recording: &Recording, request: &Request, downsample: u64, out: &Pa
         return Err(TableError::Empty(name));
     }
     let io = |source| TableError::Io { name: name.clone(), source };
-    let folder = out.parent().filter(|p| !p.as_os_str().is_empty()).unwrap_or(Path::new("."));
-    let mut file = tempfile::Builder::new().prefix(".analyze-").suffix(".part").tempfile_in(folder).map_err(io)?;
-    match kind.as_str() {
-        "csv" => csv(&columns, &mut file).map_err(io)?,
-        _ => parquet(&columns, &mut file, &name)?,
+    // Both kinds of failure in one type, sorted out afterwards.
+    let written: Result<(), Trouble> = crate::whole::write_whole(out, |file| match kind.as_str() {
+        "csv" => Ok(csv(&columns, file)?),
+        _ => parquet(&columns, file, &name).map_err(Trouble::Table),
+    });
+    written.map_err(|trouble| match trouble {
+        Trouble::Io(source) => io(source),
+        Trouble::Table(error) => error,
+    })
+}
+
+/// What can go wrong while a table is written.
+enum Trouble {
+    Io(std::io::Error),
+    Table(TableError),
+}
+
+impl From<std::io::Error> for Trouble {
+    fn from(source: std::io::Error) -> Self {
+        Trouble::Io(source)
     }
-    file.persist(out).map_err(|e| io(e.error))?;
-    Ok(())
 }
 
 /// Reads the wanted signals and joins them by time.

@@ -1,6 +1,6 @@
 //! `analyze FILE...`
 
-use std::io::Read;
+use std::io::{Read, Write};
 use std::path::Path;
 
 use anyhow::{Context, bail};
@@ -94,7 +94,9 @@ fn one(path: &Path, args: &AnalyzeArgs, request: &Request) -> anyhow::Result<Ana
         analyze::table::write(&recording, request, args.downsample, out)?;
     }
     if let Some(out) = &args.report {
-        whole(out, report::html(&analysis, &command_line()).as_bytes())?;
+        let page = report::html(&analysis, &command_line());
+        analyze::whole::write_whole(out, |file| file.write_all(page.as_bytes()))
+            .with_context(|| format!("{}: cannot be written; no file of that name was made or changed", out.display()))?;
     }
     if let Some(out) = &args.annotate {
         annotate::write(&recording, &analysis, out)?;
@@ -129,17 +131,6 @@ fn command_line() -> String {
     };
     let args = std::env::args().skip(1).map(quoted);
     std::iter::once("analyze".to_owned()).chain(args).collect::<Vec<_>>().join(" ")
-}
-
-/// Writes a file whole or not at all.
-fn whole(path: &Path, bytes: &[u8]) -> anyhow::Result<()> {
-    use std::io::Write;
-    let said = || format!("{}: cannot be written; no file of that name was made or changed", path.display());
-    let folder = path.parent().filter(|p| !p.as_os_str().is_empty()).unwrap_or(Path::new("."));
-    let mut file = tempfile::Builder::new().prefix(".analyze-").suffix(".part").tempfile_in(folder).with_context(said)?;
-    file.write_all(bytes).with_context(said)?;
-    file.persist(path).with_context(said)?;
-    Ok(())
 }
 
 /// Why there is nothing to analyse.

@@ -6,6 +6,7 @@ use super::{Columns, Records};
 use crate::clock::from_signals;
 use crate::imu::orientation::causal;
 use crate::imu::rath::Motion;
+use crate::imu::track::period_s;
 use crate::imu::truth::{Truth, inclination_error_deg, relative_error};
 use crate::imu::{Track, vertical};
 use crate::metrics::{Datum, Metrics, Value};
@@ -112,7 +113,7 @@ impl Judge {
             let f1 = Value::number(a.f1).source("imu");
             let text = format!("{} of {} true and {} found steps within 0.25 s; found {:+.0} ms of the true ones (median)", a.matched, self.step_s.len(), inside.len(), 1e3 * a.offset_s);
             out.push(("step_f1", Value { unit: "1", reason: Some(text), ..f1 }));
-            if let (Some(true_hz), Some(found_hz)) = (rate(&self.step_s), metrics.number("step_rate_hz")) {
+            if let (Some(true_hz), Some(found_hz)) = (rate(&self.step_s), rate(&inside)) {
                 out.push(("step_rate_hz_error", Value { unit: "Hz", ..Value::number(found_hz - true_hz).source("imu") }));
             }
         }
@@ -149,15 +150,16 @@ impl Judge {
         push("inclination_error_deg", inclination_error_deg(&sensor.t_s, &live, &self.truth, &spans));
         push("inclination_error_batch_deg", inclination_error_deg(&motion.inputs.t_s, &whole, &self.truth, &spans));
         let Some((t_s, z)) = &self.height else { return };
-        // How old the sensor's stamps are beside the truth's: both felt the same rotation.
-        let rate = self.truth.rate_norm();
-        let norm: Vec<f64> = sensor.gyro_rad_per_s.iter().map(|w| (w[0] * w[0] + w[1] * w[1] + w[2] * w[2]).sqrt()).collect();
-        let clock = from_signals((&sensor.t_s, &norm), (&rate.0, &rate.1), 0.2).ok();
-        let offset_s = clock.map_or(0.0, |c| c.offset_s);
+        let Some(period_s) = period_s(&motion.inputs.t_s) else { return };
+        let height_m = vertical::height(&motion.accel_up_m_per_s2, period_s, vertical::CORNER_HZ);
         let inner = spans.iter().fold((f64::MAX, f64::MIN), |(a, b), s| (a.min(s.0), b.max(s.1)));
         let clean: (Vec<f64>, Vec<f64>) = t_s.iter().zip(z).filter(|(_, z)| z.is_finite()).unzip();
+        // How old the accelerometer's stamps are beside the truth's (the gyroscope's may be older): both heaved alike.
+        let own = (&motion.inputs.t_s[..], &height_m[..]);
+        let clock = from_signals(own, (&clean.0, &clean.1), 0.1).ok();
+        let offset_s = clock.map_or(0.0, |c| c.offset_s);
         let error = relative_error(
-            (&motion.inputs.t_s, &motion.inputs.height_m),
+            (&motion.inputs.t_s, &height_m),
             (&clean.0, &clean.1),
             vertical::VALID_BAND_HZ,
             offset_s,
@@ -196,14 +198,10 @@ fn difference(estimate: &Value, truth: &Value) -> Value {
     value
 }
 
-/// Events per second over the intervals that are no pauses.
+/// Events per second from the first to the last.
 fn rate(t_s: &[f64]) -> Option<f64> {
-    let mut gaps: Vec<f64> = t_s.windows(2).map(|w| w[1] - w[0]).collect();
-    gaps.sort_by(f64::total_cmp);
-    let median = *gaps.get(gaps.len() / 2)?;
-    let walked: Vec<f64> = gaps.into_iter().filter(|g| *g < 1.7 * median).collect();
-    let sum: f64 = walked.iter().sum();
-    (sum > 0.0).then(|| walked.len() as f64 / sum)
+    let span_s = t_s.last()? - t_s.first()?;
+    (span_s > 0.0).then(|| (t_s.len() - 1) as f64 / span_s)
 }
 
 /// The spans that count, s since `start_ns`: metadata record `broad`, key `movement`, a list of [from, to] in nanoseconds.

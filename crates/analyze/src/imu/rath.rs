@@ -59,14 +59,14 @@ impl Default for Budget {
     /// A calibrated MEMS sensor; checked against simulated twins (docs/field.md).
     fn default() -> Self {
         Self {
-            tilt_offset_rad: 0.05f64.to_radians(),
-            tilt_wander_rad: 0.15f64.to_radians(),
+            tilt_offset_rad: 0.11f64.to_radians(),
+            tilt_wander_rad: 0.05f64.to_radians(),
             angle_scale: 0.003,
             height_scale: 0.005,
             height_wander_m: 0.002,
-            support_offset: 0.003,
+            support_offset: 0.004,
             support_scale: 0.002,
-            support_noise: 0.004,
+            support_noise: 0.013,
         }
     }
 }
@@ -82,6 +82,9 @@ pub struct Settings {
     pub lever_m: [f64; 3],
     /// Gravity, m/s².
     pub gravity_m_per_s2: f64,
+    /// Corner f₀ of the height, Hz: what is slower is held at zero ([`vertical`]). Twice the corner that suits 0.3 Hz, because a rath swings
+    /// at 1 Hz and above and a lower corner lets the accelerometer's bias into Δz.
+    pub height_corner_hz: f64,
     /// Error budget behind the intervals.
     pub budget: Budget,
 }
@@ -94,6 +97,7 @@ impl Default for Settings {
             mounting: Mounting::default(),
             lever_m: [0.0; 3],
             gravity_m_per_s2: 9.80665,
+            height_corner_hz: 2.0 * vertical::CORNER_HZ,
             budget: Budget::default(),
         }
     }
@@ -127,8 +131,10 @@ pub enum MotionError {
 /// The body's motion, as far as an inertial sensor sees it.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Motion {
-    /// Columns for [`crate::metrics()`], all from the sensor: roll, pitch, height about its slow course, support ratio.
+    /// Columns for [`crate::metrics()`], all from the sensor: roll, pitch, support ratio, height about its slow course (NaN at the ends).
     pub inputs: Inputs,
+    /// Vertical acceleration of the centre of mass about its mean, gravity removed, m/s²; evenly spaced.
+    pub accel_up_m_per_s2: Vec<f64>,
     /// Orientation of the body, and what was learnt of the gyroscope; one per time of `inputs.t_s`.
     pub orientation: Estimate,
     /// Body from sensor, as used.
@@ -188,7 +194,12 @@ pub fn motion(track: &Track, settings: &Settings) -> Result<Motion, MotionError>
     }
     let mean = accel_up.iter().sum::<f64>() / n as f64;
     accel_up.iter_mut().for_each(|a| *a -= mean);
-    let height_m = vertical::height(&accel_up, period_s, vertical::CORNER_HZ);
+    let mut height_m = vertical::height(&accel_up, period_s, settings.height_corner_hz);
+    // At its free ends the height shows the accelerometer's bias; that fades by e every 1/(√2 π f₀).
+    let fade = (ENDS / settings.height_corner_hz / period_s) as usize;
+    let fade = fade.min(n / 10);
+    height_m[..fade].fill(f64::NAN);
+    height_m[n - fade..].fill(f64::NAN);
     let mut inputs = Inputs {
         t_s: body.t_s.clone(),
         height_m,
@@ -201,7 +212,7 @@ pub fn motion(track: &Track, settings: &Settings) -> Result<Motion, MotionError>
     inputs.sources.attitude = "imu".into();
     inputs.sources.height = "imu".into();
     inputs.sources.forces = "imu".into();
-    Ok(Motion { inputs, orientation: estimate, body_from_sensor, settings: *settings })
+    Ok(Motion { inputs, accel_up_m_per_s2: accel_up, orientation: estimate, body_from_sensor, settings: *settings })
 }
 
 /// The same samples on an even grid with the track's own period, straight between samples.
@@ -294,10 +305,10 @@ fn at_centre_of_mass(
         .zip(&estimate.bias_rad_per_s)
         .map(|(w, b)| Vector3::from(*w) - body_from_sensor * Vector3::from(*b))
         .collect();
-    // The body turns below 10 Hz; a derivative of what is above would be noise.
+    // Re-contact jerks the body: 60 Hz keeps that and takes off the worst of the derivative's noise.
     let smooth: [Vec<f64>; 3] = std::array::from_fn(|axis| {
         let x: Vec<f64> = rates.iter().map(|w| w[axis]).collect();
-        butter(2, Band::Low(20.0), 1.0 / period_s)
+        butter(2, Band::Low(60.0), 1.0 / period_s)
             .and_then(|sections| sosfiltfilt(&sections, &x))
             .unwrap_or(x)
     });
@@ -313,6 +324,9 @@ fn at_centre_of_mass(
         })
         .collect()
 }
+
+/// Seconds at both ends without height, times the corner.
+const ENDS: f64 = 0.5;
 
 /// Number of draws behind an interval.
 const DRAWS: usize = 40;

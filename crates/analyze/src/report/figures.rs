@@ -67,9 +67,7 @@ pub fn figures(plots: &[Plot], folder: &Path) -> Result<Vec<PathBuf>, FigureErro
         let svg = SvgBackend::default().render_scene(&scene);
         for (extension, bytes) in [("svg", svg.as_bytes()), ("png", &png[..])] {
             let path = folder.join(format!("{stem}.{extension}"));
-            let mut file = tempfile::Builder::new().prefix(".analyze-").suffix(".part").tempfile_in(folder).map_err(io(&path))?;
-            std::io::Write::write_all(&mut file, bytes).map_err(io(&path))?;
-            file.persist(&path).map_err(|e| io(&path)(e.error))?;
+            crate::whole::write_whole(&path, |file| std::io::Write::write_all(file, bytes)).map_err(io(&path))?;
             written.push(path);
         }
     }

@@ -183,14 +183,6 @@ pub fn plots(a: &Analysis) -> Vec<Plot> {
         panel(sync);
     }
 
-    for trace in &a.traces {
-        let mut p = Panel::over_time("signals", &trace.topic, &trace.label, a);
-        for (name, t_s, x) in &trace.series {
-            p.line(name.clone(), t_s, x);
-        }
-        panel(p);
-    }
-
     for (id, title, name) in [("psd_roll", "Spectrum of the roll", "roll"), ("psd_height", "Spectrum of the height", "height")] {
         if let Some((_, s)) = role_spectrum(a, name) {
             panel(psd(id, title, name, s));
@@ -198,9 +190,16 @@ pub fn plots(a: &Analysis) -> Vec<Plot> {
     }
 
     portrait(a).into_iter().chain(force_plane(a)).for_each(&mut panel);
+    for trace in &a.traces {
+        let mut p = Panel::over_time("signals", &trace.topic, &trace.label, a);
+        for (name, t_s, x) in &trace.series {
+            p.line(name.clone(), t_s, x);
+        }
+        panel(p);
+    }
     if let Some(image) = roll_spectrogram(a) {
         // After the spectra, before the planes.
-        let place = out.iter().position(|p| matches!(p, Plot::Panel(p) if p.points || p.id == "portrait")).unwrap_or(out.len());
+        let place = out.iter().position(|p| matches!(p, Plot::Panel(p) if matches!(p.id, "portrait" | "force_plane" | "signals"))).unwrap_or(out.len());
         out.insert(place, Plot::Image(image));
     }
     out

@@ -165,10 +165,13 @@ fn signals_section(out: &mut String, a: &Analysis, all: bool) {
     if a.signals.is_empty() {
         return;
     }
-    let shown = if all { a.signals.len() } else { a.signals.len().min(MOST_SIGNALS) };
+    // What never changes, and stamps, are no news unless they were asked for.
+    let news = |(path, s): &&(String, crate::summary::Summary)| all || (s.min != s.max && !path.contains(".stamp."));
+    let listed: Vec<&(String, crate::summary::Summary)> = a.signals.iter().filter(news).collect();
+    let shown = if all { listed.len() } else { listed.len().min(MOST_SIGNALS) };
     line!(out, "\n{:<41} {:>8} {:>8} {:>9} {:>9} {:>9} {:>9}", "Signals", "Hz", "min", "mean", "max", "SD", "peak Hz");
     let cell = |x: Option<f64>| x.map_or("–".to_owned(), short);
-    for (path, s) in &a.signals[..shown] {
+    for (path, s) in &listed[..shown] {
         let name = if s.unit.is_empty() { path.clone() } else { format!("{path} [{}]", s.unit) };
         line!(
             out,
@@ -182,9 +185,14 @@ fn signals_section(out: &mut String, a: &Analysis, all: bool) {
             cell(s.peak_hz)
         );
     }
-    if shown < a.signals.len() {
-        line!(out, "  … and {} more: --signal '*' lists all, --signal PATH some of them", a.signals.len() - shown);
-    }
+    let still = a.signals.len() - listed.len();
+    let more = match (listed.len() - shown, still) {
+        (0, 0) => return,
+        (0, still) => format!("{still} that never change, or are stamps"),
+        (more, 0) => format!("{more} more"),
+        (more, still) => format!("{more} more, and {still} that never change, or are stamps"),
+    };
+    line!(out, "  … and {more}: --signal '*' lists all, --signal PATH some of them");
 }
 
 fn quality_section(out: &mut String, a: &Analysis) {
@@ -238,7 +246,7 @@ pub(super) fn figures(x: f64) -> String {
     }
     let size = x.abs().log10().floor() as i32;
     match size {
-        -4..=5 => format!("{x:.*}", (4 - size).clamp(0, 6) as usize),
+        -4..=5 => plain(x, (4 - size).clamp(0, 6) as usize),
         _ => format!("{x:.4e}"),
     }
 }

@@ -1,0 +1,45 @@
+//! Files that appear whole or not at all.
+
+use std::io::{Error, Write};
+use std::path::Path;
+
+/// Fills a temporary file in the folder of `path` and gives it that name when it is complete; a failure leaves what was there as it was.
+///
+/// # Errors
+/// What the system says, or what `fill` returns.
+pub fn write_whole<E: From<Error>>(path: &Path, fill: impl FnOnce(&mut std::fs::File) -> Result<(), E>) -> Result<(), E> {
+    let folder = path.parent().filter(|p| !p.as_os_str().is_empty()).unwrap_or(Path::new("."));
+    let mut builder = tempfile::Builder::new();
+    builder.prefix(".analyze-").suffix(".part");
+    #[cfg(unix)]
+    {
+        use std::os::unix::fs::PermissionsExt;
+        // As any other new file: the user's mask takes its part away.
+        builder.permissions(std::fs::Permissions::from_mode(0o666));
+    }
+    let mut file = builder.tempfile_in(folder)?;
+    fill(file.as_file_mut())?;
+    file.as_file_mut().flush()?;
+    file.persist(path).map_err(|e| e.error)?;
+    Ok(())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_failure_leaves_nothing_behind_and_the_old_file_alone() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("x.txt");
+        write_whole::<Error>(&path, |f| f.write_all(b"old")).unwrap();
+        let failed = write_whole::<Error>(&path, |f| {
+            f.write_all(b"new")?;
+            Err(Error::other("no more"))
+        });
+        assert!(failed.is_err());
+        assert_eq!(std::fs::read(&path).unwrap(), b"old");
+        assert_eq!(std::fs::read_dir(folder.path()).unwrap().count(), 1);
+        assert!(write_whole::<Error>(&folder.path().join("no/such/x"), |_| Ok(())).is_err());
+    }
+}
