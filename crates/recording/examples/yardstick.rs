@@ -4,7 +4,7 @@
 //! cargo run --release -p recording --example yardstick -- yardstick.mcap [MESSAGES]
 //! ```
 //! 1.84 million messages (the default) are about 100 MB; ten times as many about 1 GB. The numbers are a walk at 2 Hz with harmonics
-//! and full-precision noise, which is what keeps zstd from finding more than the constant fields.
+//! and noise, rounded to the single precision that sensors' drivers work in.
 
 use std::path::Path;
 
@@ -35,6 +35,11 @@ impl Noise {
     }
 }
 
+/// A number as a driver gives it.
+fn single(value: f64) -> f64 {
+    f64::from(value as f32)
+}
+
 fn main() -> Result<(), Box<dyn std::error::Error>> {
     let arguments: Vec<String> = std::env::args().collect();
     let path = arguments
@@ -58,11 +63,12 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
         let (sample, device) = (index / DEVICES, index % DEVICES);
         let t_ns = 1_700_000_000_000_000_000 + sample as i64 * 1_000_000 + device as i64 * 1_000;
         let phase = sample as f64 * 1e-3 * std::f64::consts::TAU * 2.0 + device as f64;
-        let rate =
-            std::array::from_fn(|axis| 0.3 * (phase + axis as f64).sin() + 0.05 * noise.next());
+        let rate = std::array::from_fn(|axis| {
+            single(0.3 * (phase + axis as f64).sin() + 0.05 * noise.next())
+        });
         let force = std::array::from_fn(|axis| {
             let rest = if axis == 2 { 9.81 } else { 0.0 };
-            rest + (phase * (axis + 1) as f64).cos() + 0.2 * noise.next()
+            single(rest + (phase * (axis + 1) as f64).cos() + 0.2 * noise.next())
         });
         writer.message(
             channels[device],

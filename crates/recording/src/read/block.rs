@@ -389,7 +389,13 @@ impl<'a> ChannelState<'a> {
                 times: std::mem::take(&mut self.times),
                 stamps: if self.stamped { stamps } else { Vec::new() },
                 columns,
-                absent: std::mem::take(&mut self.rows.absent),
+                absent: self
+                    .rows
+                    .absent
+                    .iter()
+                    .filter(|(_, count)| *count > 0)
+                    .cloned()
+                    .collect(),
                 long: std::mem::take(&mut self.rows.long),
                 trailing: self.rows.trailing,
                 remark: self.rows.remark.take(),

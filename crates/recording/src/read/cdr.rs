@@ -128,7 +128,7 @@ impl Cdr {
         };
         Ok(self.programs[position]
             .1
-            .run(&self.types, shape, body, 0, rows))
+            .decode(&self.types, shape, body, rows))
     }
 }
 

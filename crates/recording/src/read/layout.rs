@@ -49,7 +49,7 @@ enum Sink {
     Column(u32),
     StampSeconds,
     StampNanoseconds,
-    /// First element of a covariance: −1 says that the field is not given. Index into the program's fields.
+    /// First element of a covariance: −1 says that the field is not given. The number under which the rows count it.
     Covariance(u32),
 }
 
@@ -111,7 +111,53 @@ struct Items {
 #[derive(Clone, Debug, Default)]
 pub(super) struct Program {
     ops: Vec<Op>,
-    covariances: Vec<String>,
+    flat: Option<Box<Flat>>,
+    /// How many messages in a row did not fit the flat table.
+    misses: u32,
+}
+
+/// Where everything lay in the last message. It holds for every message of the same length whose counts and text lengths are the
+/// same, which in most topics are nearly all.
+#[derive(Clone, Debug, Default)]
+struct Flat {
+    length: usize,
+    /// Places of 32-bit lengths, and their bytes.
+    checks: Vec<(u32, [u8; 4])>,
+    doubles: Vec<(u32, u32)>,
+    others: Vec<Load>,
+    end: usize,
+}
+
+/// What a message is decoded with.
+struct Context<'a> {
+    types: &'a Types,
+    shape: Shape,
+    data: &'a [u8],
+    /// The flat table in the making; `None` where it is not wanted, or once something was met that it cannot hold.
+    trace: Option<Box<Flat>>,
+}
+
+impl Flat {
+    #[inline]
+    fn fits(&self, data: &[u8]) -> bool {
+        data.len() == self.length
+            && self.checks.iter().all(|(at, bytes)| {
+                data.get(*at as usize..*at as usize + 4) == Some(bytes.as_slice())
+            })
+    }
+
+    #[inline]
+    fn take<const BIG: bool>(&self, data: &[u8], rows: &mut Rows) {
+        for &(offset, column) in &self.doubles {
+            rows.push(
+                column,
+                f64::from_bits(load::<8, BIG>(data, offset as usize)),
+            );
+        }
+        for load in &self.others {
+            load.take::<BIG>(data, rows);
+        }
+    }
 }
 
 /// More fields than this in one message type are refused: a schema could otherwise multiply arrays of arrays without end.
@@ -133,44 +179,103 @@ impl Program {
         compile(types, &Type::Struct(0), "", shape, rows, true)
     }
 
-    /// Decodes `data` from `at`, aligned from the slice's start, and returns where it ended.
-    pub fn run(
+    /// Decodes a message, aligned from the slice's start, and returns where it ended.
+    pub fn decode(
         &mut self,
         types: &Types,
         shape: Shape,
         data: &[u8],
+        rows: &mut Rows,
+    ) -> Result<usize, Fail> {
+        if let Some(flat) = &self.flat
+            && flat.fits(data)
+        {
+            self.misses = 0;
+            if shape.big_endian {
+                flat.take::<true>(data, rows);
+            } else {
+                flat.take::<false>(data, rows);
+            }
+            return Ok(flat.end);
+        }
+        // A topic whose messages all differ is not worth a table each time.
+        self.misses = self.misses.saturating_add(1);
+        let worth = (self.misses < 8 || self.misses.is_multiple_of(64))
+            && u32::try_from(data.len()).is_ok();
+        let trace = worth.then(|| {
+            Box::new(Flat {
+                length: data.len(),
+                ..Flat::default()
+            })
+        });
+        let mut context = Context {
+            types,
+            shape,
+            data,
+            trace,
+        };
+        let end = self.run(&mut context, 0, rows)?;
+        if let Some(mut flat) = context.trace {
+            flat.end = end;
+            self.flat = Some(flat);
+        }
+        Ok(end)
+    }
+
+    fn run(
+        &mut self,
+        context: &mut Context<'_>,
         mut at: usize,
         rows: &mut Rows,
     ) -> Result<usize, Fail> {
         for op in &mut self.ops {
             at = match op {
-                Op::Run(run) if shape.big_endian => {
-                    run.read::<true>(shape, data, at, rows, &self.covariances)?
-                }
-                Op::Run(run) => run.read::<false>(shape, data, at, rows, &self.covariances)?,
+                Op::Run(run) if context.shape.big_endian => run.read::<true>(context, at, rows)?,
+                Op::Run(run) => run.read::<false>(context, at, rows)?,
                 Op::Text(field) => {
-                    let (length, at) = read_length(shape, data, at, field)?;
-                    end_of(data, at, length, field)?
+                    let (length, at) = context.length(at, field)?;
+                    end_of(context.data, at, length, field)?
                 }
                 Op::WideText(field) => {
-                    let (length, at) = read_length(shape, data, at, field)?;
+                    let (length, at) = context.length(at, field)?;
                     let bytes = length
-                        .checked_mul(shape.wide)
+                        .checked_mul(context.shape.wide)
                         .ok_or_else(|| short(at, field))?;
-                    end_of(data, at, bytes, field)?
+                    end_of(context.data, at, bytes, field)?
                 }
                 Op::Sequence(items) => {
-                    let start = items.header(shape, data, at)?;
-                    let (count, at) = read_length(shape, data, start, &items.field)?;
-                    items.read(types, shape, data, at, count, rows)?
+                    let start = items.header(context, at)?;
+                    let (count, at) = context.length(start, &items.field)?;
+                    items.read(context, at, count, rows)?
                 }
                 Op::Array(items, count) => {
-                    let at = items.header(shape, data, at)?;
-                    items.read(types, shape, data, at, *count, rows)?
+                    let at = items.header(context, at)?;
+                    items.read(context, at, *count, rows)?
                 }
             };
         }
         Ok(at)
+    }
+}
+
+impl Context<'_> {
+    /// A 32-bit length and the place after it.
+    #[inline]
+    fn length(&mut self, at: usize, field: &str) -> Result<(usize, usize), Fail> {
+        let at = align(at, 4, self.shape);
+        let Some(bytes) = self.data.get(at..).and_then(<[u8]>::first_chunk::<4>) else {
+            return Err(short(self.data.len(), field));
+        };
+        if let Some(flat) = &mut self.trace {
+            // OK because messages with a flat table are shorter than 4 GiB.
+            flat.checks.push((at as u32, *bytes));
+        }
+        let length = if self.shape.big_endian {
+            u32::from_be_bytes(*bytes)
+        } else {
+            u32::from_le_bytes(*bytes)
+        };
+        Ok((length as usize, at + 4))
     }
 }
 
@@ -304,9 +409,7 @@ impl Compiler<'_, '_> {
                 self.run.fields.len().checked_sub(count.max(1)),
             ) && count > 0
             {
-                self.run.fields[first].sinks[1] =
-                    Sink::Covariance(self.program.covariances.len() as u32);
-                self.program.covariances.push(given.to_owned());
+                self.run.fields[first].sinks[1] = Sink::Covariance(self.rows.absent_field(given));
             }
             return Ok(());
         }
@@ -356,19 +459,16 @@ fn has_header(kind: &Type) -> bool {
 
 impl Items {
     /// Steps over the size that XCDR2 puts before collections of non-numbers.
-    fn header(&self, shape: Shape, data: &[u8], at: usize) -> Result<usize, Fail> {
+    fn header(&self, context: &mut Context<'_>, at: usize) -> Result<usize, Fail> {
         if !self.header {
             return Ok(at);
         }
-        let (_, at) = read_length(shape, data, at, &self.field)?;
-        Ok(at)
+        context.length(at, &self.field).map(|(_, at)| at)
     }
 
     fn read(
         &mut self,
-        types: &Types,
-        shape: Shape,
-        data: &[u8],
+        context: &mut Context<'_>,
         mut at: usize,
         count: usize,
         rows: &mut Rows,
@@ -376,38 +476,46 @@ impl Items {
         let wanted = count <= rows.max_items;
         if !wanted {
             rows.note_long(&self.field);
+            // The flat table does not count what is too long.
+            context.trace = None;
         }
         if let (Some(prim), false) = (self.prim, wanted) {
-            let start = align(at, prim.size(), shape);
+            let start = align(at, prim.size(), context.shape);
             let bytes = count
                 .checked_mul(prim.size())
                 .ok_or_else(|| short(at, &self.field))?;
-            return end_of(data, start, bytes, &self.field);
+            return end_of(context.data, start, bytes, &self.field);
         }
+        const TOO_MANY: &str = "its items have too many fields";
         for item in 0..count {
             let before = at;
             if wanted {
                 while self.programs.len() <= item {
                     let field = format!("{}[{}]", self.field, self.programs.len());
-                    let program = compile(types, &self.kind, &field, shape, rows, true);
-                    self.programs.push(
-                        program.map_err(|_| {
-                            other(at, &self.field, "its items have too many fields")
-                        })?,
-                    );
+                    let program =
+                        compile(context.types, &self.kind, &field, context.shape, rows, true);
+                    self.programs
+                        .push(program.map_err(|_| other(at, &self.field, TOO_MANY))?);
                 }
-                at = self.programs[item].run(types, shape, data, at, rows)?;
+                at = self.programs[item].run(context, at, rows)?;
             } else {
                 let skip = match &mut self.skip {
                     Some(skip) => skip,
                     none => {
-                        let program = compile(types, &self.kind, &self.field, shape, rows, false);
-                        none.insert(Box::new(program.map_err(|_| {
-                            other(at, &self.field, "its items have too many fields")
-                        })?))
+                        let program = compile(
+                            context.types,
+                            &self.kind,
+                            &self.field,
+                            context.shape,
+                            rows,
+                            false,
+                        );
+                        none.insert(Box::new(
+                            program.map_err(|_| other(at, &self.field, TOO_MANY))?,
+                        ))
                     }
                 };
-                at = skip.run(types, shape, data, at, rows)?;
+                at = skip.run(context, at, rows)?;
                 if at == before {
                     break; // Items without bytes: the rest is as empty.
                 }
@@ -417,25 +525,42 @@ impl Items {
     }
 }
 
+impl Load {
+    /// Puts the number where it belongs.
+    #[inline]
+    fn take<const BIG: bool>(&self, bytes: &[u8], rows: &mut Rows) {
+        let value = read::<BIG>(self.prim, bytes, self.offset as usize);
+        // OK because stamps are 32-bit integers, which doubles hold exactly.
+        let stamp = |ns: i64, rows: &mut Rows| {
+            rows.stamp_ns = Some(rows.stamp_ns.unwrap_or(0).wrapping_add(ns))
+        };
+        match self.sink {
+            Sink::Column(column) => rows.push(column, value),
+            Sink::StampSeconds => stamp((value as i64).wrapping_mul(1_000_000_000), rows),
+            Sink::StampNanoseconds => stamp(value as i64, rows),
+            Sink::Covariance(field) if value == -1.0 => rows.note_absent(field),
+            Sink::Covariance(_) | Sink::Nowhere => {}
+        }
+    }
+}
+
 impl Run {
     #[inline]
     fn read<const BIG: bool>(
         &mut self,
-        shape: Shape,
-        data: &[u8],
+        context: &mut Context<'_>,
         at: usize,
         rows: &mut Rows,
-        covariances: &[String],
     ) -> Result<usize, Fail> {
         let phase = at % 8;
         if self.tables[phase].is_none() {
-            self.tables[phase] = Some(Box::new(self.table(shape, phase)));
+            self.tables[phase] = Some(Box::new(self.table(context.shape, phase)));
         }
         let Some(table) = &self.tables[phase] else {
             return Ok(at);
         };
-        let Some(bytes) = data.get(at..at + table.length) else {
-            return Err(self.name_shortfall(shape, data.len(), at));
+        let Some(bytes) = context.data.get(at..at.saturating_add(table.length)) else {
+            return Err(self.name_shortfall(context.shape, context.data.len(), at));
         };
         for &(offset, column) in &table.doubles {
             rows.push(
@@ -444,25 +569,21 @@ impl Run {
             );
         }
         for load in &table.others {
-            let value = read::<BIG>(load.prim, bytes, load.offset as usize);
-            match load.sink {
-                Sink::Column(column) => rows.push(column, value),
-                // OK because these fields are 32-bit integers, which doubles hold exactly.
-                Sink::StampSeconds => {
-                    rows.stamp_ns = Some(
-                        rows.stamp_ns
-                            .unwrap_or(0)
-                            .wrapping_add((value as i64).wrapping_mul(1_000_000_000)),
-                    );
-                }
-                Sink::StampNanoseconds => {
-                    rows.stamp_ns = Some(rows.stamp_ns.unwrap_or(0).wrapping_add(value as i64))
-                }
-                Sink::Covariance(field) if value == -1.0 => {
-                    rows.note_absent(&covariances[field as usize])
-                }
-                Sink::Covariance(_) | Sink::Nowhere => {}
-            }
+            load.take::<BIG>(bytes, rows);
+        }
+        if let Some(flat) = &mut context.trace {
+            // OK because messages with a flat table are shorter than 4 GiB.
+            let start = at as u32;
+            flat.doubles.extend(
+                table
+                    .doubles
+                    .iter()
+                    .map(|&(offset, column)| (start + offset, column)),
+            );
+            flat.others.extend(table.others.iter().map(|load| Load {
+                offset: start + load.offset,
+                ..*load
+            }));
         }
         Ok(at + table.length)
     }
@@ -533,21 +654,6 @@ fn end_of(data: &[u8], at: usize, bytes: usize, field: &str) -> Result<usize, Fa
         Some(end) if end <= data.len() => Ok(end),
         _ => Err(short(data.len(), field)),
     }
-}
-
-/// A 32-bit length and the place after it.
-#[inline]
-fn read_length(shape: Shape, data: &[u8], at: usize, field: &str) -> Result<(usize, usize), Fail> {
-    let at = align(at, 4, shape);
-    let Some(bytes) = data.get(at..at + 4) else {
-        return Err(short(data.len(), field));
-    };
-    let bits = if shape.big_endian {
-        load::<4, true>(bytes, 0)
-    } else {
-        load::<4, false>(bytes, 0)
-    };
-    Ok((bits as usize, at + 4))
 }
 
 /// `N` bytes at `offset` as an unsigned integer. The caller has checked the run's length; a wrong offset would panic, never read outside.

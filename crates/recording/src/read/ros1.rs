@@ -33,7 +33,7 @@ impl Decoder for Ros1 {
     fn decode(&mut self, message: &[u8], rows: &mut Rows) -> Result<(), String> {
         let end = self
             .program
-            .run(&self.types, SHAPE, message, 0, rows)
+            .decode(&self.types, SHAPE, message, rows)
             .map_err(|fail| describe(&fail, "ROS 1 message", message.len()))?;
         if end < message.len() {
             rows.trailing += 1;

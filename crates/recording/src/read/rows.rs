@@ -118,9 +118,22 @@ impl<'a> Rows<'a> {
         count(&mut self.long, field);
     }
 
+    /// The number under which a field is counted that messages may declare as not given.
+    pub fn absent_field(&mut self, field: &str) -> u32 {
+        let known = self.absent.iter().position(|(known, _)| known == field);
+        // OK because there are at most as many as columns.
+        known.unwrap_or_else(|| {
+            self.absent.push((field.to_owned(), 0));
+            self.absent.len() - 1
+        }) as u32
+    }
+
     /// Counts a message that declares a field as not given.
-    pub fn note_absent(&mut self, field: &str) {
-        count(&mut self.absent, field);
+    #[inline]
+    pub fn note_absent(&mut self, field: u32) {
+        if let Some((_, count)) = self.absent.get_mut(field as usize) {
+            *count += 1;
+        }
     }
 
     /// Begins the next message.
@@ -162,7 +175,9 @@ impl<'a> Rows<'a> {
     /// Empties everything for the next batch but keeps the columns and their memory.
     pub fn clear(&mut self) {
         self.row = 0;
-        self.absent.clear();
+        for (_, count) in &mut self.absent {
+            *count = 0;
+        }
         self.long.clear();
         self.trailing = 0;
         for column in &mut self.columns {
