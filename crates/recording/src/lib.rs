@@ -1,9 +1,9 @@
 //! What a recording is: an MCAP file of named, timed messages. This crate writes the project's own recordings, reads anybody's,
 //! and turns other people's logs into recordings. It knows no physics and no statistics, and it alone knows the word MCAP.
 //!
-//! * [`write`] makes a recording: [`write::RecordingWriter`], the topics in [`topics`], the messages in [`schema`] and [`cdr`].
+//! * [`mod@write`] makes a recording: [`write::RecordingWriter`], the topics in [`topics`], the messages in [`schema`] and [`cdr`].
 //! * [`read`] opens any MCAP: [`read::Recording`] gives what is in it, its numbers as [`Signal`]s, and every oddity as a [`Finding`].
-//! * [`import`] turns logs of other formats into recordings.
+//! * [`mod@import`] turns logs of other formats into recordings.
 
 pub mod cdr;
 pub mod finding;
