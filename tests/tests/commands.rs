@@ -1,0 +1,345 @@
+//! The commands as a person would run them: in an empty folder, on real files.
+
+use serde_json::Value;
+use std::path::{Path, PathBuf};
+use std::process::{Command, Output};
+use std::sync::OnceLock;
+
+/// Path of a command, built once beside this test: cargo gives a test only the binaries of its own package.
+fn bin(name: &str) -> PathBuf {
+    static BUILT: OnceLock<PathBuf> = OnceLock::new();
+    let folder = BUILT.get_or_init(|| {
+        let exe = std::env::current_exe().expect("a test has a path");
+        let folder = exe
+            .parent()
+            .and_then(Path::parent)
+            .expect("target/PROFILE/deps/test")
+            .to_owned();
+        let mut build = Command::new(env!("CARGO"));
+        build.args([
+            "build", "--quiet", "-p", "sim", "-p", "analyze", "-p", "study",
+        ]);
+        if folder.ends_with("release") {
+            build.arg("--release");
+        }
+        build.current_dir(concat!(env!("CARGO_MANIFEST_DIR"), "/.."));
+        assert!(
+            build.status().expect("cargo runs").success(),
+            "the commands do not build"
+        );
+        folder
+    });
+    folder.join(name)
+}
+
+fn run_in(folder: &Path, name: &str, args: &[&str]) -> Output {
+    Command::new(bin(name))
+        .args(args)
+        .current_dir(folder)
+        .output()
+        .expect("the command starts")
+}
+
+#[track_caller]
+fn good(output: Output) -> Output {
+    assert!(
+        output.status.success(),
+        "{:?}: {}",
+        output.status.code(),
+        String::from_utf8_lossy(&output.stderr)
+    );
+    output
+}
+
+fn files(folder: &Path) -> Vec<String> {
+    let entries = std::fs::read_dir(folder).expect("the folder is there");
+    let mut names: Vec<String> = entries
+        .map(|e| {
+            e.expect("an entry")
+                .file_name()
+                .to_string_lossy()
+                .into_owned()
+        })
+        .collect();
+    names.sort();
+    names
+}
+
+fn json(output: &Output) -> Value {
+    serde_json::from_slice(&output.stdout).expect("JSON on standard output")
+}
+
+#[test]
+fn a_scene_becomes_a_recording_and_the_recording_findings() {
+    let folder = tempfile::tempdir().expect("a folder");
+    good(run_in(folder.path(), "sim", &["record"]));
+    assert_eq!(files(folder.path()), ["music-1001.mcap"]);
+    let found = json(&good(run_in(
+        folder.path(),
+        "analyze",
+        &["music-1001.mcap", "--format", "json"],
+    )));
+    assert_eq!(found["window_s"], serde_json::json!([15.0, 60.0]));
+    assert_eq!(found["samples"], 1801);
+    let metric = |name: &str| {
+        found["metrics"][name]["value"]
+            .as_f64()
+            .unwrap_or_else(|| panic!("{name} is missing"))
+    };
+    assert!(metric("synchrony") > 0.95);
+    assert!((metric("synchrony_chance") - 2.0 / std::f64::consts::PI).abs() < 1e-12);
+    assert!((metric("peak_hz") - 2.1507).abs() < 0.03);
+    assert_eq!(found["metrics"]["mechanism"]["value"], "parametric");
+    assert_eq!(found["metrics"]["unstable"]["value"], true);
+    assert!(!found.to_string().contains("NaN"));
+}
+
+#[test]
+fn same_scene_seed_and_version_give_the_same_bytes() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let record = |seed: &str, out: &str| {
+        good(run_in(
+            folder.path(),
+            "sim",
+            &[
+                "record",
+                "baseline",
+                "--seed",
+                seed,
+                "--duration",
+                "10",
+                "--out",
+                out,
+            ],
+        ))
+    };
+    record("7", "a.mcap");
+    record("7", "b.mcap");
+    let read = |name: &str| std::fs::read(folder.path().join(name)).expect("written");
+    assert!(read("a.mcap") == read("b.mcap"));
+    assert!(
+        record("7", "-").stdout == read("a.mcap"),
+        "standard output gets the same recording"
+    );
+    record("8", "c.mcap");
+    assert!(
+        read("a.mcap") != read("c.mcap"),
+        "another seed is another run"
+    );
+}
+
+#[test]
+fn bad_input_gets_one_sentence_and_leaves_nothing() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let cases: &[(&[&str], Option<&str>, &str)] = &[
+        (&["record", "musik"], None, "Did you mean `music`"),
+        (&["record", "--method", "dopri"], None, "dopri5"),
+        (
+            &["record", "--set", "effects.musik.beat_hz=2"],
+            None,
+            "Did you mean `music`",
+        ),
+        (&["record", "--duration", "0"], None, "above zero"),
+        (&["record", "--set", "body.mass_kg=-1"], None, "above zero"),
+        (
+            &["record", "mine.toml"],
+            Some("name = \"x\"\n[body]\nmass_kg = 0.0\n"),
+            "mine.toml:3:11",
+        ),
+        (
+            &["record", "mine.toml"],
+            Some("name = \"x\"\n[body]\nmas_kg = 1.0\n"),
+            "mine.toml:3:1",
+        ),
+        (
+            &["record", "mine.toml"],
+            Some("name = \"x\"\n[body]\nmass_kg = \"heavy\"\n"),
+            "mine.toml:3:11",
+        ),
+        (
+            &["record", "mine.toml"],
+            Some("name = \"x\"\n[carriers]\nhandles_m = []\n"),
+            "at least one handle",
+        ),
+        (
+            &["record", "mine.toml"],
+            Some("name = \"x\"\n[body]\ninertia_kg_m2 = { xx = 1.0, yy = 1.0, zz = 3.0 }\n"),
+            "triangle inequality",
+        ),
+        (
+            &["record", "--out", "no/such/folder/x.mcap"],
+            None,
+            "no/such/folder/x.mcap",
+        ),
+    ];
+    for (args, text, expected) in cases {
+        if let Some(text) = text {
+            std::fs::write(folder.path().join("mine.toml"), text).expect("written");
+        }
+        let out = run_in(folder.path(), "sim", args);
+        let said = String::from_utf8_lossy(&out.stderr);
+        assert_eq!(out.status.code(), Some(1), "{args:?}: {said}");
+        assert!(said.contains(expected), "{args:?} says: {said}");
+        assert!(out.stdout.is_empty());
+    }
+    assert_eq!(files(folder.path()), ["mine.toml"], "nothing half-written");
+    assert_eq!(
+        run_in(folder.path(), "sim", &["record", "--nonsense"])
+            .status
+            .code(),
+        Some(2),
+        "wrong usage"
+    );
+}
+
+#[test]
+fn what_is_no_recording_is_refused_in_one_sentence() {
+    let folder = tempfile::tempdir().expect("a folder");
+    std::fs::write(folder.path().join("empty.mcap"), b"").expect("written");
+    std::fs::write(
+        folder.path().join("text.mcap"),
+        b"this is no recording, whatever its name says",
+    )
+    .expect("written");
+    for name in ["empty.mcap", "text.mcap", "absent.mcap"] {
+        let out = run_in(folder.path(), "analyze", &[name]);
+        let said = String::from_utf8_lossy(&out.stderr);
+        assert_eq!(out.status.code(), Some(1), "{name}: {said}");
+        assert!(said.contains(name), "{said}");
+    }
+}
+
+#[test]
+fn a_cut_off_recording_is_salvaged_and_said() {
+    let folder = tempfile::tempdir().expect("a folder");
+    good(run_in(
+        folder.path(),
+        "sim",
+        &["record", "--out", "whole.mcap"],
+    ));
+    let whole = std::fs::read(folder.path().join("whole.mcap")).expect("written");
+    std::fs::write(
+        folder.path().join("cut.mcap"),
+        &whole[..whole.len() * 2 / 3],
+    )
+    .expect("written");
+    let out = run_in(folder.path(), "analyze", &["cut.mcap", "--format", "json"]);
+    assert_eq!(
+        out.status.code(),
+        Some(3),
+        "{}",
+        String::from_utf8_lossy(&out.stderr)
+    );
+    let found = json(&out);
+    assert_eq!(found["recording"]["salvaged"], true);
+    assert!(found["metrics"]["rms_roll_deg"]["value"].is_number());
+}
+
+#[test]
+fn the_study_is_the_same_for_any_number_of_threads() {
+    let folder = tempfile::tempdir().expect("a folder");
+    for jobs in ["1", "2"] {
+        good(run_in(
+            folder.path(),
+            "study",
+            &["paper", "--seeds", "3", "--jobs", jobs, "--out", jobs],
+        ));
+    }
+    for name in ["paper.txt", "paper.json", "runs.csv"] {
+        let read =
+            |jobs: &str| std::fs::read(folder.path().join(jobs).join(name)).expect("written");
+        assert!(read("1") == read("2"), "{name} depends on --jobs");
+    }
+}
+
+/// Every mean within the paper's ± of the paper's mean, and some that the paper does not print.
+#[test]
+fn table_1_is_reproduced() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let found = json(&good(run_in(
+        folder.path(),
+        "study",
+        &["paper", "--format", "json"],
+    )));
+    let mean = |condition: &str, metric: &str| {
+        let value = &found["conditions"][condition]["metrics"][metric]["mean"];
+        value
+            .as_f64()
+            .unwrap_or_else(|| panic!("{condition} {metric} is missing"))
+    };
+    for (condition, metric, theirs, spread) in [
+        ("baseline", "rms_roll_deg", 0.148, 0.019),
+        ("baseline", "contact_loss_mean", 0.040, 0.005),
+        ("baseline", "synchrony", 0.629, 0.032),
+        ("baseline", "dz_pp_m", 0.133, 0.017),
+        ("baseline", "t_float", 0.089, 0.035),
+        ("music", "rms_roll_deg", 18.387, 0.814),
+        ("music", "contact_loss_mean", 0.317, 0.013),
+        ("music", "synchrony", 0.990, 0.004),
+        ("music", "onset_time_s", 20.5, 4.0),
+        ("music", "dz_pp_m", 0.155, 0.020),
+    ] {
+        let here = mean(condition, metric);
+        assert!(
+            (here - theirs).abs() <= spread,
+            "{condition} {metric}: {here}, expected {theirs} ± {spread}"
+        );
+    }
+    for (condition, unstable) in [("baseline", 0), ("music", 30)] {
+        assert_eq!(found["conditions"][condition]["unstable"], unstable);
+        assert_eq!(found["conditions"][condition]["runs"], 30);
+        assert!(mean(condition, "force_correlation") > 0.95);
+    }
+}
+
+/// The paper's 'V5' nuance: with strict contact, music raises synchrony and does not raise roll.
+#[test]
+fn strict_contact_synchronises_without_rocking() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let metrics = |name: &str, extra: &[&str]| {
+        let args = [&["record", "strict-contact", "--out", name], extra].concat();
+        good(run_in(folder.path(), "sim", &args));
+        json(&good(run_in(
+            folder.path(),
+            "analyze",
+            &[name, "--format", "json"],
+        )))["metrics"]
+            .clone()
+    };
+    let with = metrics("with.mcap", &[]);
+    let without = metrics("without.mcap", &["--set", "effects.music=false"]);
+    let number = |found: &Value, name: &str| {
+        found[name]["value"]
+            .as_f64()
+            .unwrap_or_else(|| panic!("{name}"))
+    };
+    assert!(number(&with, "synchrony") > 0.95 && number(&without, "synchrony") < 0.8);
+    assert!(number(&with, "contact_loss_mean") <= 0.003);
+    assert!(number(&with, "rms_roll_deg") <= number(&without, "rms_roll_deg"));
+}
+
+/// The recordings that the project ships, against statistics that NumPy computed from them (data-samples/expected.py).
+#[test]
+fn val_numpy_statistics_of_the_samples() {
+    let folder = Path::new(concat!(env!("CARGO_MANIFEST_DIR"), "/../data-samples"));
+    let text =
+        std::fs::read_to_string(folder.join("expected.json")).expect("expected.json is shipped");
+    let expected: Value = serde_json::from_str(&text).expect("JSON");
+    for (name, numbers) in expected.as_object().expect("an object") {
+        let found = json(&good(run_in(
+            folder,
+            "analyze",
+            &[name, "--format", "json"],
+        )));
+        for (metric, theirs) in numbers.as_object().expect("an object") {
+            let theirs = theirs.as_f64().expect("a number");
+            let here = found["metrics"][metric]["value"]
+                .as_f64()
+                .unwrap_or_else(|| panic!("{name}: {metric} is missing"));
+            assert!(
+                (here - theirs).abs() <= 1e-9 * theirs.abs(),
+                "{name} {metric}: {here}, NumPy says {theirs}"
+            );
+        }
+    }
+}
