@@ -20,6 +20,8 @@ pub enum Node {
     Column(Vec<(f32, Node)>),
     /// One at a time, the first in front.
     Tabs(String, Vec<Node>),
+    /// A row or column with a name, as a tab shows it.
+    Named(String, Box<Node>),
     /// A view.
     View(View),
 }
@@ -166,6 +168,7 @@ pub fn titles(node: &Node) -> Vec<&str> {
             .flat_map(|(_, child)| titles(child))
             .collect(),
         Node::Tabs(_, children) => children.iter().flat_map(titles).collect(),
+        Node::Named(_, node) => titles(node),
         Node::View(view) => vec![view.title()],
     }
 }
@@ -189,7 +192,7 @@ pub fn send(sink: &mut dyn Sink, id: &str, root: &Node, play: Play) -> anyhow::R
     let root = match root {
         // The root has to be a container.
         Node::View(_) => out.container(c::ContainerKind::Tabs, None, &[(1.0, root)])?,
-        _ => out.node(root)?,
+        _ => out.node(root, None)?,
     };
     let uuid = re_sdk_types::datatypes::Uuid::from(root.1);
     let viewport = a::ViewportBlueprint::new()
@@ -227,20 +230,21 @@ impl Writer<'_> {
         Uuid::from_u128((0x7261_7468_u128 << 96) | self.nodes)
     }
 
-    fn node(&mut self, node: &Node) -> anyhow::Result<Place> {
+    fn node(&mut self, node: &Node, name: Option<&str>) -> anyhow::Result<Place> {
         match node {
             Node::Row(children) => {
                 let children: Vec<_> = children.iter().map(|(s, n)| (*s, n)).collect();
-                self.container(c::ContainerKind::Horizontal, None, &children)
+                self.container(c::ContainerKind::Horizontal, name, &children)
             }
             Node::Column(children) => {
                 let children: Vec<_> = children.iter().map(|(s, n)| (*s, n)).collect();
-                self.container(c::ContainerKind::Vertical, None, &children)
+                self.container(c::ContainerKind::Vertical, name, &children)
             }
             Node::Tabs(name, children) => {
                 let children: Vec<_> = children.iter().map(|n| (1.0, n)).collect();
                 self.container(c::ContainerKind::Tabs, Some(name), &children)
             }
+            Node::Named(name, node) => self.node(node, Some(name)),
             Node::View(view) => self.view(view),
         }
     }
@@ -254,7 +258,7 @@ impl Writer<'_> {
         let id = self.id();
         let mut contents = Vec::new();
         for (_, child) in children {
-            contents.push(c::IncludedContent(self.node(child)?.0.into()));
+            contents.push(c::IncludedContent(self.node(child, None)?.0.into()));
         }
         let shares = || children.iter().map(|(share, _)| *share);
         let mut container = a::ContainerBlueprint::new(kind);

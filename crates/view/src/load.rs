@@ -17,7 +17,7 @@ use crate::take::{Carriers, Curve, Ledger, Pose, Sensor, Shape, Take, Topic};
 use crate::thin::Thin;
 
 /// Points that all thinned curves together may have: what a viewer draws with ease.
-const POINTS: u64 = 2_400_000;
+const POINTS: u64 = 1_200_000;
 /// Points that a curve has at least, however many there are.
 const MIN_POINTS: u64 = 4_000;
 /// Curves of one topic that are drawn; more would be no picture.
@@ -39,7 +39,7 @@ pub enum Detail {
 }
 
 /// More messages than this are streamed only: metrics need whole columns in memory.
-const MAX_EXAMINED: u64 = 5_000_000;
+const MAX_EXAMINED: u64 = 3_000_000;
 
 /// Reads what there is to draw. Returns what the reader found odd beside it.
 pub fn load(
@@ -579,25 +579,27 @@ impl SensorStream {
     fn finish(self, topic: &str) -> Sensor {
         let curves = |thin: [Thin; 3]| -> Vec<Curve> {
             let curves: Vec<Curve> = thin.into_iter().map(Thin::finish).collect();
-            let any = curves
-                .iter()
-                .any(|c| c.values.iter().any(|x| x.is_finite()));
-            if any { curves } else { Vec::new() }
+            // A field that the sensor does not have stands in its messages as zeros.
+            let any = |c: &Curve| c.values.iter().any(|x| x.is_finite() && *x != 0.0);
+            if curves.iter().any(any) {
+                curves
+            } else {
+                Vec::new()
+            }
         };
         let spectra = |welch: [Option<WelchStream>; 3]| -> Vec<Spectrum> {
             let all: Option<Vec<Spectrum>> = welch.into_iter().map(|w| w?.finish().ok()).collect();
             all.unwrap_or_default()
         };
         let attitude: Vec<Curve> = self.attitude.into_iter().map(Thin::finish).collect();
+        let (gyro, accel) = (curves(self.gyro), curves(self.accel));
+        // Without a gyroscope there is an average inclination at best: nothing to call a roll.
+        let none = gyro.is_empty() || attitude[0].values.is_empty();
         Sensor {
             topic: topic.to_owned(),
-            gyro: curves(self.gyro),
-            accel: curves(self.accel),
-            attitude: if attitude[0].values.is_empty() {
-                Vec::new()
-            } else {
-                attitude
-            },
+            gyro,
+            accel,
+            attitude: if none { Vec::new() } else { attitude },
             gyro_spectra: spectra(self.gyro_spectra),
             accel_spectra: spectra(self.accel_spectra),
         }

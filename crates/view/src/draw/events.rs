@@ -13,6 +13,11 @@ pub fn draw(store: &mut Store<'_>, take: &Take) -> anyhow::Result<Option<View>> 
     // OK because event times lie inside the recording, whose length fits.
     let at = |t_s: f64| take.start_ns.saturating_add((t_s * 1e9).round() as i64);
     for event in &take.events {
+        // What names only its topic is said with its kind.
+        let what = match event.what.starts_with('/') {
+            true => format!("{}: {}", event.kind.replace('_', " "), event.what),
+            false => event.what.clone(),
+        };
         let (level, color) = match event.kind {
             "onset" => ("CRITICAL", palette::VERMILION),
             "contact_lost" | "jump" => ("WARN", palette::YELLOW),
@@ -20,7 +25,7 @@ pub fn draw(store: &mut Store<'_>, take: &Take) -> anyhow::Result<Option<View>> 
         };
         lines.push((
             at(event.t_s),
-            format!("{:.2} s  {}", event.t_s, event.what),
+            format!("{:.2} s  {}", event.t_s, what),
             level,
             color,
         ));

@@ -40,25 +40,38 @@ struct Scene {
     plots: Vec<View>,
 }
 
-/// Columns of plots beside the scene; a tab for every sensor and for topics of other kinds. A single sensor without a scene is
-/// shown with what was estimated from it.
-fn layout(scene: Scene, log: Option<View>, page: View, mut sensors: Vec<Panel>) -> Node {
+/// Columns of plots beside the scene; a tab for every sensor and for topics of other kinds. Where there is no scene, a single
+/// sensor is shown together with what was estimated from it.
+fn layout(scene: Scene, log: Option<View>, page: View, mut panels: Vec<Panel>) -> Node {
     let words = match log {
         Some(log) => Node::Tabs("Words".into(), vec![log.into(), page.into()]),
         None => page.into(),
     };
     let known = scene.space.is_some() || !scene.small.is_empty() || !scene.plots.is_empty();
-    if !known || (scene.space.is_none() && sensors.len() == 1) {
-        if sensors.len() == 1 {
-            let mut panel = sensors.remove(0);
-            panel.plots.extend(scene.plots);
-            panel.small.extend(scene.small);
-            return panel.node(Some(words));
+    let sensors = panels.iter().filter(|panel| panel.is_sensor).count();
+    let tabs = |first: Node, panels: Vec<Panel>| match panels.is_empty() {
+        true => first,
+        false => {
+            let mut tabs = vec![first];
+            tabs.extend(panels.into_iter().map(|panel| panel.node(None)));
+            Node::Tabs("Recording".into(), tabs)
         }
-        let tabs: Vec<Node> = sensors.into_iter().map(|panel| panel.node(None)).collect();
-        return match tabs.is_empty() {
+    };
+    if scene.space.is_none() && sensors == 1 {
+        // Sensors stand first.
+        let mut panel = panels.remove(0);
+        panel.plots.extend(scene.plots);
+        panel.small.extend(scene.small);
+        return tabs(panel.node(Some(words)), panels);
+    }
+    if !known {
+        let nodes: Vec<Node> = panels.into_iter().map(|panel| panel.node(None)).collect();
+        return match nodes.is_empty() {
             true => words,
-            false => Node::Row(vec![(3.4, Node::Tabs("Topics".into(), tabs)), (1.0, words)]),
+            false => Node::Row(vec![
+                (3.4, Node::Tabs("Topics".into(), nodes)),
+                (1.0, words),
+            ]),
         };
     }
     let mut small: Vec<(f32, Node)> = Vec::new();
@@ -96,13 +109,10 @@ fn layout(scene: Scene, log: Option<View>, page: View, mut sensors: Vec<Panel>) 
         }
         columns.push((4.0, Node::Column(rows)));
     }
-    let main = Node::Row(columns);
-    if sensors.is_empty() {
-        return main;
-    }
-    let mut tabs = vec![main];
-    tabs.extend(sensors.into_iter().map(|panel| panel.node(None)));
-    Node::Tabs("Recording".into(), tabs)
+    tabs(
+        Node::Named("Overview".into(), Box::new(Node::Row(columns))),
+        panels,
+    )
 }
 
 fn even(views: Vec<View>) -> Vec<(f32, Node)> {
@@ -111,6 +121,8 @@ fn even(views: Vec<View>) -> Vec<(f32, Node)> {
 
 /// The views of one topic: curves over time, and drawings beside them.
 pub struct Panel {
+    name: String,
+    is_sensor: bool,
     plots: Vec<View>,
     small: Vec<View>,
 }
@@ -118,15 +130,29 @@ pub struct Panel {
 impl Panel {
     /// Curves to the left, drawings and words to the right.
     fn node(self, words: Option<Node>) -> Node {
-        let mut right = even(self.small);
+        // More than two drawings would be too small to read: all but the last stand behind each other.
+        let mut small = self.small;
+        let last = small.split_off(small.len().saturating_sub(1));
+        let mut right = match small.len() {
+            0 | 1 => even(small),
+            _ => vec![(
+                1.0,
+                Node::Tabs(
+                    "Spectra".into(),
+                    small.into_iter().map(Node::from).collect(),
+                ),
+            )],
+        };
+        right.extend(even(last));
         right.extend(words.map(|words| (1.0, words)));
-        match (self.plots.is_empty(), right.is_empty()) {
+        let node = match (self.plots.is_empty(), right.is_empty()) {
             (_, true) => Node::Column(even(self.plots)),
             (true, false) => Node::Column(right),
             (false, false) => Node::Row(vec![
                 (2.0, Node::Column(even(self.plots))),
                 (1.0, Node::Column(right)),
             ]),
-        }
+        };
+        Node::Named(self.name, Box::new(node))
     }
 }

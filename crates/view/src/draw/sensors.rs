@@ -10,8 +10,10 @@ use crate::palette;
 use crate::store::Store;
 use crate::take::{self, Sensor, Take};
 
-/// Up to this frequency a sensor's spectra are drawn: people move below it.
+/// Up to this frequency a sensor's spectra are drawn where no line says otherwise: people move below it.
 const TOP_HZ: f64 = 8.0;
+/// Up to so many times the line's frequency, at least 4 Hz.
+const TOP_TIMES: f64 = 3.2;
 /// Where the line of a gait or of a shaken load is looked for, Hz.
 const GAIT_HZ: [f64; 2] = [0.5, 4.0];
 
@@ -84,17 +86,18 @@ fn sensor(store: &mut Store<'_>, sensor: &Sensor, attitude: bool) -> anyhow::Res
         plots.push(View::plot(title, path));
     }
     let f_hz = gait_line(&sensor.accel_spectra).or_else(|| gait_line(&sensor.gyro_spectra));
+    let top_hz = f_hz.map_or(TOP_HZ, |f_hz| (TOP_TIMES * f_hz).clamp(4.0, TOP_HZ));
     let mut small: Vec<View> = Vec::new();
     let groups = [
-        (
-            "gyro_spectra",
-            &sensor.gyro_spectra,
-            "Spectra of angular velocity",
-        ),
         (
             "accel_spectra",
             &sensor.accel_spectra,
             "Spectra of specific force",
+        ),
+        (
+            "gyro_spectra",
+            &sensor.gyro_spectra,
+            "Spectra of angular velocity",
         ),
     ];
     for (name, found, title) in groups {
@@ -110,10 +113,15 @@ fn sensor(store: &mut Store<'_>, sensor: &Sensor, attitude: bool) -> anyhow::Res
             .collect();
         let path = format!("{origin}/{name}");
         small.extend(spectra::drawing(
-            store, &path, title, &curves, f_hz, TOP_HZ,
+            store, &path, title, &curves, f_hz, top_hz,
         )?);
     }
-    Ok((!plots.is_empty() || !small.is_empty()).then_some(Panel { plots, small }))
+    Ok((!plots.is_empty() || !small.is_empty()).then_some(Panel {
+        name: sensor.topic.clone(),
+        is_sensor: true,
+        plots,
+        small,
+    }))
 }
 
 /// The strongest line of all three axes together between 0.5 and 4 Hz, Hz; `None` where nothing stands out tenfold above the median there.
@@ -175,6 +183,8 @@ fn topic(store: &mut Store<'_>, topic: &take::Topic) -> anyhow::Result<Panel> {
         plots.push(View::plot(format!("{}: {shown}{unit}", topic.name), path).contents(paths));
     }
     Ok(Panel {
+        name: topic.name.clone(),
+        is_sensor: false,
         plots,
         small: Vec::new(),
     })
