@@ -40,7 +40,9 @@ impl Clock {
     /// the recording of `length_s`.
     pub fn is_off(&self, length_s: f64) -> bool {
         let drifted_s = 1e-6 * self.drift_ppm.abs() * length_s;
-        let sure = self.drift_sd_ppm.is_none_or(|sd| self.drift_ppm.abs() > 2.0 * sd);
+        let sure = self
+            .drift_sd_ppm
+            .is_none_or(|sd| self.drift_ppm.abs() > 2.0 * sd);
         (self.offset_s.abs() > 1e-3 && self.offset_s.abs() > 2.0 * self.offset_sd_s)
             || (drifted_s > 1e-3 && sure)
     }
@@ -56,13 +58,17 @@ pub enum ClockError {
         found_s: f64,
     },
     /// They did not feel the same.
-    #[error("the two signals do not match at any offset (correlation {best:.2}; at least 0.5 is needed)")]
+    #[error(
+        "the two signals do not match at any offset (correlation {best:.2}; at least 0.5 is needed)"
+    )]
     NoMatch {
         /// Best correlation.
         best: f64,
     },
     /// Events that cannot be paired.
-    #[error("of {device} and {reference} events only {paired} can be paired; at least 2 are needed")]
+    #[error(
+        "of {device} and {reference} events only {paired} can be paired; at least 2 are needed"
+    )]
     TooFewEvents {
         /// Events on the device.
         device: usize,
@@ -143,9 +149,19 @@ fn inside(grid: &[f64], t_s: &[f64], x: &[f64]) -> Vec<f64> {
     let mut out = interpolate(t_s, x, grid);
     let on = |t: f64| (first..=last).contains(&t);
     let count = grid.iter().filter(|t| on(**t)).count().max(1);
-    let mean = grid.iter().zip(&out).filter(|(t, _)| on(**t)).map(|(_, v)| v).sum::<f64>() / count as f64;
+    let mean = grid
+        .iter()
+        .zip(&out)
+        .filter(|(t, _)| on(**t))
+        .map(|(_, v)| v)
+        .sum::<f64>()
+        / count as f64;
     for (t, v) in grid.iter().zip(&mut out) {
-        *v = if on(*t) && v.is_finite() { *v - mean } else { 0.0 };
+        *v = if on(*t) && v.is_finite() {
+            *v - mean
+        } else {
+            0.0
+        };
     }
     out
 }
@@ -165,7 +181,11 @@ fn best_lag(x: &[f64], y: &[f64], reach: usize) -> (f64, f64) {
     if !(scale > 0.0) {
         return (0.0, 0.0);
     }
-    let mut cross: Vec<Complex64> = rfft(&px).iter().zip(rfft(&py)).map(|(a, b)| a.conj() * b).collect();
+    let mut cross: Vec<Complex64> = rfft(&px)
+        .iter()
+        .zip(rfft(&py))
+        .map(|(a, b)| a.conj() * b)
+        .collect();
     let last = cross.len() - 1;
     (cross[0].im, cross[last].im) = (0.0, 0.0);
     let plan = RealFftPlanner::<f64>::new().plan_fft_inverse(n);
@@ -180,7 +200,11 @@ fn best_lag(x: &[f64], y: &[f64], reach: usize) -> (f64, f64) {
         .unwrap_or(0);
     let (l, c, r) = (at(best - 1), at(best), at(best + 1));
     let bend = l - 2.0 * c + r;
-    let shift = if bend < 0.0 { 0.5 * (l - r) / bend } else { 0.0 };
+    let shift = if bend < 0.0 {
+        0.5 * (l - r) / bend
+    } else {
+        0.0
+    };
     (best as f64 + shift.clamp(-0.5, 0.5), c)
 }
 
@@ -200,7 +224,11 @@ fn window_lag(x: &[f64], y: &[f64]) -> Option<(f64, f64)> {
                 xy += a * b;
                 yy += (b - mean) * (b - mean);
             }
-            if xx * yy > 0.0 { xy / (xx * yy).sqrt() } else { 0.0 }
+            if xx * yy > 0.0 {
+                xy / (xx * yy).sqrt()
+            } else {
+                0.0
+            }
         })
         .collect();
     let best = (0..pearson.len()).max_by(|a, b| pearson[*a].total_cmp(&pearson[*b]))?;
@@ -208,7 +236,11 @@ fn window_lag(x: &[f64], y: &[f64]) -> Option<(f64, f64)> {
         return None;
     };
     let bend = l - 2.0 * c + r;
-    let shift = if bend < 0.0 { 0.5 * (l - r) / bend } else { 0.0 };
+    let shift = if bend < 0.0 {
+        0.5 * (l - r) / bend
+    } else {
+        0.0
+    };
     Some((best as f64 + shift.clamp(-0.5, 0.5), c))
 }
 
@@ -244,12 +276,17 @@ pub fn from_events(
     };
     // Candidates: every difference between an early event of one and any of the other.
     let mut best: (usize, f64, f64) = (0, f64::MAX, 0.0);
-    for d in device_s.iter().take(20).chain(device_s.iter().rev().take(20)) {
+    for d in device_s
+        .iter()
+        .take(20)
+        .chain(device_s.iter().rev().take(20))
+    {
         for r in reference_s {
             let offset = r - d;
             if offset.abs() <= search_s {
                 let pairs = pairs_at(offset, 0.0, tolerance_s.max(0.02));
-                let spread = pairs.iter().map(|p| (p.1 - offset).abs()).sum::<f64>() / pairs.len() as f64;
+                let spread =
+                    pairs.iter().map(|p| (p.1 - offset).abs()).sum::<f64>() / pairs.len() as f64;
                 if pairs.len() > best.0 || (pairs.len() == best.0 && spread < best.1) {
                     best = (pairs.len(), spread, offset);
                 }
@@ -313,7 +350,11 @@ fn line(points: &[(f64, f64)], shared: f64) -> Clock {
 /// A tap is a maximum above `threshold_m_per_s2` over the running median norm, at least 0.15 s from a stronger one.
 pub fn taps(t_s: &[f64], accel_norm_m_per_s2: &[f64], threshold_m_per_s2: f64) -> Vec<f64> {
     let n = t_s.len().min(accel_norm_m_per_s2.len());
-    let mut sorted: Vec<f64> = accel_norm_m_per_s2[..n].iter().copied().filter(|a| a.is_finite()).collect();
+    let mut sorted: Vec<f64> = accel_norm_m_per_s2[..n]
+        .iter()
+        .copied()
+        .filter(|a| a.is_finite())
+        .collect();
     if sorted.is_empty() {
         return Vec::new();
     }
@@ -342,7 +383,9 @@ mod tests {
 
     fn motion(t: f64) -> f64 {
         // Never repeats within minutes.
-        (2.0 * t).sin() + 0.7 * (3.3 * t + (0.21 * t).sin() * 2.0).sin() + 0.5 * (0.37 * t * t.sqrt()).cos()
+        (2.0 * t).sin()
+            + 0.7 * (3.3 * t + (0.21 * t).sin() * 2.0).sin()
+            + 0.5 * (0.37 * t * t.sqrt()).cos()
     }
 
     #[test]
@@ -354,7 +397,9 @@ mod tests {
                 .map(|k| k as f64 * 0.005 + 1.0)
                 .map(|t| t - offset - 1e-6 * drift_ppm * (t - 60.0))
                 .collect();
-            let x: Vec<f64> = (0..23_000).map(|k| motion(k as f64 * 0.005 + 1.0)).collect();
+            let x: Vec<f64> = (0..23_000)
+                .map(|k| motion(k as f64 * 0.005 + 1.0))
+                .collect();
             let y: Vec<f64> = reference.iter().map(|t| motion(*t)).collect();
             let clock = from_signals((&device, &x), (&reference, &y), 3.0).unwrap();
             assert!((clock.drift_ppm - drift_ppm).abs() < 8.0, "{clock:?}");
@@ -368,14 +413,23 @@ mod tests {
         let t: Vec<f64> = (0..6000).map(|k| f64::from(k) * 0.01).collect();
         let x: Vec<f64> = t.iter().map(|t| (7.0 * t + t * t * 0.2).sin()).collect();
         let y: Vec<f64> = t.iter().map(|t| (1.0 * t * t.sqrt()).cos()).collect();
-        assert!(matches!(from_signals((&t, &x), (&t, &y), 1.0), Err(ClockError::NoMatch { .. })));
-        assert!(matches!(from_signals((&[], &[]), (&t, &y), 1.0), Err(ClockError::TooShort { .. })));
+        assert!(matches!(
+            from_signals((&t, &x), (&t, &y), 1.0),
+            Err(ClockError::NoMatch { .. })
+        ));
+        assert!(matches!(
+            from_signals((&[], &[]), (&t, &y), 1.0),
+            Err(ClockError::TooShort { .. })
+        ));
     }
 
     #[test]
     fn taps_at_both_ends_tell_offset_and_drift() {
         let reference = [1.0, 1.7, 2.1, 3.4, 301.0, 301.9, 302.3, 303.0];
-        let device: Vec<f64> = reference.iter().map(|t| t - 0.2 - 50e-6 * (t - 150.0)).collect();
+        let device: Vec<f64> = reference
+            .iter()
+            .map(|t| t - 0.2 - 50e-6 * (t - 150.0))
+            .collect();
         let clock = from_events(&device, &reference, 2.0, 0.02).unwrap();
         assert!((clock.drift_ppm - 50.0).abs() < 0.1, "{clock:?}");
         assert!((clock.reference_s(device[3]) - 3.4).abs() < 1e-6);

@@ -204,7 +204,10 @@ fn local_rms(x: &[f64], width: usize) -> Vec<f64> {
     }
     (0..x.len())
         .map(|i| {
-            let (a, b) = (i.saturating_sub(width / 2), (i + width / 2 + 1).min(x.len()));
+            let (a, b) = (
+                i.saturating_sub(width / 2),
+                (i + width / 2 + 1).min(x.len()),
+            );
             ((sums[b] - sums[a]).max(0.0) / (b - a) as f64).sqrt()
         })
         .collect()
@@ -249,8 +252,14 @@ fn cadence(wide: &[f64], walking: &[bool]) -> Result<f64, StepError> {
     // Which harmonic of it is the step: the one that swings most, at a cadence people use.
     let bin_hz = RATE_HZ / (2 * (spectrum.len() - 1)) as f64;
     let weight = |hz: f64| {
-        let (a, b) = ((0.92 * hz / bin_hz) as usize, (1.08 * hz / bin_hz) as usize + 1);
-        let swing = spectrum[a.min(b)..b.min(spectrum.len())].iter().sum::<f64>().sqrt();
+        let (a, b) = (
+            (0.92 * hz / bin_hz) as usize,
+            (1.08 * hz / bin_hz) as usize + 1,
+        );
+        let swing = spectrum[a.min(b)..b.min(spectrum.len())]
+            .iter()
+            .sum::<f64>()
+            .sqrt();
         let octaves = (hz / USUAL_HZ).log2() / USUAL_OCTAVES;
         swing * (-0.5 * octaves * octaves).exp()
     };
@@ -273,7 +282,10 @@ fn autocorrelation(x: &[f64], lags: usize) -> (Vec<f64>, Vec<f64>) {
     full.extend(power[1..power.len() - 1].iter().rev());
     let rho = rfft(&full);
     let zero = rho[0].re;
-    (rho.iter().take(lags + 1).map(|z| z.re / zero).collect(), power)
+    (
+        rho.iter().take(lags + 1).map(|z| z.re / zero).collect(),
+        power,
+    )
 }
 
 /// Maxima of the norm about the cadence that stand out of the local swing (in samples, refined), and that signal.
@@ -381,7 +393,9 @@ mod tests {
             .iter()
             .map(|t| {
                 let p = TAU * hz * t;
-                9.81 + 2.0 * p.cos() + 0.8 * (2.0 * p + 0.3).cos() + asymmetry * (0.5 * p + 1.0).cos()
+                9.81 + 2.0 * p.cos()
+                    + 0.8 * (2.0 * p + 0.3).cos()
+                    + asymmetry * (0.5 * p + 1.0).cos()
             })
             .collect();
         let x = up.iter().map(|u| 0.6 * u).collect();
@@ -392,7 +406,10 @@ mod tests {
     fn check(hz: f64, rate_hz: f64, asymmetry: f64) {
         let (t, [x, y, z]) = walk(hz, rate_hz, 60.0, asymmetry);
         let found = steps(&t, [&x, &y, &z]).unwrap();
-        let truth: Vec<f64> = (0..).map(|k| k as f64 / hz).take_while(|t| *t < 60.0).collect();
+        let truth: Vec<f64> = (0..)
+            .map(|k| k as f64 / hz)
+            .take_while(|t| *t < 60.0)
+            .collect();
         let a = agreement(&found.step_s, &truth, 0.25);
         assert!(a.f1 > 0.97, "{hz} Hz at {rate_hz} Hz, {asymmetry}: {a:?}");
         assert!((found.cadence_hz - hz).abs() < 0.01, "{}", found.cadence_hz);
@@ -416,11 +433,22 @@ mod tests {
     #[test]
     fn a_device_on_a_table_does_not_walk() {
         let t: Vec<f64> = (0..3000).map(|k| k as f64 / 100.0).collect();
-        let z: Vec<f64> = (0..3000).map(|k| 9.81 + 0.01 * ((k * 37 % 101) as f64 / 50.0 - 1.0)).collect();
+        let z: Vec<f64> = (0..3000)
+            .map(|k| 9.81 + 0.01 * ((k * 37 % 101) as f64 / 50.0 - 1.0))
+            .collect();
         let o = vec![0.0; 3000];
-        assert!(matches!(steps(&t, [&o, &o, &z]), Err(StepError::NoWalking { .. })));
-        assert!(matches!(steps(&t[..100], [&o, &o, &z]), Err(StepError::TooShort { .. })));
-        assert!(matches!(steps(&[], [&o, &o, &z]), Err(StepError::TooShort { .. })));
+        assert!(matches!(
+            steps(&t, [&o, &o, &z]),
+            Err(StepError::NoWalking { .. })
+        ));
+        assert!(matches!(
+            steps(&t[..100], [&o, &o, &z]),
+            Err(StepError::TooShort { .. })
+        ));
+        assert!(matches!(
+            steps(&[], [&o, &o, &z]),
+            Err(StepError::TooShort { .. })
+        ));
     }
 
     #[test]

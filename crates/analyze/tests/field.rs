@@ -13,7 +13,10 @@ fn analysed(name: &str) -> Option<Analysis> {
         return None;
     }
     let recording = Recording::open(&path, &ReadOptions::default()).unwrap();
-    let request = Request { truth: true, ..Request::default() };
+    let request = Request {
+        truth: true,
+        ..Request::default()
+    };
     Some(examine(name, &recording, &request).unwrap())
 }
 
@@ -29,8 +32,17 @@ fn val_broad_inclination() {
     if found.len() < BROAD.len() {
         return;
     }
-    let mean = |name: &str| found.iter().map(|a| a.metrics.number(name).unwrap()).sum::<f64>() / 3.0;
-    let (causal, batch) = (mean("inclination_error_deg"), mean("inclination_error_batch_deg"));
+    let mean = |name: &str| {
+        found
+            .iter()
+            .map(|a| a.metrics.number(name).unwrap())
+            .sum::<f64>()
+            / 3.0
+    };
+    let (causal, batch) = (
+        mean("inclination_error_deg"),
+        mean("inclination_error_batch_deg"),
+    );
     println!("causal {causal:.3}°, batch {batch:.3}°");
     // The best published filter on the same cuts, run by its authors' own code: 0.618° and 0.528°.
     assert!(causal <= 0.618, "{causal}");
@@ -39,7 +51,9 @@ fn val_broad_inclination() {
 
 #[test]
 fn val_broad_height() {
-    let Some(found) = analysed(BROAD[2]) else { return };
+    let Some(found) = analysed(BROAD[2]) else {
+        return;
+    };
     let error = found.metrics.number("height_relative_error").unwrap();
     println!("height, 0.3 to 10 Hz: {:.2} % RMS", 100.0 * error);
     assert!(error < 0.01, "{error}");
@@ -47,7 +61,10 @@ fn val_broad_height() {
 
 #[test]
 fn val_oxford_steps() {
-    for name in ["oxford_Pixel_Jamie_Hard_InHand_1.mcap", "oxford_Samsung_Dario_Hard_FrontPocket_2.mcap"] {
+    for name in [
+        "oxford_Pixel_Jamie_Hard_InHand_1.mcap",
+        "oxford_Samsung_Dario_Hard_FrontPocket_2.mcap",
+    ] {
         let Some(found) = analysed(name) else { return };
         let f1 = found.metrics.number("step_f1").unwrap();
         let rate = found.metrics.number("step_rate_hz_error").unwrap();

@@ -104,7 +104,13 @@ pub struct Lock {
 ///
 /// Surrogates keep each phase's increments but shuffle the first's in segments of `segment` samples: the same tempo and
 /// wobble, no bond. p-values are (1 + number at least as firm) / (1 + draws). Empty for fewer than four segments.
-pub fn locks(phi_rad: &[f64], psi_rad: &[f64], segment: usize, draws: usize, seed: u64) -> Vec<Lock> {
+pub fn locks(
+    phi_rad: &[f64],
+    psi_rad: &[f64],
+    segment: usize,
+    draws: usize,
+    seed: u64,
+) -> Vec<Lock> {
     let n = phi_rad.len().min(psi_rad.len());
     let segments = n.saturating_sub(1) / segment.max(1);
     if segments < 4 {
@@ -196,7 +202,9 @@ mod tests {
 
     #[test]
     fn adlers_equation_gives_back_its_parameters() {
-        for (detuning, coupling, captured) in [(0.3, 1.0, true), (0.9, 0.5, false), (-0.6, 0.61, true)] {
+        for (detuning, coupling, captured) in
+            [(0.3, 1.0, true), (0.9, 0.5, false), (-0.6, 0.61, true)]
+        {
             let (t, delta) = path(detuning, coupling, 0.4, 2.8);
             let a = adler(&t, &delta).unwrap();
             assert!((a.detuning_rad_per_s - detuning).abs() < 0.01, "{a:?}");

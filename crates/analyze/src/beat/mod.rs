@@ -126,8 +126,14 @@ mod tests {
     #[test]
     fn silence_and_noise_have_no_beat_or_say_so() {
         assert_eq!(beats(&vec![0.0; 200_000], 22_050.0), Err(BeatError::NoBeat));
-        assert!(matches!(beats(&[0.0; 100], 22_050.0), Err(BeatError::TooShort { .. })));
-        assert!(matches!(beats(&[0.0; 100], f64::NAN), Err(BeatError::TooSlow { .. })));
+        assert!(matches!(
+            beats(&[0.0; 100], 22_050.0),
+            Err(BeatError::TooShort { .. })
+        ));
+        assert!(matches!(
+            beats(&[0.0; 100], f64::NAN),
+            Err(BeatError::TooSlow { .. })
+        ));
     }
 
     #[test]

@@ -73,7 +73,13 @@ pub fn drums(d: &Drums) -> (Vec<f64>, Vec<f64>) {
             snare(&mut sound, d.rate_hz, t + l0, 0.7, &mut random);
         }
         hat(&mut sound, d.rate_hz, t + l1, 0.2, &mut random);
-        hat(&mut sound, d.rate_hz, t + d.swing * period + l2, 0.2, &mut random);
+        hat(
+            &mut sound,
+            d.rate_hz,
+            t + d.swing * period + l2,
+            0.2,
+            &mut random,
+        );
         if number % 16 == 15 {
             for k in 1..4 {
                 let at = t + f64::from(k) * period / 4.0 + l3;
@@ -90,7 +96,13 @@ pub fn drums(d: &Drums) -> (Vec<f64>, Vec<f64>) {
     (sound, beats)
 }
 
-fn add(sound: &mut [f64], rate_hz: f64, at_s: f64, length_s: f64, mut wave: impl FnMut(f64) -> f64) {
+fn add(
+    sound: &mut [f64],
+    rate_hz: f64,
+    at_s: f64,
+    length_s: f64,
+    mut wave: impl FnMut(f64) -> f64,
+) {
     let first = (at_s.max(0.0) * rate_hz) as usize;
     for k in 0..(length_s * rate_hz) as usize {
         if let Some(s) = sound.get_mut(first + k) {

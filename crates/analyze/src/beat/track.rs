@@ -151,14 +151,20 @@ fn median_step(chain: &[usize]) -> Option<f64> {
 /// (hi-hats, the floor of a noisy room).
 fn strokes(accent: &[f64]) -> Vec<(usize, f64)> {
     let tops: Vec<(usize, f64)> = (3..accent.len().saturating_sub(3))
-        .filter(|&t| (t - 3..t).all(|s| accent[s] < accent[t]) && (t + 1..t + 4).all(|s| accent[s] <= accent[t]))
+        .filter(|&t| {
+            (t - 3..t).all(|s| accent[s] < accent[t])
+                && (t + 1..t + 4).all(|s| accent[s] <= accent[t])
+        })
         .map(|t| (t, accent[t]))
         .collect();
     // Hard: there are two in five seconds at any tempo considered, were it only every second beat.
     let mut sorted: Vec<f64> = tops.iter().map(|t| t.1).collect();
     sorted.sort_by(|a, b| b.total_cmp(a));
     let rank = (0.4 * accent.len() as f64 / FRAME_HZ) as usize;
-    let Some(hard) = sorted.get(rank.min(sorted.len().saturating_sub(1))).copied() else {
+    let Some(hard) = sorted
+        .get(rank.min(sorted.len().saturating_sub(1)))
+        .copied()
+    else {
         return Vec::new();
     };
     tops.into_iter()
@@ -169,7 +175,10 @@ fn strokes(accent: &[f64]) -> Vec<(usize, f64)> {
 
 /// The beat's time: the centre of the onset strength within 40 ms of the frame.
 fn refined(onsets: &Onsets, frame: usize) -> f64 {
-    let (a, b) = (frame.saturating_sub(4), (frame + 5).min(onsets.strength.len()));
+    let (a, b) = (
+        frame.saturating_sub(4),
+        (frame + 5).min(onsets.strength.len()),
+    );
     let (mut weight, mut moment) = (1e-3, 1e-3 * frame as f64);
     for f in a..b {
         weight += onsets.strength[f];

@@ -35,7 +35,14 @@ pub struct Carriers(Vec<Worn>);
 
 /// Whether a metric rests on the carriers' phases.
 pub fn gives(name: &str) -> bool {
-    ["synchrony", "synchrony_chance", "plv", "beat_synchrony", "beat_hz"].contains(&name)
+    [
+        "synchrony",
+        "synchrony_chance",
+        "plv",
+        "beat_synchrony",
+        "beat_hz",
+    ]
+    .contains(&name)
 }
 
 impl Carriers {
@@ -44,20 +51,39 @@ impl Carriers {
         let turns = track.gyro_rad_per_s.iter().any(|w| *w != [0.0; 3]);
         let heave: Vec<f64> = if turns {
             let up = |(q, a): (&UnitQuaternion<f64>, &[f64; 3])| (q * Vector3::from(*a)).z;
-            batch(track, options).earth_from_sensor.iter().zip(&track.accel_m_per_s2).map(up).collect()
+            batch(track, options)
+                .earth_from_sensor
+                .iter()
+                .zip(&track.accel_m_per_s2)
+                .map(up)
+                .collect()
         } else {
-            track.accel_m_per_s2.iter().map(|a| Vector3::from(*a).norm()).collect()
+            track
+                .accel_m_per_s2
+                .iter()
+                .map(|a| Vector3::from(*a).norm())
+                .collect()
         };
         let steps = steps_in(&track.t_s, &heave);
-        self.0.push(Worn { topic: topic.to_owned(), heave, steps, t_s: track.t_s.clone(), clock: None });
+        self.0.push(Worn {
+            topic: topic.to_owned(),
+            heave,
+            steps,
+            t_s: track.t_s.clone(),
+            clock: None,
+        });
     }
 
     /// Compares every carrier's clock with the rath's, by the heave that the carriers give it, and puts right what differs *between*
     /// carriers. What all have in common cannot be told from the lag of the load behind the shoulders: it stays.
     pub fn align(&mut self, motion: &Motion) -> Vec<Quality> {
         let seen = &motion.inputs;
-        let Some(rate_hz) = period_s(&seen.t_s).map(|p| 1.0 / p) else { return Vec::new() };
-        let Some(heave) = gait_band(&seen.support_ratio, rate_hz) else { return Vec::new() };
+        let Some(rate_hz) = period_s(&seen.t_s).map(|p| 1.0 / p) else {
+            return Vec::new();
+        };
+        let Some(heave) = gait_band(&seen.support_ratio, rate_hz) else {
+            return Vec::new();
+        };
         let clocks: Vec<Option<Clock>> = self
             .0
             .iter()
@@ -72,14 +98,20 @@ impl Carriers {
         }
         let middle = known.iter().map(|c| c.at_s).sum::<f64>() / known.len() as f64;
         let lag = |c: &Clock| c.reference_s(middle) - middle;
-        let (low, high) = known.iter().map(lag).fold((f64::MAX, f64::MIN), |(a, b), x| (a.min(x), b.max(x)));
+        let (low, high) = known
+            .iter()
+            .map(lag)
+            .fold((f64::MAX, f64::MIN), |(a, b), x| (a.min(x), b.max(x)));
         if high - low < CLOCK_S {
             return Vec::new();
         }
         let common = known.iter().map(lag).sum::<f64>() / known.len() as f64;
         let mut out = Vec::new();
         for (worn, clock) in self.0.iter_mut().zip(known) {
-            let own = Clock { offset_s: clock.offset_s - common, ..clock };
+            let own = Clock {
+                offset_s: clock.offset_s - common,
+                ..clock
+            };
             out.push(remark(
                 &worn.topic,
                 "clock_offset",
@@ -97,22 +129,40 @@ impl Carriers {
 
     /// Phases on one time axis, rad, for those who walk; `None` for fewer than two.
     pub fn phases(&self) -> Option<(Vec<f64>, Vec<Vec<f64>>)> {
-        let walking: Vec<(&Worn, &Steps)> = self.0.iter().filter_map(|w| Some((w, w.steps.as_ref().ok()?))).collect();
+        let walking: Vec<(&Worn, &Steps)> = self
+            .0
+            .iter()
+            .filter_map(|w| Some((w, w.steps.as_ref().ok()?)))
+            .collect();
         if walking.len() < 2 {
             return None;
         }
         let times: Vec<Vec<f64>> = walking
             .iter()
-            .map(|(worn, s)| s.t_s.iter().map(|t| worn.clock.map_or(*t, |c| c.reference_s(*t))).collect())
+            .map(|(worn, s)| {
+                s.t_s
+                    .iter()
+                    .map(|t| worn.clock.map_or(*t, |c| c.reference_s(*t)))
+                    .collect()
+            })
             .collect();
         let start = times.iter().map(|t| t[0]).fold(f64::MIN, f64::max);
-        let end = times.iter().map(|t| t[t.len() - 1]).fold(f64::MAX, f64::min);
+        let end = times
+            .iter()
+            .map(|t| t[t.len() - 1])
+            .fold(f64::MAX, f64::min);
         let step = period_s(&walking[0].1.t_s)?;
         if end - start < 1.0 {
             return None;
         }
-        let axis: Vec<f64> = (0..=((end - start) / step) as usize).map(|k| start + k as f64 * step).collect();
-        let phases = walking.iter().zip(&times).map(|((_, s), t)| interpolate(t, &s.phase_rad, &axis)).collect();
+        let axis: Vec<f64> = (0..=((end - start) / step) as usize)
+            .map(|k| start + k as f64 * step)
+            .collect();
+        let phases = walking
+            .iter()
+            .zip(&times)
+            .map(|((_, s), t)| interpolate(t, &s.phase_rad, &axis))
+            .collect();
         Some((axis, phases))
     }
 
@@ -127,34 +177,68 @@ impl Carriers {
 
     /// Steps per second: mean over carriers, `per` carrier.
     pub fn step_rate(&self) -> Option<Value> {
-        let walking: Vec<&Steps> = self.0.iter().filter_map(|w| w.steps.as_ref().ok()).collect();
+        let walking: Vec<&Steps> = self
+            .0
+            .iter()
+            .filter_map(|w| w.steps.as_ref().ok())
+            .collect();
         if walking.is_empty() {
             return None;
         }
         let n = walking.len() as f64;
         let mean = walking.iter().map(|s| s.cadence_hz).sum::<f64>() / n;
-        let half = walking.iter().map(|s| s.cadence_ci95_hz.powi(2)).sum::<f64>().sqrt() / n;
-        let value = Value::number(mean).per(walking.iter().map(|s| s.cadence_hz).collect()).source("imu").ci95(mean - half, mean + half);
-        Some(Value { unit: "Hz", ..value })
+        let half = walking
+            .iter()
+            .map(|s| s.cadence_ci95_hz.powi(2))
+            .sum::<f64>()
+            .sqrt()
+            / n;
+        let value = Value::number(mean)
+            .per(walking.iter().map(|s| s.cadence_hz).collect())
+            .source("imu")
+            .ci95(mean - half, mean + half);
+        Some(Value {
+            unit: "Hz",
+            ..value
+        })
     }
 
     /// Steps of the first who walks, s.
     pub fn first_steps(&self) -> Option<&[f64]> {
-        self.0.iter().find_map(|w| w.steps.as_ref().ok()).map(|s| &s.step_s[..])
+        self.0
+            .iter()
+            .find_map(|w| w.steps.as_ref().ok())
+            .map(|s| &s.step_s[..])
     }
 
     /// Every step.
     pub fn events(&self) -> Vec<Event> {
         let of = |worn: &Worn| -> Vec<Event> {
-            let Ok(found) = &worn.steps else { return Vec::new() };
-            found.step_s.iter().map(|t| Event { t_s: *t, kind: "step", what: worn.topic.clone() }).collect()
+            let Ok(found) = &worn.steps else {
+                return Vec::new();
+            };
+            found
+                .step_s
+                .iter()
+                .map(|t| Event {
+                    t_s: *t,
+                    kind: "step",
+                    what: worn.topic.clone(),
+                })
+                .collect()
         };
         self.0.iter().flat_map(of).collect()
     }
 
     /// Who does not walk, and why.
     pub fn quality(&self) -> Vec<Quality> {
-        let silent = |w: &Worn| Some(remark(&w.topic, "no_steps", w.steps.as_ref().err()?.to_string()));
+        let silent = |w: &Worn| {
+            Some(remark(
+                &w.topic,
+                "no_steps",
+                w.steps.as_ref().err()?.to_string(),
+            ))
+        };
         self.0.iter().filter_map(silent).collect()
     }
 }

@@ -43,9 +43,24 @@ const ERRORS: &[(&str, &str)] = &[
 
 /// Fields of a truth's topic: orientation and height, in the message types that hold them.
 const ORIENTATION: &[[&str; 4]] = &[
-    ["pose.orientation.x", "pose.orientation.y", "pose.orientation.z", "pose.orientation.w"],
-    ["pose.pose.orientation.x", "pose.pose.orientation.y", "pose.pose.orientation.z", "pose.pose.orientation.w"],
-    ["orientation.x", "orientation.y", "orientation.z", "orientation.w"],
+    [
+        "pose.orientation.x",
+        "pose.orientation.y",
+        "pose.orientation.z",
+        "pose.orientation.w",
+    ],
+    [
+        "pose.pose.orientation.x",
+        "pose.pose.orientation.y",
+        "pose.pose.orientation.z",
+        "pose.pose.orientation.w",
+    ],
+    [
+        "orientation.x",
+        "orientation.y",
+        "orientation.z",
+        "orientation.w",
+    ],
 ];
 const HEIGHT: &[&str] = &["pose.position.z", "pose.pose.position.z", "position_m.z"];
 
@@ -71,16 +86,30 @@ impl Judge {
         let step_s = columns.times(STEP_TOPIC);
         let topic = roles.topic(Role::Truth);
         let sensor = roles.topic(Role::Imu).and_then(|t| columns.track(t));
-        let mut judge = Self { truth: Truth::default(), height: None, sensor, of_body: false, spans_s: Vec::new(), step_s };
+        let mut judge = Self {
+            truth: Truth::default(),
+            height: None,
+            sensor,
+            of_body: false,
+            spans_s: Vec::new(),
+            step_s,
+        };
         if let Some(topic) = topic {
             for fields in ORIENTATION {
-                if let (Some(q), Some(signal)) = (columns.values(topic, *fields), columns.get(topic, fields[0])) {
+                if let (Some(q), Some(signal)) = (
+                    columns.values(topic, *fields),
+                    columns.get(topic, fields[0]),
+                ) {
                     judge.truth = Truth::from_columns(&signal.times_s(columns.start_ns), q);
                 }
             }
             let height = HEIGHT.iter().find_map(|f| columns.get(topic, f));
             judge.height = height.map(|s| (s.times_s(columns.start_ns), s.values.clone()));
-            judge.of_body = recording.info().channels.iter().any(|c| c.topic == topic && c.schema == "rath.State");
+            judge.of_body = recording
+                .info()
+                .channels
+                .iter()
+                .any(|c| c.topic == topic && c.schema == "rath.State");
         }
         judge.spans_s = movement(&recording.info().metadata, recording.info().start_ns);
         (!judge.truth.t_s.is_empty() || !judge.step_s.is_empty()).then_some(judge)
@@ -90,13 +119,22 @@ impl Judge {
     ///
     /// `NAME_error` is estimate minus truth; of words and yes-or-no, 0 for the same and 1 for different. Its interval is the
     /// estimate's, moved along: it covers 0 when the estimate's covers the truth.
-    pub fn errors(&self, motion: Option<&Motion>, carriers: &Carriers, estimated: &Metrics, metrics: &mut Metrics, window: Window) {
+    pub fn errors(
+        &self,
+        motion: Option<&Motion>,
+        carriers: &Carriers,
+        estimated: &Metrics,
+        metrics: &mut Metrics,
+        window: Window,
+    ) {
         let mut out: Vec<(&'static str, Value)> = Vec::new();
         if let (Some(motion), Some(sensor)) = (motion, &self.sensor) {
             self.orientation(motion, sensor, window, &mut out);
         }
         for (name, error) in ERRORS {
-            let (Some(truth), Some(estimate)) = (metrics.get(name), estimated.get(name)) else { continue };
+            let (Some(truth), Some(estimate)) = (metrics.get(name), estimated.get(name)) else {
+                continue;
+            };
             // A metric that came from the sensors itself has no truth beside it.
             if truth.source == "imu" || truth.source.is_empty() {
                 continue;
@@ -106,53 +144,121 @@ impl Judge {
         if !self.step_s.is_empty()
             && let Some(found) = carriers.first_steps()
         {
-            let span = (self.step_s[0] - 0.3, self.step_s[self.step_s.len() - 1] + 0.3);
+            let span = (
+                self.step_s[0] - 0.3,
+                self.step_s[self.step_s.len() - 1] + 0.3,
+            );
             // Steps before the first and after the last true one were not judged by anybody.
-            let inside: Vec<f64> = found.iter().copied().filter(|t| (span.0..=span.1).contains(t)).collect();
+            let inside: Vec<f64> = found
+                .iter()
+                .copied()
+                .filter(|t| (span.0..=span.1).contains(t))
+                .collect();
             let a = agreement(&inside, &self.step_s, 0.25);
             let f1 = Value::number(a.f1).source("imu");
-            let text = format!("{} of {} true and {} found steps within 0.25 s; found {:+.0} ms of the true ones (median)", a.matched, self.step_s.len(), inside.len(), 1e3 * a.offset_s);
-            out.push(("step_f1", Value { unit: "1", reason: Some(text), ..f1 }));
+            let text = format!(
+                "{} of {} true and {} found steps within 0.25 s; found {:+.0} ms of the true ones (median)",
+                a.matched,
+                self.step_s.len(),
+                inside.len(),
+                1e3 * a.offset_s
+            );
+            out.push((
+                "step_f1",
+                Value {
+                    unit: "1",
+                    reason: Some(text),
+                    ..f1
+                },
+            ));
             if let (Some(true_hz), Some(found_hz)) = (rate(&self.step_s), rate(&inside)) {
-                out.push(("step_rate_hz_error", Value { unit: "Hz", ..Value::number(found_hz - true_hz).source("imu") }));
+                out.push((
+                    "step_rate_hz_error",
+                    Value {
+                        unit: "Hz",
+                        ..Value::number(found_hz - true_hz).source("imu")
+                    },
+                ));
             }
         }
         metrics.0.extend(out);
     }
 
-    fn orientation(&self, motion: &Motion, sensor: &Track, window: Window, out: &mut Vec<(&'static str, Value)>) {
+    fn orientation(
+        &self,
+        motion: &Motion,
+        sensor: &Track,
+        window: Window,
+        out: &mut Vec<(&'static str, Value)>,
+    ) {
         if self.truth.t_s.is_empty() {
             return;
         }
-        let spans = if self.spans_s.is_empty() { vec![(window.start_s, window.end_s)] } else { self.spans_s.clone() };
+        let spans = if self.spans_s.is_empty() {
+            vec![(window.start_s, window.end_s)]
+        } else {
+            self.spans_s.clone()
+        };
         let options = motion.settings.orientation;
         let sensor_from_body = motion.body_from_sensor.inverse();
         let live: Vec<_> = causal(sensor, options)
             .earth_from_sensor
             .into_iter()
-            .map(|q| if self.of_body { q * sensor_from_body } else { q })
+            .map(|q| {
+                if self.of_body {
+                    q * sensor_from_body
+                } else {
+                    q
+                }
+            })
             .collect();
         let whole: Vec<_> = motion
             .orientation
             .earth_from_sensor
             .iter()
-            .map(|q| if self.of_body { *q } else { q * motion.body_from_sensor })
+            .map(|q| {
+                if self.of_body {
+                    *q
+                } else {
+                    q * motion.body_from_sensor
+                }
+            })
             .collect();
         let mut push = |name, error: Option<f64>| {
             let value = match error {
                 Some(e) => Value::number(e),
                 None => Value::missing("the truth holds no orientation while the sensor moves"),
             };
-            let text = format!("samples taken to be {:.1} ms old at their stamps", 1e3 * options.latency_s);
+            let text = format!(
+                "samples taken to be {:.1} ms old at their stamps",
+                1e3 * options.latency_s
+            );
             let reason = value.reason.clone().or(Some(text));
-            out.push((name, Value { unit: "deg", reason, ..value.source("imu") }));
+            out.push((
+                name,
+                Value {
+                    unit: "deg",
+                    reason,
+                    ..value.source("imu")
+                },
+            ));
         };
-        push("inclination_error_deg", inclination_error_deg(&sensor.t_s, &live, &self.truth, &spans));
-        push("inclination_error_batch_deg", inclination_error_deg(&motion.inputs.t_s, &whole, &self.truth, &spans));
+        push(
+            "inclination_error_deg",
+            inclination_error_deg(&sensor.t_s, &live, &self.truth, &spans),
+        );
+        push(
+            "inclination_error_batch_deg",
+            inclination_error_deg(&motion.inputs.t_s, &whole, &self.truth, &spans),
+        );
         let Some((t_s, z)) = &self.height else { return };
-        let Some(period_s) = period_s(&motion.inputs.t_s) else { return };
+        let Some(period_s) = period_s(&motion.inputs.t_s) else {
+            return;
+        };
         let height_m = vertical::height(&motion.accel_up_m_per_s2, period_s, vertical::CORNER_HZ);
-        let inner = spans.iter().fold((f64::MAX, f64::MIN), |(a, b), s| (a.min(s.0), b.max(s.1)));
+        let inner = spans
+            .iter()
+            .fold((f64::MAX, f64::MIN), |(a, b), s| (a.min(s.0), b.max(s.1)));
         let clean: (Vec<f64>, Vec<f64>) = t_s.iter().zip(z).filter(|(_, z)| z.is_finite()).unzip();
         // How old the accelerometer's stamps are beside the truth's (the gyroscope's may be older): both heaved alike.
         let own = (&motion.inputs.t_s[..], &height_m[..]);
@@ -174,7 +280,14 @@ impl Judge {
                 ),
                 None => "RMS of the difference over RMS of the truth, both 0.3 to 10 Hz; the clocks could not be compared".into(),
             };
-            out.push(("height_relative_error", Value { unit: "1", reason: Some(text), ..Value::number(e).source("imu") }));
+            out.push((
+                "height_relative_error",
+                Value {
+                    unit: "1",
+                    reason: Some(text),
+                    ..Value::number(e).source("imu")
+                },
+            ));
         }
     }
 }
@@ -186,13 +299,33 @@ fn difference(estimate: &Value, truth: &Value) -> Value {
         (Datum::Number(e), Datum::Number(t)) => {
             let mut v = Value::number(e - t);
             v.ci95 = estimate.ci95.map(|[a, b]| [a - t, b - t]);
-            Value { unit: truth.unit, ..v }
+            Value {
+                unit: truth.unit,
+                ..v
+            }
         }
-        (Datum::Word(e), Datum::Word(t)) => Value { unit: "1", reason: Some(format!("found {e}, true {t}")), ..same(e == t) },
-        (Datum::Bool(e), Datum::Bool(t)) => Value { unit: "1", ..same(e == t) },
-        (Datum::Missing, Datum::Missing) => Value { unit: truth.unit, reason: Some("neither has a value".into()), ..Value::number(0.0) },
-        (Datum::Missing, _) => Value { unit: truth.unit, ..Value::missing("the sensors give no value") },
-        _ => Value { unit: truth.unit, ..Value::missing("the truth has no value") },
+        (Datum::Word(e), Datum::Word(t)) => Value {
+            unit: "1",
+            reason: Some(format!("found {e}, true {t}")),
+            ..same(e == t)
+        },
+        (Datum::Bool(e), Datum::Bool(t)) => Value {
+            unit: "1",
+            ..same(e == t)
+        },
+        (Datum::Missing, Datum::Missing) => Value {
+            unit: truth.unit,
+            reason: Some("neither has a value".into()),
+            ..Value::number(0.0)
+        },
+        (Datum::Missing, _) => Value {
+            unit: truth.unit,
+            ..Value::missing("the sensors give no value")
+        },
+        _ => Value {
+            unit: truth.unit,
+            ..Value::missing("the truth has no value")
+        },
     };
     value.source = estimate.source.clone();
     value
@@ -207,7 +340,9 @@ fn rate(t_s: &[f64]) -> Option<f64> {
 /// The spans that count, s since `start_ns`: metadata record `broad`, key `movement`, a list of [from, to] in nanoseconds.
 fn movement(records: &Records, start_ns: i64) -> Vec<(f64, f64)> {
     let text = records.get("broad").and_then(|m| m.get("movement"));
-    let spans: Vec<[i64; 2]> = text.and_then(|t| serde_json::from_str(t).ok()).unwrap_or_default();
+    let spans: Vec<[i64; 2]> = text
+        .and_then(|t| serde_json::from_str(t).ok())
+        .unwrap_or_default();
     let s = |t: i64| (i128::from(t) - i128::from(start_ns)) as f64 / 1e9;
     spans.iter().map(|[a, b]| (s(*a), s(*b))).collect()
 }
@@ -219,7 +354,10 @@ mod tests {
 
     #[test]
     fn movement_spans_count_from_the_first_message() {
-        let record = BTreeMap::from([("movement".to_owned(), "[[2000000000, 3500000000]]".to_owned())]);
+        let record = BTreeMap::from([(
+            "movement".to_owned(),
+            "[[2000000000, 3500000000]]".to_owned(),
+        )]);
         let records = BTreeMap::from([("broad".to_owned(), record)]);
         assert_eq!(movement(&records, 1_000_000_000), [(1.0, 2.5)]);
         assert!(movement(&Records::new(), 0).is_empty());
@@ -230,7 +368,10 @@ mod tests {
         let e = difference(&Value::number(2.5).ci95(2.0, 3.0), &Value::number(2.2));
         assert!((e.as_f64().unwrap() - 0.3).abs() < 1e-12);
         assert!((e.ci95.unwrap()[0] + 0.2).abs() < 1e-12);
-        let word = difference(&Value::word("quiet", String::new()), &Value::word("mixed", String::new()));
+        let word = difference(
+            &Value::word("quiet", String::new()),
+            &Value::word("mixed", String::new()),
+        );
         assert_eq!(word.as_f64(), Some(1.0));
     }
 }

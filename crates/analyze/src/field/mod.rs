@@ -27,8 +27,16 @@ use carriers::Carriers;
 use judge::Judge;
 
 /// The six columns of an inertial message.
-const GYRO: [&str; 3] = ["angular_velocity.x", "angular_velocity.y", "angular_velocity.z"];
-const ACCEL: [&str; 3] = ["linear_acceleration.x", "linear_acceleration.y", "linear_acceleration.z"];
+const GYRO: [&str; 3] = [
+    "angular_velocity.x",
+    "angular_velocity.y",
+    "angular_velocity.z",
+];
+const ACCEL: [&str; 3] = [
+    "linear_acceleration.x",
+    "linear_acceleration.y",
+    "linear_acceleration.z",
+];
 /// ROS's mark of a field that the sensor does not have.
 const GYRO_MARK: &str = "angular_velocity_covariance[0]";
 
@@ -58,14 +66,22 @@ impl Field {
     ///
     /// # Errors
     /// Where the file cannot be read.
-    pub fn read(recording: &Recording, roles: &Roles, gravity_m_per_s2: f64, truth: bool) -> Result<Self, ReadError> {
+    pub fn read(
+        recording: &Recording,
+        roles: &Roles,
+        gravity_m_per_s2: f64,
+        truth: bool,
+    ) -> Result<Self, ReadError> {
         let topics: Vec<&str> = [Role::Imu, Role::Carriers, Role::Beats, Role::Truth]
             .iter()
             .flat_map(|r| roles.patterns(*r))
             .map(String::as_str)
             .filter(|t| recording.info().channels.iter().any(|c| c.topic == *t))
             .collect();
-        let imus = roles.patterns(Role::Imu).iter().chain(roles.patterns(Role::Carriers));
+        let imus = roles
+            .patterns(Role::Imu)
+            .iter()
+            .chain(roles.patterns(Role::Carriers));
         let mut field = Self::default();
         field.listen(recording)?;
         if topics.is_empty() || (imus.clone().next().is_none() && !truth) {
@@ -74,7 +90,11 @@ impl Field {
         let wanted = |path: &str| {
             let of = |t: &&str| path.strip_prefix(*t).and_then(|p| p.strip_prefix('.'));
             topics.iter().find_map(of).is_some_and(|field| {
-                GYRO.contains(&field) || ACCEL.contains(&field) || field == GYRO_MARK || judge::wants(field) || field == "number"
+                GYRO.contains(&field)
+                    || ACCEL.contains(&field)
+                    || field == GYRO_MARK
+                    || judge::wants(field)
+                    || field == "number"
             }) || (truth && path.starts_with(judge::STEP_TOPIC))
         };
         let (signals, _) = recording.signals(&wanted)?;
@@ -83,7 +103,9 @@ impl Field {
         let places = place::places(recording);
         let simulated = place::is_simulated(recording);
         for topic in imus {
-            let Some(track) = columns.track(topic) else { continue };
+            let Some(track) = columns.track(topic) else {
+                continue;
+            };
             let here = places.get(topic).copied().unwrap_or_default();
             let is_rath = roles.topic(Role::Imu) == Some(topic.as_str());
             if is_rath {
@@ -112,20 +134,35 @@ impl Field {
     fn listen(&mut self, recording: &Recording) -> Result<(), ReadError> {
         match sound::sound_beats(recording)? {
             Some((_, Ok(found))) => (self.beat_s, self.beat_source) = (found.beat_s, "sound"),
-            Some((topic, Err(error))) => self.quality.push(remark(&topic, "no_beat", error.to_string())),
+            Some((topic, Err(error))) => {
+                self.quality
+                    .push(remark(&topic, "no_beat", error.to_string()))
+            }
             None => {}
         }
         Ok(())
     }
 
-    fn motion(&mut self, columns: &Columns, topic: &str, track: &Track, here: place::Place, g: f64, simulated: bool) {
+    fn motion(
+        &mut self,
+        columns: &Columns,
+        topic: &str,
+        track: &Track,
+        here: place::Place,
+        g: f64,
+        simulated: bool,
+    ) {
         if columns.first(topic, GYRO_MARK) == Some(-1.0) {
-            self.no_motion = Some(format!("{topic} has no gyroscope (angular_velocity_covariance[0] is -1)"));
+            self.no_motion = Some(format!(
+                "{topic} has no gyroscope (angular_velocity_covariance[0] is -1)"
+            ));
             return;
         }
         let settings = Settings {
             orientation: options(simulated),
-            mounting: here.body_from_sensor.map_or(Mounting::Levelled, Mounting::Known),
+            mounting: here
+                .body_from_sensor
+                .map_or(Mounting::Levelled, Mounting::Known),
             lever_m: here.lever_m,
             gravity_m_per_s2: g,
             ..Settings::default()
@@ -185,10 +222,21 @@ impl Field {
 
     /// Adds to the metrics what only the sensors know: intervals, reasons, step rate, and errors against the truth.
     pub fn finish(&self, metrics: &mut Metrics, window: Window) {
-        let asked = self.filled.motion || self.filled.phases || self.judge.is_some() || self.beat_source == "sound";
-        let estimated = if asked { self.estimated(window) } else { Metrics::default() };
+        let asked = self.filled.motion
+            || self.filled.phases
+            || self.judge.is_some()
+            || self.beat_source == "sound";
+        let estimated = if asked {
+            self.estimated(window)
+        } else {
+            Metrics::default()
+        };
         for (name, value) in &mut metrics.0 {
-            let ours = if rath::gives(name) { self.filled.motion } else { self.filled.phases && carriers::gives(name) };
+            let ours = if rath::gives(name) {
+                self.filled.motion
+            } else {
+                self.filled.phases && carriers::gives(name)
+            };
             if ours && let Some(v) = estimated.get(name) {
                 *value = v.clone();
             }
@@ -203,7 +251,10 @@ impl Field {
         }
         if self.beat_source == "sound"
             && let Some(v) = estimated.get("beat_hz")
-            && let Some((_, value)) = metrics.0.iter_mut().find(|(name, value)| *name == "beat_hz" && value.as_f64().is_none())
+            && let Some((_, value)) = metrics
+                .0
+                .iter_mut()
+                .find(|(name, value)| *name == "beat_hz" && value.as_f64().is_none())
         {
             *value = v.clone();
         }
@@ -211,7 +262,13 @@ impl Field {
             metrics.0.push(("step_rate_hz", rate));
         }
         if let Some(judge) = &self.judge {
-            judge.errors(self.motion.as_ref(), &self.carriers, &estimated, metrics, window);
+            judge.errors(
+                self.motion.as_ref(),
+                &self.carriers,
+                &estimated,
+                metrics,
+                window,
+            );
         }
     }
 
@@ -230,7 +287,15 @@ impl Field {
         }
         if let Some((hz, half)) = tempo_of(&self.beat_s) {
             out.0.retain(|(name, _)| *name != "beat_hz");
-            out.0.push(("beat_hz", Value { unit: "Hz", ..Value::number(hz).source(self.beat_source).ci95(hz - half, hz + half) }));
+            out.0.push((
+                "beat_hz",
+                Value {
+                    unit: "Hz",
+                    ..Value::number(hz)
+                        .source(self.beat_source)
+                        .ci95(hz - half, hz + half)
+                },
+            ));
         }
         out
     }
@@ -239,14 +304,22 @@ impl Field {
     pub fn events(&self) -> Vec<Event> {
         let mut out = self.carriers.events();
         if self.beat_source == "sound" {
-            out.extend(self.beat_s.iter().map(|t| Event { t_s: *t, kind: "beat", what: "heard".into() }));
+            out.extend(self.beat_s.iter().map(|t| Event {
+                t_s: *t,
+                kind: "beat",
+                what: "heard".into(),
+            }));
         }
         if let (Some(motion), true) = (&self.motion, self.filled.motion) {
             let s = &motion.inputs;
             out.extend(
                 unloadings(&s.t_s, &s.support_ratio)
                     .into_iter()
-                    .map(|t_s| Event { t_s, kind: "unloaded", what: "support falls below 0.05 of the weight".into() }),
+                    .map(|t_s| Event {
+                        t_s,
+                        kind: "unloaded",
+                        what: "support falls below 0.05 of the weight".into(),
+                    }),
             );
         }
         out
@@ -278,16 +351,29 @@ pub fn unloadings(t_s: &[f64], support_ratio: &[f64]) -> Vec<f64> {
 
 /// A simulated sensor's samples are true at their stamps.
 fn options(simulated: bool) -> Options {
-    if simulated { Options::without_latency() } else { Options::default() }
+    if simulated {
+        Options::without_latency()
+    } else {
+        Options::default()
+    }
 }
 
 fn about_the_rath(topic: &str) -> bool {
     let topic = topic.to_lowercase();
-    ["rath", "palanquin", "palki", "pole", "load"].iter().any(|word| topic.contains(word))
+    ["rath", "palanquin", "palki", "pole", "load"]
+        .iter()
+        .any(|word| topic.contains(word))
 }
 
 pub(super) fn remark(topic: &str, kind: &'static str, text: String) -> Quality {
-    Quality { topic: topic.to_owned(), kind, count: 1, t_s: None, text, loss: false }
+    Quality {
+        topic: topic.to_owned(),
+        kind,
+        count: 1,
+        t_s: None,
+        text,
+        loss: false,
+    }
 }
 
 /// Signals by topic.
@@ -298,7 +384,9 @@ struct Columns {
 
 impl Columns {
     fn get(&self, topic: &str, field: &str) -> Option<&Signal> {
-        self.signals.iter().find(|s| s.path.strip_prefix(topic).and_then(|p| p.strip_prefix('.')) == Some(field))
+        self.signals
+            .iter()
+            .find(|s| s.path.strip_prefix(topic).and_then(|p| p.strip_prefix('.')) == Some(field))
     }
 
     fn first(&self, topic: &str, field: &str) -> Option<f64> {
@@ -306,7 +394,10 @@ impl Columns {
     }
 
     fn values<const N: usize>(&self, topic: &str, fields: [&str; N]) -> Option<[&[f64]; N]> {
-        let found: Vec<&[f64]> = fields.iter().filter_map(|f| Some(&self.get(topic, f)?.values[..])).collect();
+        let found: Vec<&[f64]> = fields
+            .iter()
+            .filter_map(|f| Some(&self.get(topic, f)?.values[..]))
+            .collect();
         found.try_into().ok()
     }
 
@@ -320,8 +411,17 @@ impl Columns {
 
     /// Times of a topic's messages, s.
     fn times(&self, topic: &str) -> Vec<f64> {
-        let of = |s: &&Signal| s.path.strip_prefix(topic).is_some_and(|p| p.starts_with('.'));
-        let mut t_s = self.signals.iter().find(of).map(|s| seconds_since(&s.times_ns, self.start_ns)).unwrap_or_default();
+        let of = |s: &&Signal| {
+            s.path
+                .strip_prefix(topic)
+                .is_some_and(|p| p.starts_with('.'))
+        };
+        let mut t_s = self
+            .signals
+            .iter()
+            .find(of)
+            .map(|s| seconds_since(&s.times_ns, self.start_ns))
+            .unwrap_or_default();
         t_s.dedup();
         t_s
     }

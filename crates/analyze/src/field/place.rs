@@ -17,30 +17,49 @@ pub struct Place {
 /// Whether the recording's own record says that it was simulated: its samples are true at their stamps.
 pub fn is_simulated(recording: &Recording) -> bool {
     let rath = recording.info().metadata.get("rath");
-    rath.and_then(|m| m.get("source")).is_some_and(|s| s == "sim")
+    rath.and_then(|m| m.get("source"))
+        .is_some_and(|s| s == "sim")
 }
 
 /// Places by topic, from the attachment `scene.toml` (`effects.imu.sensors`: `on`, `name`, `place_m`, `mounting_roll_pitch_yaw_deg`).
 ///
 /// Empty where there is no such attachment or it cannot be read; sensors then count as levelled and at the centre of mass.
 pub fn places(recording: &Recording) -> HashMap<String, Place> {
-    let scene = recording.attachment("scene.toml").and_then(|bytes| String::from_utf8(bytes).ok());
+    let scene = recording
+        .attachment("scene.toml")
+        .and_then(|bytes| String::from_utf8(bytes).ok());
     scene.map(|text| from_scene(&text)).unwrap_or_default()
 }
 
 fn from_scene(text: &str) -> HashMap<String, Place> {
     let mut out = HashMap::new();
-    let Ok(scene) = text.parse::<toml::Table>() else { return out };
-    let sensors = scene.get("effects").and_then(|e| e.get("imu")).and_then(|i| i.get("sensors")).and_then(|s| s.as_array());
+    let Ok(scene) = text.parse::<toml::Table>() else {
+        return out;
+    };
+    let sensors = scene
+        .get("effects")
+        .and_then(|e| e.get("imu"))
+        .and_then(|i| i.get("sensors"))
+        .and_then(|s| s.as_array());
     for sensor in sensors.into_iter().flatten() {
         let word = |key: &str| sensor.get(key).and_then(|v| v.as_str());
-        let Some(name) = word("name").or_else(|| word("on")).or(Some("rath")) else { continue };
+        let Some(name) = word("name").or_else(|| word("on")).or(Some("rath")) else {
+            continue;
+        };
         let triple = |key: &str| -> Option<[f64; 3]> {
-            let number = |v: &toml::Value| v.as_float().or_else(|| v.as_integer().map(|i| i as f64));
-            let values: Vec<f64> = sensor.get(key)?.as_array()?.iter().filter_map(number).collect();
+            let number =
+                |v: &toml::Value| v.as_float().or_else(|| v.as_integer().map(|i| i as f64));
+            let values: Vec<f64> = sensor
+                .get(key)?
+                .as_array()?
+                .iter()
+                .filter_map(number)
+                .collect();
             values.try_into().ok()
         };
-        let [roll, pitch, yaw] = triple("mounting_roll_pitch_yaw_deg").unwrap_or_default().map(f64::to_radians);
+        let [roll, pitch, yaw] = triple("mounting_roll_pitch_yaw_deg")
+            .unwrap_or_default()
+            .map(f64::to_radians);
         let place = Place {
             lever_m: triple("place_m").unwrap_or_default(),
             body_from_sensor: Some(UnitQuaternion::from_euler_angles(roll, pitch, yaw)),

@@ -28,26 +28,42 @@ const MOST_SAMPLES: usize = 3600 * 48_000;
 ///
 /// # Errors
 /// Where the file cannot be read.
-pub fn sound_beats(recording: &Recording) -> Result<Option<(String, Result<Beats, BeatError>)>, ReadError> {
+pub fn sound_beats(
+    recording: &Recording,
+) -> Result<Option<(String, Result<Beats, BeatError>)>, ReadError> {
     let info = recording.info();
-    let Some(channel) = info.channels.iter().find(|c| c.schema == "foxglove.RawAudio" && c.encoding == "protobuf") else {
+    let Some(channel) = info
+        .channels
+        .iter()
+        .find(|c| c.schema == "foxglove.RawAudio" && c.encoding == "protobuf")
+    else {
         return Ok(None);
     };
     let (mut sound, mut rate, mut first_ns) = (Vec::new(), 0u32, None);
     recording.messages(&|topic| topic == channel.topic, &mut |message| {
-        let Ok(audio) = RawAudio::decode(message.data) else { return };
+        let Ok(audio) = RawAudio::decode(message.data) else {
+            return;
+        };
         let channels = audio.number_of_channels.max(1) as usize;
-        if audio.format != "pcm-s16" || sound.len() > MOST_SAMPLES || (rate != 0 && rate != audio.sample_rate) {
+        if audio.format != "pcm-s16"
+            || sound.len() > MOST_SAMPLES
+            || (rate != 0 && rate != audio.sample_rate)
+        {
             return;
         }
         rate = audio.sample_rate;
         first_ns.get_or_insert(message.log_time_ns);
         sound.extend(audio.data.chunks_exact(2 * channels).map(|frame| {
-            let sum: f64 = frame.chunks_exact(2).map(|b| f64::from(i16::from_le_bytes([b[0], b[1]]))).sum();
+            let sum: f64 = frame
+                .chunks_exact(2)
+                .map(|b| f64::from(i16::from_le_bytes([b[0], b[1]])))
+                .sum();
             sum / channels as f64
         }));
     })?;
-    let Some(first_ns) = first_ns else { return Ok(None) };
+    let Some(first_ns) = first_ns else {
+        return Ok(None);
+    };
     let start_s = (i128::from(first_ns) - i128::from(info.start_ns)) as f64 / 1e9;
     let found = beats(&sound, f64::from(rate)).map(|mut b| {
         b.beat_s.iter_mut().for_each(|t| *t += start_s);

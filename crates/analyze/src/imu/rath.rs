@@ -62,9 +62,9 @@ impl Default for Budget {
             tilt_offset_rad: 0.11f64.to_radians(),
             tilt_wander_rad: 0.05f64.to_radians(),
             angle_scale: 0.003,
-            height_scale: 0.005,
+            height_scale: 0.01,
             height_wander_m: 0.002,
-            support_offset: 0.004,
+            support_offset: 0.008,
             support_scale: 0.002,
             support_noise: 0.013,
         }
@@ -157,14 +157,18 @@ pub fn motion(track: &Track, settings: &Settings) -> Result<Motion, MotionError>
     }
     let period_s = track.period_s().unwrap_or(1.0);
     if period_s > 1.0 / 25.0 {
-        return Err(MotionError::TooSlow { found_hz: 1.0 / period_s });
+        return Err(MotionError::TooSlow {
+            found_hz: 1.0 / period_s,
+        });
     }
     let track = even(track, period_s);
     let mut estimate = orientation::batch(&track, settings.orientation);
     let found = mean_specific_force(&track, &estimate);
     let g = settings.gravity_m_per_s2;
     if !(0.8 * g..=1.2 * g).contains(&found) {
-        return Err(MotionError::NoGravity { found_m_per_s2: found });
+        return Err(MotionError::NoGravity {
+            found_m_per_s2: found,
+        });
     }
     let body_from_sensor = match settings.mounting {
         Mounting::Known(rotation) => rotation,
@@ -179,7 +183,13 @@ pub fn motion(track: &Track, settings: &Settings) -> Result<Motion, MotionError>
         *q *= sensor_from_body;
     }
     let body = track.rotated(&body_from_sensor);
-    let force = at_centre_of_mass(&body, &estimate, &body_from_sensor, settings.lever_m, period_s);
+    let force = at_centre_of_mass(
+        &body,
+        &estimate,
+        &body_from_sensor,
+        settings.lever_m,
+        period_s,
+    );
     let n = body.len();
     let (mut roll_rad, mut pitch_rad) = (Vec::with_capacity(n), Vec::with_capacity(n));
     let (mut support_ratio, mut accel_up) = (Vec::with_capacity(n), Vec::with_capacity(n));
@@ -212,7 +222,13 @@ pub fn motion(track: &Track, settings: &Settings) -> Result<Motion, MotionError>
     inputs.sources.attitude = "imu".into();
     inputs.sources.height = "imu".into();
     inputs.sources.forces = "imu".into();
-    Ok(Motion { inputs, accel_up_m_per_s2: accel_up, orientation: estimate, body_from_sensor, settings: *settings })
+    Ok(Motion {
+        inputs,
+        accel_up_m_per_s2: accel_up,
+        orientation: estimate,
+        body_from_sensor,
+        settings: *settings,
+    })
 }
 
 /// The same samples on an even grid with the track's own period, straight between samples.
@@ -235,7 +251,9 @@ fn even(track: &Track, period_s: f64) -> Track {
             let x: Vec<f64> = v.iter().map(|s| s[a]).collect();
             interpolate(&track.t_s, &x, &grid)
         });
-        (0..n).map(|k| [axes[0][k], axes[1][k], axes[2][k]]).collect()
+        (0..n)
+            .map(|k| [axes[0][k], axes[1][k], axes[2][k]])
+            .collect()
     };
     Track {
         gyro_rad_per_s: resample(&track.gyro_rad_per_s),
@@ -261,17 +279,27 @@ fn level(estimate: &Estimate) -> UnitQuaternion<f64> {
         up += q.inverse() * Vector3::z();
     }
     // On its head: half a turn about x; there is no shortest turn.
-    UnitQuaternion::rotation_between(&up, &Vector3::z())
-        .unwrap_or_else(|| UnitQuaternion::from_axis_angle(&Vector3::x_axis(), std::f64::consts::PI))
+    UnitQuaternion::rotation_between(&up, &Vector3::z()).unwrap_or_else(|| {
+        UnitQuaternion::from_axis_angle(&Vector3::x_axis(), std::f64::consts::PI)
+    })
 }
 
 /// The turn about z that takes the direction of the first walking to x: the mean horizontal acceleration over the two seconds after the
 /// first rest. Identity when they never stood still or never set off.
-fn forward(track: &Track, estimate: &Estimate, level: &UnitQuaternion<f64>, g: f64) -> UnitQuaternion<f64> {
+fn forward(
+    track: &Track,
+    estimate: &Estimate,
+    level: &UnitQuaternion<f64>,
+    g: f64,
+) -> UnitQuaternion<f64> {
     let Some(still) = estimate.rest.iter().position(|r| *r) else {
         return UnitQuaternion::identity();
     };
-    let Some(off) = estimate.rest[still..].iter().position(|r| !*r).map(|k| still + k) else {
+    let Some(off) = estimate.rest[still..]
+        .iter()
+        .position(|r| !*r)
+        .map(|k| still + k)
+    else {
         return UnitQuaternion::identity();
     };
     let end = track.t_s.partition_point(|t| *t < track.t_s[off] + 2.0);
@@ -334,7 +362,10 @@ const DRAWS: usize = 40;
 const SEED: u64 = 0x7261_7468;
 /// Metrics that an inertial sensor cannot give, and why.
 const BEYOND: &[(&str, &str)] = &[
-    ("z_mean_m", "an inertial sensor does not see the mean height"),
+    (
+        "z_mean_m",
+        "an inertial sensor does not see the mean height",
+    ),
     ("rms_yaw_deg", "heading without a magnetometer drifts"),
 ];
 /// Metrics that rest on the motion columns: those that get an interval.
@@ -366,21 +397,31 @@ pub fn gives(name: &str) -> bool {
 pub fn metrics(motion: &Motion, window: Window) -> Metrics {
     let mut out = metrics_of(&motion.inputs, window, gives);
     let draws: Vec<Metrics> = (0..DRAWS)
-        .map(|k| metrics_of(&varied(motion, window, k as u64), Window::ALL, |name| gives(name) && name != "mechanism"))
+        .map(|k| {
+            metrics_of(&varied(motion, window, k as u64), Window::ALL, |name| {
+                gives(name) && name != "mechanism"
+            })
+        })
         .collect();
     for (name, value) in &mut out.0 {
         if let Some((_, why)) = BEYOND.iter().find(|(n, _)| n == name) {
-            *value = Value { unit: value.unit, ..Value::missing(*why).source("imu") };
+            *value = Value {
+                unit: value.unit,
+                ..Value::missing(*why).source("imu")
+            };
             continue;
         }
-        let Datum::Number(x) = value.datum else { continue };
+        let Datum::Number(x) = value.datum else {
+            continue;
+        };
         let drawn: Vec<f64> = draws.iter().filter_map(|d| d.number(name)).collect();
         if drawn.len() < DRAWS / 2 {
             continue;
         }
         let mean = drawn.iter().sum::<f64>() / drawn.len() as f64;
         // About the estimate, not about the draws' mean: what the draws add on average is theirs.
-        let variance = drawn.iter().map(|d| (d - mean).powi(2)).sum::<f64>() / (drawn.len() - 1) as f64;
+        let variance =
+            drawn.iter().map(|d| (d - mean).powi(2)).sum::<f64>() / (drawn.len() - 1) as f64;
         let half = 1.96 * variance.sqrt();
         value.ci95 = Some([x - half, x + half]);
     }
@@ -393,25 +434,47 @@ fn varied(motion: &Motion, window: Window, draw: u64) -> Inputs {
     let mut random = Random(SEED ^ (draw.wrapping_add(1)).wrapping_mul(0x9e37_79b9_7f4a_7c15));
     let inputs = &motion.inputs;
     let range = window.range(&inputs.t_s);
-    let (Some(first), Some(last)) = (inputs.t_s[range.clone()].first(), inputs.t_s[range.clone()].last()) else {
-        return Inputs { gravity_m_per_s2: inputs.gravity_m_per_s2, ..Inputs::default() };
+    let (Some(first), Some(last)) = (
+        inputs.t_s[range.clone()].first(),
+        inputs.t_s[range.clone()].last(),
+    ) else {
+        return Inputs {
+            gravity_m_per_s2: inputs.gravity_m_per_s2,
+            ..Inputs::default()
+        };
     };
     let step_s = 0.033;
     let phase = random.uniform() * step_s;
     let n = ((last - first - phase) / step_s).max(0.0) as usize + 1;
-    let t_s: Vec<f64> = (0..n.min(range.len())).map(|k| first + phase + k as f64 * step_s).collect();
+    let t_s: Vec<f64> = (0..n.min(range.len()))
+        .map(|k| first + phase + k as f64 * step_s)
+        .collect();
     let pick = |x: &[f64]| interpolate(&inputs.t_s[range.clone()], &x[range.clone()], &t_s);
     let angle = |x: &[f64], random: &mut Random| -> Vec<f64> {
-        let (offset, scale) = (budget.tilt_offset_rad * random.normal(), 1.0 + budget.angle_scale * random.normal());
+        let (offset, scale) = (
+            budget.tilt_offset_rad * random.normal(),
+            1.0 + budget.angle_scale * random.normal(),
+        );
         let wander = random.wander(t_s.len(), step_s, budget.tilt_wander_rad);
-        pick(x).iter().zip(wander).map(|(x, w)| scale * x + offset + w).collect()
+        pick(x)
+            .iter()
+            .zip(wander)
+            .map(|(x, w)| scale * x + offset + w)
+            .collect()
     };
     let roll_rad = angle(&inputs.roll_rad, &mut random);
     let pitch_rad = angle(&inputs.pitch_rad, &mut random);
     let scale = 1.0 + budget.height_scale * random.normal();
     let wander = random.wander(t_s.len(), step_s, budget.height_wander_m);
-    let height_m = pick(&inputs.height_m).iter().zip(wander).map(|(z, w)| scale * z + w).collect();
-    let (offset, scale) = (budget.support_offset * random.normal(), 1.0 + budget.support_scale * random.normal());
+    let height_m = pick(&inputs.height_m)
+        .iter()
+        .zip(wander)
+        .map(|(z, w)| scale * z + w)
+        .collect();
+    let (offset, scale) = (
+        budget.support_offset * random.normal(),
+        1.0 + budget.support_scale * random.normal(),
+    );
     let support_ratio = pick(&inputs.support_ratio)
         .iter()
         .map(|s| scale * s + offset + budget.support_noise * random.normal())
@@ -482,9 +545,13 @@ mod tests {
             let up = -swing * 4.0 * w * w * (2.0 * w * t).sin() + g;
             let earth_from_body = UnitQuaternion::from_axis_angle(&Vector3::x_axis(), phi);
             let r = Vector3::from(lever);
-            let force = earth_from_body.inverse() * Vector3::new(0.0, 0.0, up) + alpha.cross(&r) + rate.cross(&rate.cross(&r));
+            let force = earth_from_body.inverse() * Vector3::new(0.0, 0.0, up)
+                + alpha.cross(&r)
+                + rate.cross(&rate.cross(&r));
             track.t_s.push(t);
-            track.gyro_rad_per_s.push((mount.inverse() * rate + Vector3::new(0.004, -0.003, 0.002)).into());
+            track
+                .gyro_rad_per_s
+                .push((mount.inverse() * rate + Vector3::new(0.004, -0.003, 0.002)).into());
             track.accel_m_per_s2.push((mount.inverse() * force).into());
             roll.push(phi);
             height.push(z);
@@ -504,18 +571,35 @@ mod tests {
         // About one axis: levelling by gravity cannot see a turn about the vertical.
         let mount = UnitQuaternion::from_euler_angles(0.1, 0.0, 0.0);
         let (track, roll, height, support) = twin(lever, mount);
-        let settings = Settings { lever_m: lever, orientation: Options::without_latency(), ..Settings::default() };
+        let settings = Settings {
+            lever_m: lever,
+            orientation: Options::without_latency(),
+            ..Settings::default()
+        };
         let found = motion(&track, &settings).unwrap();
         let inner = 2000..6000;
         let error = |a: &[f64], b: &[f64]| rms(inner.clone().map(|i| a[i] - b[i]));
-        assert!(error(&found.inputs.roll_rad, &roll).to_degrees() < 0.2, "{}", error(&found.inputs.roll_rad, &roll).to_degrees());
+        assert!(
+            error(&found.inputs.roll_rad, &roll).to_degrees() < 0.2,
+            "{}",
+            error(&found.inputs.roll_rad, &roll).to_degrees()
+        );
         let lost = error(&found.inputs.height_m, &height) / rms(height.iter().copied());
         assert!(lost < 0.01, "{lost}");
         assert!(error(&found.inputs.support_ratio, &support) < 0.02);
-        let m = metrics(&found, Window { start_s: 10.0, end_s: 30.0 });
+        let m = metrics(
+            &found,
+            Window {
+                start_s: 10.0,
+                end_s: 30.0,
+            },
+        );
         let value = m.get("rms_roll_deg").unwrap();
         let true_deg = rms(roll[2000..6000].iter().copied()).to_degrees();
-        assert!((value.as_f64().unwrap() - true_deg).abs() < 0.1, "{value:?}");
+        assert!(
+            (value.as_f64().unwrap() - true_deg).abs() < 0.1,
+            "{value:?}"
+        );
         assert_eq!(value.source, "imu");
         let [low, high] = value.ci95.unwrap();
         assert!(low < true_deg && true_deg < high);
@@ -530,6 +614,9 @@ mod tests {
         }
         let error = motion(&track, &Settings::default()).unwrap_err();
         assert!(matches!(error, MotionError::NoGravity { .. }), "{error}");
-        assert!(matches!(motion(&Track::default(), &Settings::default()), Err(MotionError::TooShort { .. })));
+        assert!(matches!(
+            motion(&Track::default(), &Settings::default()),
+            Err(MotionError::TooShort { .. })
+        ));
     }
 }

@@ -16,7 +16,13 @@ impl Truth {
     /// From columns x, y, z, w; samples that are no unit quaternion (norm² outside 0.5 … 2, or not finite) are left out.
     pub fn from_columns(t_s: &[f64], [x, y, z, w]: [&[f64]; 4]) -> Self {
         let mut out = Self::default();
-        for i in 0..t_s.len().min(x.len()).min(y.len()).min(z.len()).min(w.len()) {
+        for i in 0..t_s
+            .len()
+            .min(x.len())
+            .min(y.len())
+            .min(z.len())
+            .min(w.len())
+        {
             let q = Quaternion::new(w[i], x[i], y[i], z[i]);
             let later = out.t_s.last().is_none_or(|&last| t_s[i] > last);
             if later && t_s[i].is_finite() && (0.5..=2.0).contains(&q.norm_squared()) {
@@ -32,7 +38,12 @@ impl Truth {
         self.t_s
             .windows(2)
             .zip(self.world_from_body.windows(2))
-            .map(|(t, q)| (0.5 * (t[0] + t[1]), (q[0].inverse() * q[1]).angle() / (t[1] - t[0])))
+            .map(|(t, q)| {
+                (
+                    0.5 * (t[0] + t[1]),
+                    (q[0].inverse() * q[1]).angle() / (t[1] - t[0]),
+                )
+            })
             .unzip()
     }
 }
@@ -55,10 +66,16 @@ pub fn inclination_error_deg(
     let (mut sum, mut count) = (0.0, 0usize);
     for (t, q) in t_s.iter().zip(earth_from_body) {
         // Half a nanosecond per second of rounding must not push a sample out of its span.
-        if !spans_s.is_empty() && !spans_s.iter().any(|(a, b)| (a - 1e-6..=b + 1e-6).contains(t)) {
+        if !spans_s.is_empty()
+            && !spans_s
+                .iter()
+                .any(|(a, b)| (a - 1e-6..=b + 1e-6).contains(t))
+        {
             continue;
         }
-        let Some(p) = at(truth, *t, step) else { continue };
+        let Some(p) = at(truth, *t, step) else {
+            continue;
+        };
         let d = q * p.inverse();
         let e = 2.0 * (d.w * d.w + d.k * d.k).sqrt().min(1.0).acos();
         sum += e * e;
@@ -79,7 +96,11 @@ fn at(truth: &Truth, t_s: f64, step_s: f64) -> Option<UnitQuaternion<f64>> {
     let (a, b) = (truth.t_s[near], truth.t_s[other]);
     let reach = (2.0 * step_s).max(0.05);
     if near == other || b - a > reach {
-        let (i, gap) = if (t_s - a).abs() <= (b - t_s).abs() { (near, (t_s - a).abs()) } else { (other, (b - t_s).abs()) };
+        let (i, gap) = if (t_s - a).abs() <= (b - t_s).abs() {
+            (near, (t_s - a).abs())
+        } else {
+            (other, (b - t_s).abs())
+        };
         return (gap <= 0.5 * step_s).then(|| truth.world_from_body[i]);
     }
     let share = (t_s - a) / (b - a);
@@ -103,7 +124,10 @@ pub fn relative_error(
     let shifted: Vec<f64> = t_s.iter().map(|t| t + clock_s).collect();
     let truth = interpolate(u_s, y, &shifted);
     let sections = butter(4, Band::Pass(band_hz[0], band_hz[1]), 1.0 / step_s).ok()?;
-    let (x, y) = (sosfiltfilt(&sections, x).ok()?, sosfiltfilt(&sections, &truth).ok()?);
+    let (x, y) = (
+        sosfiltfilt(&sections, x).ok()?,
+        sosfiltfilt(&sections, &truth).ok()?,
+    );
     let (mut error, mut power) = (0.0, 0.0);
     for i in (0..x.len()).filter(|i| t_s[*i] >= inner_s.0 && t_s[*i] <= inner_s.1) {
         error += (x[i] - y[i]).powi(2);
@@ -120,21 +144,37 @@ mod tests {
     #[test]
     fn heading_is_free_and_tilt_is_not() {
         let t: Vec<f64> = (0..100).map(|k| f64::from(k) * 0.01).collect();
-        let truth: Vec<UnitQuaternion<f64>> = t.iter().map(|t| UnitQuaternion::from_euler_angles(*t, 0.3 * t, 2.0 * t)).collect();
+        let truth: Vec<UnitQuaternion<f64>> = t
+            .iter()
+            .map(|t| UnitQuaternion::from_euler_angles(*t, 0.3 * t, 2.0 * t))
+            .collect();
         let turned: Vec<_> = truth
             .iter()
-            .map(|q| UnitQuaternion::from_axis_angle(&Vector3::z_axis(), 1.0) * UnitQuaternion::from_axis_angle(&Vector3::x_axis(), 0.01) * q)
+            .map(|q| {
+                UnitQuaternion::from_axis_angle(&Vector3::z_axis(), 1.0)
+                    * UnitQuaternion::from_axis_angle(&Vector3::x_axis(), 0.01)
+                    * q
+            })
             .collect();
-        let truth = Truth { t_s: t.clone(), world_from_body: truth };
+        let truth = Truth {
+            t_s: t.clone(),
+            world_from_body: truth,
+        };
         let e = inclination_error_deg(&t, &turned, &truth, &[]).unwrap();
         assert!((e - 0.01f64.to_degrees()).abs() < 1e-9, "{e}");
-        assert_eq!(inclination_error_deg(&t, &turned, &truth, &[(5.0, 6.0)]), None);
+        assert_eq!(
+            inclination_error_deg(&t, &turned, &truth, &[(5.0, 6.0)]),
+            None
+        );
     }
 
     #[test]
     fn missing_truth_does_not_count() {
         let nan = f64::NAN;
-        let truth = Truth::from_columns(&[0.0, 1.0, 2.0], [&[0.0, nan, 0.0], &[0.0; 3], &[0.0; 3], &[1.0; 3]]);
+        let truth = Truth::from_columns(
+            &[0.0, 1.0, 2.0],
+            [&[0.0, nan, 0.0], &[0.0; 3], &[0.0; 3], &[1.0; 3]],
+        );
         assert_eq!(truth.t_s, [0.0, 2.0]);
         let q = UnitQuaternion::from_axis_angle(&Vector3::y_axis(), 0.02);
         let e = inclination_error_deg(&[0.0, 1.0, 2.0], &[q; 3], &truth, &[]).unwrap();

@@ -156,6 +156,10 @@ mod tests {
     #[test]
     fn very_short_input_is_not_an_error() {
         assert_eq!(height(&[1.0, 2.0], 0.01, 0.1), [0.0, 0.0]);
-        assert!(height(&[1.0, 2.0, 3.0], 0.01, 0.1).iter().all(|z| z.is_finite()));
+        assert!(
+            height(&[1.0, 2.0, 3.0], 0.01, 0.1)
+                .iter()
+                .all(|z| z.is_finite())
+        );
     }
 }
