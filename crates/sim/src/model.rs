@@ -18,6 +18,7 @@ use crate::freedoms::{Freedoms, Six, choose};
 use crate::lanes::{self, LANES, f64x2, pack, pairs};
 use crate::random::{Stream, normal};
 use crate::scene::Scene;
+use crate::sensors::drum::Track;
 use crate::sensors::{Clock, Imu};
 
 /// A part of the right-hand side.
@@ -200,6 +201,7 @@ pub struct Model {
     watches_contact: bool,
     sensor_clocks: Vec<Clock>,
     imus: Vec<Imu>,
+    track: Option<Track>,
 }
 
 impl Model {
@@ -243,6 +245,7 @@ impl Model {
             watches_contact: false,
             sensor_clocks: Vec::new(),
             imus: Vec::new(),
+            track: None,
         };
         for effect in effects::TABLE {
             model.building = effect.name;
@@ -322,6 +325,10 @@ impl Model {
         })
     }
 
+    pub(crate) fn set_track(&mut self, track: Track) {
+        self.track = Some(track);
+    }
+
     pub(crate) fn add_imu(&mut self, imu: Imu) {
         self.imus.push(imu);
     }
@@ -331,6 +338,11 @@ impl Model {
     /// The clocks on which sensors sample, beside the log's.
     pub fn sensor_clocks(&self) -> &[Clock] {
         &self.sensor_clocks
+    }
+
+    /// The sound of the drum, where the scene has it.
+    pub fn track(&self) -> Option<&Track> {
+        self.track.as_ref()
     }
 
     /// Every inertial sensor.

@@ -28,6 +28,8 @@ pub struct Recorder<'m> {
     tf: ChannelId,
     scene: ChannelId,
     beat: Option<ChannelId>,
+    audio: Option<ChannelId>,
+    next_block: u64,
     /// One for each virtual sensor, by topic.
     imus: BTreeMap<String, ChannelId>,
     strokes: Vec<Stroke>,
@@ -73,6 +75,12 @@ impl<'m> Recorder<'m> {
             topics::BEAT,
             MessageKind::Beat,
         )?;
+        let audio = has(
+            model.track().is_some(),
+            &mut writer,
+            topics::AUDIO_DRUM,
+            MessageKind::RawAudio,
+        )?;
         let imus = model
             .imus()
             .iter()
@@ -92,6 +100,8 @@ impl<'m> Recorder<'m> {
             tf,
             scene: arrows,
             beat,
+            audio,
+            next_block: 0,
             imus,
             strokes: model.beat().map_or_else(Vec::new, |b| b.strokes(scene.duration_s)),
             next_beat: 0,
@@ -121,6 +131,7 @@ impl<'m> Recorder<'m> {
 
     fn write(&mut self, s: &Sample) -> Result<(), WriteError> {
         self.write_beats(s.t_s)?;
+        self.write_sound(s.t_s)?;
         let t_ns = self.stamp_ns(s.t_s);
         let [roll_rad, pitch_rad, yaw_rad] = s.roll_pitch_yaw_rad;
         let [x, y, z, w] = s.pose.orientation;
@@ -193,6 +204,31 @@ impl<'m> Recorder<'m> {
             };
             self.writer.message(channel, self.epoch_ns + (stroke.t_s * 1e9).round() as i64, &message)?;
             self.next_beat += 1;
+        }
+        Ok(())
+    }
+
+    /// Every block of the drum track that has ended by `until_s`; the last one at the end of the run.
+    fn write_sound(&mut self, until_s: f64) -> Result<(), WriteError> {
+        let (Some(channel), Some(track)) = (self.audio, self.model.track()) else {
+            return Ok(());
+        };
+        let at_the_end = until_s * self.model.scene.log_rate_hz + 1.0
+            > self.model.scene.duration_s * self.model.scene.log_rate_hz;
+        while let Some(block) = track.block(self.next_block) {
+            if block.end_s > until_s && !at_the_end {
+                break;
+            }
+            let t_ns = self.epoch_ns + (block.stamp_s * 1e9).round() as i64;
+            let message = foxglove::RawAudio {
+                timestamp: Some(timestamp(t_ns)),
+                data: block.sound.iter().flat_map(|s| s.to_le_bytes()).collect(),
+                format: "pcm-s16".into(),
+                sample_rate: track.rate_hz,
+                number_of_channels: 1,
+            };
+            self.writer.message(channel, t_ns, &message)?;
+            self.next_block += 1;
         }
         Ok(())
     }

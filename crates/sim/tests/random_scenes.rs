@@ -97,8 +97,12 @@ fn valid(seed: u64) -> String {
     if hold {
         t += &format!("[effects.hold]\nstiffness_n_per_m = {:?}\n", d.from(0.0, 6000.0));
     }
+    let sling = d.chance(0.2);
+    if sling {
+        t += &format!("[effects.sling]\nlength_m = {:?}\n", d.from(0.3, 2.0));
+    }
     if d.chance(0.4) {
-        let law = if hold { "regularised" } else { d.pick(&["regularised", "bristle"]) };
+        let law = if hold || sling { "regularised" } else { d.pick(&["regularised", "bristle"]) };
         t += &format!("[effects.friction]\nlaw = \"{law}\"\ncoefficient = {:?}\n", d.from(0.05, 1.0));
     }
     if d.chance(0.5) {
@@ -125,6 +129,9 @@ fn valid(seed: u64) -> String {
         t += &format!("[effects.music]\nbeat_hz = {:?}\nonset_s = {:?}\nbuild_up_s = {:?}\n", d.from(1.0, 3.0), d.from(0.0, 2.0), d.from(0.0, 2.0));
         if d.chance(0.3) {
             t += "tempo_changes = [{ at_s = 1.0, over_s = 0.5, beat_hz = 2.2 }]\npauses = [{ from_s = 0.3, to_s = 0.6 }]\n";
+        }
+        if d.chance(0.3) {
+            t += "[effects.drum]\nsample_rate_hz = 8000\n";
         }
     }
     if d.chance(0.3) {

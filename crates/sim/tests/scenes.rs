@@ -132,3 +132,34 @@ fn states_have_names_of_their_own() {
         assert_eq!(once.len(), names.len(), "{name}: {names:?}");
     }
 }
+
+/// The schema names every effect and carries the descriptions; docs/model.md names every parameter of every effect.
+#[test]
+fn the_schema_and_the_page_know_every_parameter() {
+    let schema = sim::scene::json_schema();
+    let effects = &schema["$defs"]["Effects"]["properties"];
+    let page = std::fs::read_to_string(concat!(env!("CARGO_MANIFEST_DIR"), "/../../docs/model.md")).unwrap();
+    let mut parameters = 0;
+    for effect in sim::effects::TABLE {
+        assert!(effects.get(effect.name).is_some(), "the schema lacks {}", effect.name);
+        assert!(page.contains(&format!("### `{}`", effect.name)), "docs/model.md lacks {}", effect.name);
+        let of = effects[effect.name].to_string();
+        let definition = of.split("#/$defs/").nth(1).and_then(|s| s.split('"').next()).unwrap();
+        for (name, what) in schema["$defs"][definition]["properties"].as_object().unwrap() {
+            assert!(page.contains(&format!("`{name}`")), "docs/model.md lacks {}.{name}", effect.name);
+            assert!(what["description"].is_string(), "{}.{name} has no description", effect.name);
+            parameters += 1;
+        }
+    }
+    assert!(parameters > 60, "{parameters}");
+}
+
+/// field-imu is music with instruments, and stays so.
+#[test]
+fn the_field_scene_is_the_music_scene_with_instruments() {
+    let mut field = load("field-imu", &[]).unwrap();
+    let music = load("music", &[]).unwrap();
+    (field.effects.imu, field.effects.drum) = (None, None);
+    (field.name, field.about) = (music.name.clone(), music.about.clone());
+    assert_eq!(field, music);
+}

@@ -21,6 +21,7 @@ fn everything() -> Scene {
         angular_velocity_rad_per_s = [0.3, 0.2, -0.1]
         [effects.contact]
         [effects.hold]
+        [effects.sling]
         [effects.friction]
         [effects.pole_friction]
         [effects.gait]
@@ -41,6 +42,7 @@ fn everything() -> Scene {
         slope_deg = 5.0
         [effects.flexure]
         [effects.imu]
+        [effects.drum]
         "#,
     )
 }
@@ -73,14 +75,18 @@ fn switching_one_effect_off_leaves_the_others_as_they_are() {
     let t_s = 0.7;
     for kept in TABLE {
         for other in TABLE.iter().filter(|o| o.name != kept.name) {
-            // Two effects that are about each other by their definition: lift amplifies the gait, friction limits the hold.
-            if ["gait", "hold"].contains(&other.name) && ["lift", "friction"].contains(&kept.name) {
+            // Effects that are about another by their definition: lift amplifies the gait, friction limits the hold, a sling adds to it.
+            let by_definition = [("lift", "gait"), ("friction", "hold"), ("sling", "hold")];
+            if by_definition.contains(&(kept.name, other.name)) {
                 continue;
             }
             let mut without = full.clone();
             (other.switch_off)(&mut without.effects);
             if other.name == "gait" {
                 without.effects.lift = None;
+            }
+            if other.name == "music" {
+                without.effects.drum = None;
             }
             let (a, b) = (Model::new(&full), Model::new(&without));
             let evaluated = |m: &Model| {

@@ -1,5 +1,6 @@
 //! One file per subcommand.
 
+mod drum;
 mod explain;
 mod record;
 mod scenes;
@@ -12,6 +13,8 @@ use std::process::ExitCode;
 pub enum Command {
     /// Run a scene and write the recording (MCAP).
     Record(record::Args),
+    /// Write the drum of a scene as a WAV file.
+    Drum(drum::Args),
     /// Say what a scene turns on, what state that needs, and what it costs.
     Explain(explain::Args),
     /// List the built-in scenes, or print one as TOML.
@@ -22,6 +25,7 @@ pub enum Command {
 pub fn run(command: Command) -> ExitCode {
     let outcome = match command {
         Command::Record(args) => record::run(&args),
+        Command::Drum(args) => drum::run(&args),
         Command::Explain(args) => explain::run(&args),
         Command::Scenes(args) => scenes::run(&args),
     };

@@ -1,7 +1,7 @@
 //! `sim scenes`: what comes with the program.
 
 use anyhow::{Result, anyhow};
-use sim::scene::{BUILTIN, SceneError, builtin, load, parse};
+use sim::scene::{BUILTIN, SceneError, builtin, json_schema, load, parse};
 use std::io::Write;
 
 /// Arguments of `sim scenes`.
@@ -12,6 +12,9 @@ use std::io::Write;
 pub struct Args {
     /// Print this scene as TOML.
     name: Option<String>,
+    /// Print the JSON Schema of scenes, for editors that check TOML.
+    #[arg(long, conflicts_with = "name")]
+    schema: bool,
 }
 
 /// Prints the list, or one scene.
@@ -30,6 +33,7 @@ pub fn run(args: &Args) -> Result<()> {
                 }
             },
         },
+        None if args.schema => text = format!("{:#}\n", json_schema()),
         None => {
             let width = BUILTIN
                 .iter()

@@ -70,8 +70,8 @@ impl Friction {
         Checker::positive("effects.friction.bristle_stiffness_per_m", self.bristle_stiffness_per_m)?;
         Checker::not_negative("effects.friction.bristle_damping_s_per_m", self.bristle_damping_s_per_m)?;
         if self.law == Law::Bristle {
-            if scene.effects.hold.is_some() {
-                return Err(problem("effects.friction.law", "bristles are an elastic hold already; leave `effects.hold` out"));
+            if scene.effects.hold.is_some() || scene.effects.sling.is_some() {
+                return Err(problem("effects.friction.law", "bristles are an elastic hold already; leave `effects.hold` and `effects.sling` out"));
             }
             Checker::positive("effects.friction.coefficient", self.coefficient)?;
         }
@@ -96,8 +96,8 @@ impl Friction {
             return;
         }
         let law = Coulomb { mu: self.coefficient, per_velocity: 1.0 / self.regularising_velocity_m_per_s };
-        if scene.effects.hold.is_some() {
-            // The hold's account books the limited force.
+        if scene.effects.hold.is_some() || scene.effects.sling.is_some() {
+            // The hold's or the sling's account books the limited force.
             model.add(Stage::Handles, Limit(law));
         } else {
             model.add(Stage::Handles, Alone(law.clone()));

@@ -6,6 +6,7 @@
 
 pub mod contact;
 pub mod coupling;
+pub mod drum;
 pub mod feedback;
 pub mod flexure;
 pub mod frequency_spread;
@@ -45,6 +46,7 @@ pub struct Effects {
     pub path: Option<path::Path>,
     pub flexure: Option<flexure::Flexure>,
     pub imu: Option<imu::Imu>,
+    pub drum: Option<drum::Drum>,
 }
 
 /// One line of the table of effects.
@@ -100,6 +102,7 @@ pub const TABLE: &[Entry] = &[
     entry!(path, "the way slopes and turns"),
     entry!(flexure, "poles bend: their first mode"),
     entry!(imu, "virtual inertial sensors on body and carriers"),
+    entry!(drum, "the sound of the drum, as a microphone hears it"),
 ];
 
 /// Checks the parameters of every effect that is on.

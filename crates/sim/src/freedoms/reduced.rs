@@ -197,9 +197,16 @@ impl Reduced {
 
     #[inline(always)]
     fn attitude(&self, y: &[f64]) -> Attitude {
-        let angle = |a: usize| self.place[3 + a].map_or(self.turned[a], |p| y[p].sin_cos());
+        let angle = |a: usize| self.place[3 + a].map_or(self.turned[a], |p| sin_cos(y[p]));
         Attitude { roll: angle(0), tilt: angle(1), yaw: angle(2), rates: [3, 4, 5].map(|c| self.rate(c, y)) }
     }
+}
+
+/// Of one angle, in one lane: half the instructions of libm's.
+#[inline(always)]
+fn sin_cos(x: f64) -> (f64, f64) {
+    let (s, c) = crate::lanes::sin_cos(f64x2::splat(x));
+    (s.to_array()[0], c.to_array()[0])
 }
 
 #[inline(always)]

@@ -10,7 +10,7 @@ mod parse;
 pub use builtin::{BUILTIN, builtin};
 pub use check::{Problem, check};
 pub(crate) use check::{Checker, problem};
-pub use parse::{SceneError, load, nearest, parse, to_toml};
+pub use parse::{SceneError, json_schema, load, nearest, parse, to_toml};
 
 use crate::effects::Effects;
 use schemars::JsonSchema;

@@ -79,6 +79,11 @@ pub fn to_toml(scene: &Scene) -> String {
     toml::to_string(scene).expect("a scene is always expressible in TOML")
 }
 
+/// JSON Schema of a scene (draft 2020-12), for editors that check TOML; made from the types themselves.
+pub fn json_schema() -> serde_json::Value {
+    schemars::schema_for!(Scene).to_value()
+}
+
 /// The name nearest to `word` when it is near enough to be a slip.
 pub fn nearest<'a>(word: &str, names: impl Iterator<Item = &'a str>) -> Option<&'a str> {
     names

@@ -2,6 +2,7 @@
 //!
 //! Sensors watch and never touch: they add no state and no term, and a run without them takes the same steps.
 
+pub mod drum;
 pub mod imu;
 
 pub use imu::{Imu, Reading};
