@@ -1,6 +1,7 @@
 //! The dynamics of things that people carry together: a [`scene::Scene`] becomes a [`model::Model`], which a
 //! [`solve::Method`] integrates into samples.
 
+pub mod accuracy;
 pub mod body;
 pub mod effects;
 pub mod energy;
