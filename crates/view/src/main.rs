@@ -212,7 +212,7 @@ fn show(file: &Path, kind: Kind) -> anyhow::Result<Vec<Finding>> {
         File::open(file).map_err(|error| anyhow!("{}: cannot be read: {error}", file.display()))?;
     }
     let (mut child, stdin) = viewer::start(kind)?;
-    let sent = Encoded::new(BufWriter::with_capacity(1 << 16, stdin)).and_then(|mut encoded| {
+    let sent = Encoded::stream(BufWriter::with_capacity(1 << 16, stdin)).and_then(|mut encoded| {
         let findings = send(file, &mut encoded)?;
         encoded.finish()?.flush()?;
         Ok(findings)

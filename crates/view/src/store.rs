@@ -44,6 +44,15 @@ impl<W: std::io::Write> Encoded<W> {
         )?))
     }
 
+    /// Begins a stream for a reader that takes messages as they come: it needs no footer.
+    ///
+    /// Its bytes depend on what is sent alone. (The footer of a file lists its two stores in no fixed order.)
+    pub fn stream(write: W) -> anyhow::Result<Self> {
+        let mut encoded = Encoded::new(write)?;
+        encoded.0.do_not_emit_footer();
+        Ok(encoded)
+    }
+
     /// Ends it with the footer that `rerun rrd verify` asks for.
     pub fn finish(mut self) -> anyhow::Result<W> {
         self.0.finish()?;
