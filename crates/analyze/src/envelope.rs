@@ -22,7 +22,11 @@ struct Stretch {
 
 impl Default for Stretch {
     fn default() -> Self {
-        Stretch { count: 0, low: (0.0, f64::INFINITY), high: (0.0, f64::NEG_INFINITY) }
+        Stretch {
+            count: 0,
+            low: (0.0, f64::INFINITY),
+            high: (0.0, f64::NEG_INFINITY),
+        }
     }
 }
 
@@ -45,7 +49,11 @@ impl Envelope {
             return;
         }
         self.per = self.per.max(1);
-        self.last.join(&Stretch { count: 1, low: (t_s, x), high: (t_s, x) });
+        self.last.join(&Stretch {
+            count: 1,
+            low: (t_s, x),
+            high: (t_s, x),
+        });
         if self.last.count >= self.per {
             self.stretches.push(std::mem::take(&mut self.last));
             if self.stretches.len() >= 2 * MOST {
@@ -67,7 +75,11 @@ impl Envelope {
     /// Times and values, ascending in time: every sample while there are few, then two per stretch, its extremes.
     pub fn points(&self) -> (Vec<f64>, Vec<f64>) {
         let (mut t_s, mut x) = (Vec::new(), Vec::new());
-        for s in self.stretches.iter().chain((self.last.count > 0).then_some(&self.last)) {
+        for s in self
+            .stretches
+            .iter()
+            .chain((self.last.count > 0).then_some(&self.last))
+        {
             let mut ends = [s.low, s.high];
             ends.sort_by(|a, b| a.0.total_cmp(&b.0));
             for (k, (t, value)) in ends.into_iter().enumerate() {
@@ -108,10 +120,23 @@ mod tests {
     fn extremes_survive_any_thinning() {
         let mut envelope = Envelope::default();
         for k in 0..1_000_000 {
-            envelope.push(f64::from(k), if k == 654_321 { 9.0 } else if k == 123_456 { -7.0 } else { f64::from(k % 2) });
+            envelope.push(
+                f64::from(k),
+                if k == 654_321 {
+                    9.0
+                } else if k == 123_456 {
+                    -7.0
+                } else {
+                    f64::from(k % 2)
+                },
+            );
         }
         let (t, x) = envelope.points();
-        assert!(t.len() <= 4 * MOST + 2 && t.windows(2).all(|w| w[0] < w[1]), "{}", t.len());
+        assert!(
+            t.len() <= 4 * MOST + 2 && t.windows(2).all(|w| w[0] < w[1]),
+            "{}",
+            t.len()
+        );
         assert!(x.contains(&9.0) && x.contains(&-7.0));
         assert_eq!(t[x.iter().position(|x| *x == 9.0).unwrap()], 654_321.0);
     }

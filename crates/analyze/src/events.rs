@@ -36,7 +36,11 @@ pub fn events(inputs: &Inputs, window: Window) -> Vec<Event> {
     if inputs.roll_rad.len() == inputs.t_s.len()
         && let Some(t_s) = onset_s(&inputs.t_s[range.clone()], &inputs.roll_rad[range])
     {
-        out.push(Event { t_s, kind: "onset", what: "RMS roll of the last 2 s exceeds 10° for the first time".into() });
+        out.push(Event {
+            t_s,
+            kind: "onset",
+            what: "RMS roll of the last 2 s exceeds 10° for the first time".into(),
+        });
     }
     out.sort_by(|a, b| a.t_s.total_cmp(&b.t_s));
     out
@@ -52,8 +56,16 @@ fn contact(inputs: &Inputs, out: &mut Vec<Event>) {
             if held.is_some_and(|h| h != holds) {
                 let number = handle + 1;
                 out.push(match holds {
-                    true => Event { t_s: *t_s, kind: "contact_regained", what: format!("handle {number} presses again with {n:.0} N") },
-                    false => Event { t_s: *t_s, kind: "contact_lost", what: format!("handle {number} goes slack") },
+                    true => Event {
+                        t_s: *t_s,
+                        kind: "contact_regained",
+                        what: format!("handle {number} presses again with {n:.0} N"),
+                    },
+                    false => Event {
+                        t_s: *t_s,
+                        kind: "contact_lost",
+                        what: format!("handle {number} goes slack"),
+                    },
                 });
             }
             held = Some(holds);
@@ -66,7 +78,14 @@ fn jumps(inputs: &Inputs, out: &mut Vec<Event>) {
     let (t_s, ratio) = match inputs.mass_kg {
         Some(mass_kg) if !inputs.normal_n.is_empty() => {
             let weight_n = mass_kg * inputs.gravity_m_per_s2;
-            (inputs.force_times(), inputs.total_force_n().iter().map(|n| n / weight_n).collect())
+            (
+                inputs.force_times(),
+                inputs
+                    .total_force_n()
+                    .iter()
+                    .map(|n| n / weight_n)
+                    .collect(),
+            )
         }
         _ => (&inputs.t_s[..], inputs.support_ratio.clone()),
     };
@@ -78,7 +97,11 @@ fn jumps(inputs: &Inputs, out: &mut Vec<Event>) {
             (Some(from), false) => {
                 if k - from >= 2 {
                     let last = t_s[(k).min(t_s.len() - 1)];
-                    out.push(Event { t_s: t_s[from], kind: "jump", what: format!("nothing holds it for {:.2} s", last - t_s[from]) });
+                    out.push(Event {
+                        t_s: t_s[from],
+                        kind: "jump",
+                        what: format!("nothing holds it for {:.2} s", last - t_s[from]),
+                    });
                 }
                 start = None;
             }
@@ -93,15 +116,26 @@ fn beat(inputs: &Inputs, out: &mut Vec<Event>) {
     let tempo_hz = |k: usize| {
         let next = k + 1 + psi[k + 1..].iter().position(|p| p.is_finite())?;
         let step = (psi[next] - psi[k]).rem_euclid(std::f64::consts::TAU);
-        (next < t_s.len() && t_s[next] > t_s[k]).then(|| step / std::f64::consts::TAU / (t_s[next] - t_s[k]))
+        (next < t_s.len() && t_s[next] > t_s[k])
+            .then(|| step / std::f64::consts::TAU / (t_s[next] - t_s[k]))
     };
     for k in 0..sounding.len().min(t_s.len()) {
         let before = k > 0 && sounding[k - 1];
         if sounding[k] && !before {
-            let what = tempo_hz(k).map_or("a beat begins".into(), |hz| format!("a beat of {hz:.3} Hz begins"));
-            out.push(Event { t_s: t_s[k], kind: "beat_start", what });
+            let what = tempo_hz(k).map_or("a beat begins".into(), |hz| {
+                format!("a beat of {hz:.3} Hz begins")
+            });
+            out.push(Event {
+                t_s: t_s[k],
+                kind: "beat_start",
+                what,
+            });
         } else if before && !sounding[k] {
-            out.push(Event { t_s: t_s[k], kind: "beat_end", what: "the beat ends".into() });
+            out.push(Event {
+                t_s: t_s[k],
+                kind: "beat_end",
+                what: "the beat ends".into(),
+            });
         }
     }
 }
@@ -114,7 +148,9 @@ fn locking(inputs: &Inputs, out: &mut Vec<Event>) {
     }
     let t_s = inputs.phase_times();
     let r = phase::order_parameter(&phases);
-    let Some(step_s) = crate::inputs::mean_step_s(t_s) else { return };
+    let Some(step_s) = crate::inputs::mean_step_s(t_s) else {
+        return;
+    };
     let m = ((LOCK_STRETCH_S / step_s).round() as usize).max(1);
     let mut sum = 0.0;
     let mut loose = false;
@@ -131,8 +167,14 @@ fn locking(inputs: &Inputs, out: &mut Vec<Event>) {
         }
         let mean = sum / m as f64;
         if mean > LOCKED && loose {
-            let what = format!("the carriers walk together: mean r of the last {LOCK_STRETCH_S:.0} s exceeds {LOCKED}");
-            out.push(Event { t_s: t_s[k], kind: "locked", what });
+            let what = format!(
+                "the carriers walk together: mean r of the last {LOCK_STRETCH_S:.0} s exceeds {LOCKED}"
+            );
+            out.push(Event {
+                t_s: t_s[k],
+                kind: "locked",
+                what,
+            });
             return;
         }
         loose |= mean <= LOCKED;
@@ -149,14 +191,23 @@ mod tests {
         let inputs = Inputs {
             t_s: (0..n).map(|k| k as f64 / 10.0).collect(),
             normal_n: vec![
-                (0..n).map(|k| if (20..25).contains(&k) { 0.0 } else { 300.0 }).collect(),
-                (0..n).map(|k| if (22..24).contains(&k) { 0.0 } else { 300.0 }).collect(),
+                (0..n)
+                    .map(|k| if (20..25).contains(&k) { 0.0 } else { 300.0 })
+                    .collect(),
+                (0..n)
+                    .map(|k| if (22..24).contains(&k) { 0.0 } else { 300.0 })
+                    .collect(),
             ],
-            beat_phase_rad: (0..n).map(|k| if k < 50 { f64::NAN } else { k as f64 * 1.2 }).collect(),
+            beat_phase_rad: (0..n)
+                .map(|k| if k < 50 { f64::NAN } else { k as f64 * 1.2 })
+                .collect(),
             mass_kg: Some(60.0),
             ..Inputs::default()
         };
-        let told: Vec<(f64, &str)> = events(&inputs, Window::ALL).iter().map(|e| (e.t_s, e.kind)).collect();
+        let told: Vec<(f64, &str)> = events(&inputs, Window::ALL)
+            .iter()
+            .map(|e| (e.t_s, e.kind))
+            .collect();
         assert_eq!(
             told,
             [
@@ -174,12 +225,18 @@ mod tests {
     fn carriers_that_fall_into_step_are_noticed_once() {
         let t_s: Vec<f64> = (0..600).map(|k| k as f64 / 30.0).collect();
         let inputs = Inputs {
-            phase_rad: vec![t_s.iter().map(|t| 12.0 * t).collect(), t_s.iter().map(|t| 12.0 * t + (10.0 - t).max(0.0)).collect()],
+            phase_rad: vec![
+                t_s.iter().map(|t| 12.0 * t).collect(),
+                t_s.iter().map(|t| 12.0 * t + (10.0 - t).max(0.0)).collect(),
+            ],
             t_s,
             ..Inputs::default()
         };
         let events = events(&inputs, Window::ALL);
         assert_eq!(events.len(), 1);
-        assert!(events[0].kind == "locked" && (11.0..15.0).contains(&events[0].t_s), "{events:?}");
+        assert!(
+            events[0].kind == "locked" && (11.0..15.0).contains(&events[0].t_s),
+            "{events:?}"
+        );
     }
 }

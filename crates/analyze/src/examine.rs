@@ -147,21 +147,39 @@ impl Analysis {
 ///
 /// # Errors
 /// Where the file cannot be read at all; damage inside it is part of the answer.
-pub fn examine(file: &str, recording: &Recording, request: &Request) -> Result<Analysis, ReadError> {
+pub fn examine(
+    file: &str,
+    recording: &Recording,
+    request: &Request,
+) -> Result<Analysis, ReadError> {
     let info = recording.info();
-    let channels = info.channels.iter().map(|c| (c.topic.as_str(), c.schema.as_str()));
+    let channels = info
+        .channels
+        .iter()
+        .map(|c| (c.topic.as_str(), c.schema.as_str()));
     let roles = Roles::infer(channels, request.roles.as_ref());
     let mut pass = Pass::new(recording, request, &roles);
     let select = |path: &str| wanted(path, request, &roles);
     let findings = recording.stream(&select, &mut |batch| pass.take(batch))?;
     let mut quality: Vec<Quality> = findings
         .into_iter()
-        .map(|f| Quality { topic: f.topic, kind: f.kind.word(), count: f.count, t_s: f.t_s, text: f.text, loss: f.kind.is_loss() })
+        .map(|f| Quality {
+            topic: f.topic,
+            kind: f.kind.word(),
+            count: f.count,
+            t_s: f.t_s,
+            text: f.text,
+            loss: f.kind.is_loss(),
+        })
         .collect();
     quality.sort_by(|a, b| (&a.topic, a.kind).cmp(&(&b.topic, b.kind)));
 
     let mut warnings = info.warnings.clone();
-    let metadata: Vec<(String, String)> = info.metadata.get("rath").map(|m| m.iter().map(|(k, v)| (k.clone(), v.clone())).collect()).unwrap_or_default();
+    let metadata: Vec<(String, String)> = info
+        .metadata
+        .get("rath")
+        .map(|m| m.iter().map(|(k, v)| (k.clone(), v.clone())).collect())
+        .unwrap_or_default();
     let duration_s = ((i128::from(info.end_ns) - i128::from(info.start_ns)) as f64 / 1e9).max(0.0);
     let said = request.roles.as_ref();
     let mut inputs = pass.inputs(&metadata, said);
@@ -180,7 +198,11 @@ pub fn examine(file: &str, recording: &Recording, request: &Request) -> Result<A
     let spectra = spectra(&pass, &inputs, window, &metrics, request);
     let mut events = events(&inputs, window);
     events.extend(quality.iter().filter(|q| q.kind == "gap").filter_map(|q| {
-        Some(Event { t_s: q.t_s?, kind: "gap", what: format!("{}: {}", q.topic, q.text) })
+        Some(Event {
+            t_s: q.t_s?,
+            kind: "gap",
+            what: format!("{}: {}", q.topic, q.text),
+        })
     }));
     events.extend(field.events());
     events.sort_by(|a, b| a.t_s.total_cmp(&b.t_s));
@@ -217,15 +239,32 @@ pub fn examine(file: &str, recording: &Recording, request: &Request) -> Result<A
 const MOST_INERTIAL: u64 = 4_000_000;
 
 /// Whether motion is estimated from inertial sensors; where there are some and it is not, the reason.
-fn estimates(recording: &Recording, roles: &Roles, request: &Request) -> Result<(), Option<String>> {
-    let sensors = |topic: &str| roles.patterns(Role::Imu).iter().chain(roles.patterns(Role::Carriers)).any(|t| t == topic);
-    let samples: u64 = recording.info().channels.iter().filter(|c| sensors(&c.topic)).map(|c| c.messages).sum();
+fn estimates(
+    recording: &Recording,
+    roles: &Roles,
+    request: &Request,
+) -> Result<(), Option<String>> {
+    let sensors = |topic: &str| {
+        roles
+            .patterns(Role::Imu)
+            .iter()
+            .chain(roles.patterns(Role::Carriers))
+            .any(|t| t == topic)
+    };
+    let samples: u64 = recording
+        .info()
+        .channels
+        .iter()
+        .filter(|c| sensors(&c.topic))
+        .map(|c| c.messages)
+        .sum();
     match samples {
         0 => Ok(()),
         _ if request.truth => Ok(()),
-        _ if !request.signals.is_empty() => {
-            Err(Some("motion is not estimated from the inertial sensors where --signal narrows what is read".into()))
-        }
+        _ if !request.signals.is_empty() => Err(Some(
+            "motion is not estimated from the inertial sensors where --signal narrows what is read"
+                .into(),
+        )),
         n if n > MOST_INERTIAL => Err(Some(format!(
             "motion is not estimated from {n} inertial samples (at most {MOST_INERTIAL}): name fewer sensors in a roles file"
         ))),
@@ -237,15 +276,25 @@ fn estimates(recording: &Recording, roles: &Roles, request: &Request) -> Result<
 fn wanted(path: &str, request: &Request, roles: &Roles) -> bool {
     // The topic is not known apart from the path here; a topic filter without wildcards is a prefix of it.
     let listed = |path: &str| {
-        let topic = request.topics.is_empty() || request.topics.iter().any(|t| matches(&format!("{t}.*"), path));
+        let topic = request.topics.is_empty()
+            || request
+                .topics
+                .iter()
+                .any(|t| matches(&format!("{t}.*"), path));
         topic && (request.signals.is_empty() || request.signals.iter().any(|p| matches(p, path)))
     };
     let wants = |path: &str| listed(path) || roles.of_signal(path).is_some();
     if wants(path) {
         return true;
     }
-    let part = path.rsplit_once('.').filter(|(_, last)| matches!(*last, "x" | "y" | "z" | "w"));
-    part.is_some_and(|(prefix, _)| crate::quaternion::ANGLES.iter().any(|angle| wants(&format!("{prefix}.{angle}"))))
+    let part = path
+        .rsplit_once('.')
+        .filter(|(_, last)| matches!(*last, "x" | "y" | "z" | "w"));
+    part.is_some_and(|(prefix, _)| {
+        crate::quaternion::ANGLES
+            .iter()
+            .any(|angle| wants(&format!("{prefix}.{angle}")))
+    })
 }
 
 /// The window: what the user says, else from the recording's own start of analysis to its end.
@@ -257,7 +306,10 @@ fn window(
     warnings: &mut Vec<String>,
 ) -> Window {
     let end_s = request.window.1.unwrap_or(duration_s);
-    let own = said.and_then(|s| s.analysis_start_s).or_else(|| number(metadata, "analysis_start_s")).unwrap_or(0.0);
+    let own = said
+        .and_then(|s| s.analysis_start_s)
+        .or_else(|| number(metadata, "analysis_start_s"))
+        .unwrap_or(0.0);
     let start_s = match request.window.0 {
         Some(start_s) => start_s,
         None if own < end_s || own == 0.0 => own,
@@ -312,7 +364,13 @@ impl<'a> Pass<'a> {
     fn new(recording: &'a Recording, request: &'a Request, roles: &'a Roles) -> Self {
         let info = recording.info();
         let span_s = (info.end_ns.saturating_sub(info.start_ns)) as f64 / 1e9;
-        let rough = |messages: u64| if span_s > 0.0 { messages.saturating_sub(1) as f64 / span_s } else { 0.0 };
+        let rough = |messages: u64| {
+            if span_s > 0.0 {
+                messages.saturating_sub(1) as f64 / span_s
+            } else {
+                0.0
+            }
+        };
         Pass {
             recording,
             request,
@@ -361,14 +419,23 @@ impl<'a> Pass<'a> {
     }
 
     fn entry(&mut self, batch: &Batch<'_>, path: &str) -> usize {
-        let field = path.strip_prefix(batch.topic).unwrap_or(path).trim_start_matches('.');
+        let field = path
+            .strip_prefix(batch.topic)
+            .unwrap_or(path)
+            .trim_start_matches('.');
         let hz = self.rough_hz[batch.channel];
         let messages = self.recording.info().channels[batch.channel].messages;
         let listed = self.request.lists(batch.topic, path);
         // A stamp's seconds and nanoseconds are a clock, not a signal with lines.
         let clock = field.contains("stamp.") || field == "time_s";
-        let nperseg = if listed && !clock { segment(hz, messages) } else { 0 };
-        let angle = crate::quaternion::ANGLES.iter().any(|a| field.rsplit('.').next() == Some(a));
+        let nperseg = if listed && !clock {
+            segment(hz, messages)
+        } else {
+            0
+        };
+        let angle = crate::quaternion::ANGLES
+            .iter()
+            .any(|a| field.rsplit('.').next() == Some(a));
         self.entries.push(Entry {
             path: path.to_owned(),
             unit: match recording::signal::unit_of(batch.schema, field) {
@@ -381,7 +448,8 @@ impl<'a> Pass<'a> {
             stream: Stream::new(hz, nperseg),
             times: None,
             kept: Vec::new(),
-            outline: (self.request.traces && listed && !clock && !field.contains("covariance")).then(Envelope::default),
+            outline: (self.request.traces && listed && !clock && !field.contains("covariance"))
+                .then(Envelope::default),
         });
         self.entries.len() - 1
     }
@@ -398,7 +466,8 @@ impl<'a> Pass<'a> {
             None => batch.times_ns,
             Some(rows) => {
                 self.scratch.clear();
-                self.scratch.extend(rows.iter().map(|r| batch.times_ns[*r as usize]));
+                self.scratch
+                    .extend(rows.iter().map(|r| batch.times_ns[*r as usize]));
                 &self.scratch
             }
         };
@@ -407,10 +476,15 @@ impl<'a> Pass<'a> {
         }
         if let Some(outline) = &mut entry.outline {
             let start_ns = i128::from(self.recording.info().start_ns);
-            times.iter().zip(values).for_each(|(t, x)| outline.push((i128::from(*t) - start_ns) as f64 / 1e9, *x));
+            times
+                .iter()
+                .zip(values)
+                .for_each(|(t, x)| outline.push((i128::from(*t) - start_ns) as f64 / 1e9, *x));
         }
         if entry.role.is_some() {
-            entry.kept.extend(times.iter().copied().zip(values.iter().copied()));
+            entry
+                .kept
+                .extend(times.iter().copied().zip(values.iter().copied()));
         }
     }
 
@@ -430,8 +504,15 @@ impl<'a> Pass<'a> {
 
     fn signals(&self) -> Vec<(String, Summary)> {
         let listed = self.entries.iter().filter(|e| e.listed);
-        let mut signals: Vec<(String, Summary)> =
-            listed.map(|e| (e.path.clone(), e.stream.summary(e.times.as_ref().unwrap_or(&self.times[e.channel]), e.unit))).collect();
+        let mut signals: Vec<(String, Summary)> = listed
+            .map(|e| {
+                (
+                    e.path.clone(),
+                    e.stream
+                        .summary(e.times.as_ref().unwrap_or(&self.times[e.channel]), e.unit),
+                )
+            })
+            .collect();
         // Angles of a quaternion that never held a rotation say nothing.
         signals.retain(|(path, s)| s.count > 0 || !self.by_path.contains_key(path));
         signals.sort_by(|a, b| natural(&a.0, &b.0));
@@ -443,25 +524,53 @@ impl<'a> Pass<'a> {
         // Topics that play a role are drawn as that; transforms and scenes repeat them.
         let known = |channel: usize| {
             let schema = &self.recording.info().channels[channel].schema;
-            let repeats = ["TFMessage", "SceneUpdate", "FrameTransform", "FrameTransforms"].iter().any(|s| schema.ends_with(s));
-            repeats || self.entries.iter().any(|e| e.channel == channel && e.role.is_some())
+            let repeats = [
+                "TFMessage",
+                "SceneUpdate",
+                "FrameTransform",
+                "FrameTransforms",
+            ]
+            .iter()
+            .any(|s| schema.ends_with(s));
+            repeats
+                || self
+                    .entries
+                    .iter()
+                    .any(|e| e.channel == channel && e.role.is_some())
         };
-        let mut drawn: Vec<&Entry> = self.entries.iter().filter(|e| e.outline.is_some() && !known(e.channel)).collect();
+        let mut drawn: Vec<&Entry> = self
+            .entries
+            .iter()
+            .filter(|e| e.outline.is_some() && !known(e.channel))
+            .collect();
         drawn.sort_by(|a, b| natural(&a.path, &b.path));
         let mut traces: Vec<Trace> = Vec::new();
         for entry in drawn {
-            let Some(outline) = &entry.outline else { continue };
+            let Some(outline) = &entry.outline else {
+                continue;
+            };
             let (t_s, x) = outline.points();
             let moves = x.iter().any(|v| *v != x[0]);
             if !moves {
                 continue;
             }
             let (shared, last) = entry.path.rsplit_once('.').unwrap_or(("", &entry.path));
-            let label = if entry.unit.is_empty() { "value".to_owned() } else { entry.unit.to_owned() };
-            match traces.iter().position(|t| t.topic == shared && t.label == label) {
+            let label = if entry.unit.is_empty() {
+                "value".to_owned()
+            } else {
+                entry.unit.to_owned()
+            };
+            match traces
+                .iter()
+                .position(|t| t.topic == shared && t.label == label)
+            {
                 Some(k) => traces[k].series.push((last.to_owned(), t_s, x)),
                 None if traces.len() < MOST_TRACES => {
-                    traces.push(Trace { topic: shared.to_owned(), label, series: vec![(last.to_owned(), t_s, x)] });
+                    traces.push(Trace {
+                        topic: shared.to_owned(),
+                        label,
+                        series: vec![(last.to_owned(), t_s, x)],
+                    });
                 }
                 None => {}
             }
@@ -470,11 +579,21 @@ impl<'a> Pass<'a> {
     }
 
     fn roles_played(&self) -> Vec<(&'static str, Vec<String>)> {
-        let topics: Vec<&str> = self.recording.info().channels.iter().map(|c| c.topic.as_str()).collect();
+        let topics: Vec<&str> = self
+            .recording
+            .info()
+            .channels
+            .iter()
+            .map(|c| c.topic.as_str())
+            .collect();
         let mut out = Vec::new();
         for (role, patterns) in self.roles.iter() {
             let mut players: Vec<String> = match role.is_topic() {
-                true => patterns.iter().filter(|p| topics.contains(&p.as_str())).cloned().collect(),
+                true => patterns
+                    .iter()
+                    .filter(|p| topics.contains(&p.as_str()))
+                    .cloned()
+                    .collect(),
                 false => self.players(role).map(|e| e.path.clone()).collect(),
             };
             if !role.is_topic() {
@@ -488,7 +607,9 @@ impl<'a> Pass<'a> {
     }
 
     fn players(&self, role: Role) -> impl Iterator<Item = &Entry> {
-        self.entries.iter().filter(move |e| e.role == Some(role) && !e.kept.is_empty())
+        self.entries
+            .iter()
+            .filter(move |e| e.role == Some(role) && !e.kept.is_empty())
     }
 
     /// A role's column, ascending in time, at most one value per time.
@@ -499,25 +620,40 @@ impl<'a> Pass<'a> {
         }
         kept.dedup_by_key(|k| k.0);
         let start_ns = i128::from(self.recording.info().start_ns);
-        kept.into_iter().map(|(t, x)| ((i128::from(t) - start_ns) as f64 / 1e9, x)).unzip()
+        kept.into_iter()
+            .map(|(t, x)| ((i128::from(t) - start_ns) as f64 / 1e9, x))
+            .unzip()
     }
 
     fn inputs(&self, metadata: &[(String, String)], said: Option<&RolesFile>) -> Inputs {
         let mut inputs = Inputs {
-            mass_kg: said.and_then(|s| s.mass_kg).or_else(|| number(metadata, "mass_kg")).filter(|m| *m > 0.0),
+            mass_kg: said
+                .and_then(|s| s.mass_kg)
+                .or_else(|| number(metadata, "mass_kg"))
+                .filter(|m| *m > 0.0),
             ..Inputs::default()
         };
-        if let Some(g) = said.and_then(|s| s.gravity_m_per_s2).or_else(|| number(metadata, "gravity_m_per_s2")).filter(|g| *g > 0.0) {
+        if let Some(g) = said
+            .and_then(|s| s.gravity_m_per_s2)
+            .or_else(|| number(metadata, "gravity_m_per_s2"))
+            .filter(|g| *g > 0.0)
+        {
             inputs.gravity_m_per_s2 = g;
         }
         // Motion: the time axis of the roll, else of whatever is there.
         for role in [Role::Roll, Role::Height, Role::Pitch, Role::Yaw] {
-            let Some(entry) = self.players(role).next() else { continue };
+            let Some(entry) = self.players(role).next() else {
+                continue;
+            };
             let (t_s, x) = self.column(entry);
             if inputs.t_s.is_empty() {
                 inputs.t_s.clone_from(&t_s);
             }
-            let x = if t_s == inputs.t_s { x } else { interpolate(&t_s, &x, &inputs.t_s) };
+            let x = if t_s == inputs.t_s {
+                x
+            } else {
+                interpolate(&t_s, &x, &inputs.t_s)
+            };
             match role {
                 Role::Roll => inputs.roll_rad = x,
                 Role::Height => inputs.height_m = x,
@@ -534,7 +670,10 @@ impl<'a> Pass<'a> {
             }
             inputs.beat_phase_rad = at_times(&t_s, &psi, &inputs.phase_t_s);
         }
-        let ours = self.players(Role::Roll).chain(self.players(Role::Height)).next();
+        let ours = self
+            .players(Role::Roll)
+            .chain(self.players(Role::Height))
+            .next();
         if let Some(entry) = ours {
             let schema = &self.recording.info().channels[entry.channel].schema;
             if schema != "rath.State" {
@@ -549,7 +688,9 @@ impl<'a> Pass<'a> {
     fn columns(&self, role: Role) -> (Vec<f64>, Vec<Vec<f64>>) {
         let mut players: Vec<&Entry> = self.players(role).collect();
         players.sort_by(|a, b| natural(&a.path, &b.path));
-        let Some(first) = players.first() else { return Default::default() };
+        let Some(first) = players.first() else {
+            return Default::default();
+        };
         let (axis, x) = self.column(first);
         let mut columns = vec![x];
         for entry in &players[1..] {
@@ -572,18 +713,32 @@ fn at_times(t_s: &[f64], x: &[f64], axis: &[f64]) -> Vec<f64> {
             while k < t_s.len() && t_s[k] < *at {
                 k += 1;
             }
-            if k < t_s.len() && t_s[k] == *at { x[k] } else { f64::NAN }
+            if k < t_s.len() && t_s[k] == *at {
+                x[k]
+            } else {
+                f64::NAN
+            }
         })
         .collect()
 }
 
 /// Spectra of the roles' columns and of the signals that were asked for by name.
-fn spectra(pass: &Pass, inputs: &Inputs, window: Window, metrics: &Metrics, request: &Request) -> Vec<(String, SpectrumSummary)> {
-    let f_hz = metrics.number("beat_hz").or_else(|| metrics.number("peak_hz"));
+fn spectra(
+    pass: &Pass,
+    inputs: &Inputs,
+    window: Window,
+    metrics: &Metrics,
+    request: &Request,
+) -> Vec<(String, SpectrumSummary)> {
+    let f_hz = metrics
+        .number("beat_hz")
+        .or_else(|| metrics.number("peak_hz"));
     let name = |role: Role, k: usize| {
         let mut paths: Vec<&str> = pass.players(role).map(|e| e.path.as_str()).collect();
         paths.sort_by(|a, b| natural(a, b));
-        paths.get(k).map_or_else(|| role.name().to_owned(), |p| (*p).to_owned())
+        paths
+            .get(k)
+            .map_or_else(|| role.name().to_owned(), |p| (*p).to_owned())
     };
     let mut out = Vec::new();
     for (role, x, unit) in [
@@ -591,17 +746,32 @@ fn spectra(pass: &Pass, inputs: &Inputs, window: Window, metrics: &Metrics, requ
         (Role::Roll, &inputs.roll_rad, "rad"),
         (Role::Pitch, &inputs.pitch_rad, "rad"),
     ] {
-        out.extend(SpectrumSummary::of(&inputs.t_s, x, window, f_hz, unit).map(|s| (name(role, 0), s)));
+        out.extend(
+            SpectrumSummary::of(&inputs.t_s, x, window, f_hz, unit).map(|s| (name(role, 0), s)),
+        );
     }
     for (k, force) in inputs.normal_n.iter().enumerate() {
-        out.extend(SpectrumSummary::of(inputs.force_times(), force, window, f_hz, "N").map(|s| (name(Role::Forces, k), s)));
+        out.extend(
+            SpectrumSummary::of(inputs.force_times(), force, window, f_hz, "N")
+                .map(|s| (name(Role::Forces, k), s)),
+        );
     }
     if !request.signals.is_empty() {
         for entry in pass.entries.iter().filter(|e| e.listed) {
-            let hz = entry.times.as_ref().unwrap_or(&pass.times[entry.channel]).hz();
+            let hz = entry
+                .times
+                .as_ref()
+                .unwrap_or(&pass.times[entry.channel])
+                .hz();
             let known = out.iter().any(|(path, _)| *path == entry.path);
-            if let Some(spectrum) = hz.filter(|_| !known).and_then(|hz| entry.stream.spectrum(hz)) {
-                out.push((entry.path.clone(), SpectrumSummary::new(spectrum, f_hz, entry.unit)));
+            if let Some(spectrum) = hz
+                .filter(|_| !known)
+                .and_then(|hz| entry.stream.spectrum(hz))
+            {
+                out.push((
+                    entry.path.clone(),
+                    SpectrumSummary::new(spectrum, f_hz, entry.unit),
+                ));
             }
         }
     }
@@ -615,7 +785,11 @@ fn natural(a: &str, b: &str) -> std::cmp::Ordering {
         let digits = |s: &[u8]| s.iter().take_while(|c| c.is_ascii_digit()).count();
         let (m, n) = (digits(a), digits(b));
         if m > 0 && n > 0 {
-            let value = |s: &[u8]| s.iter().fold(0u128, |v, c| v.saturating_mul(10).saturating_add(u128::from(c - b'0')));
+            let value = |s: &[u8]| {
+                s.iter().fold(0u128, |v, c| {
+                    v.saturating_mul(10).saturating_add(u128::from(c - b'0'))
+                })
+            };
             let order = value(&a[..m]).cmp(&value(&b[..n])).then(m.cmp(&n));
             if order.is_ne() {
                 return order;

@@ -275,7 +275,7 @@ pub fn spline_derivatives(y: &[f64], step_s: f64) -> Option<(Vec<f64>, Vec<f64>)
         m[k] = right;
     }
     for k in inner.rev() {
-        let next = if k + 1 <= n - 3 { m[k + 1] } else { 0.0 };
+        let next = if k < n - 3 { m[k + 1] } else { 0.0 };
         m[k] = (m[k] - next) / diagonal[k];
     }
     m[0] = 2.0 * m[1] - m[2];

@@ -59,7 +59,11 @@ impl SpectrumSummary {
     /// Finds and names the lines of a spectrum of a signal in `unit`.
     pub fn new(spectrum: Spectrum, f_hz: Option<f64>, unit: &str) -> Self {
         let (low, high) = spectrum.confidence(0.95);
-        let unit = if unit.is_empty() { "1/Hz".to_owned() } else { format!("({unit})^2/Hz") };
+        let unit = if unit.is_empty() {
+            "1/Hz".to_owned()
+        } else {
+            format!("({unit})^2/Hz")
+        };
         SpectrumSummary {
             method: "welch",
             window: "hann",
@@ -77,7 +81,13 @@ impl SpectrumSummary {
     }
 
     /// Of an evenly sampled column in a window, in segments of [`DEFAULT_SEGMENT_S`]. `None` below 16 finite samples.
-    pub fn of(t_s: &[f64], x: &[f64], window: Window, f_hz: Option<f64>, unit: &str) -> Option<Self> {
+    pub fn of(
+        t_s: &[f64],
+        x: &[f64],
+        window: Window,
+        f_hz: Option<f64>,
+        unit: &str,
+    ) -> Option<Self> {
         if x.len() != t_s.len() {
             return None;
         }
@@ -107,14 +117,22 @@ fn peaks(s: &Spectrum, f_hz: Option<f64>) -> Vec<Peak> {
     let (median, largest) = (sorted[sorted.len() / 2], sorted[sorted.len() - 1]);
     let floor = (ABOVE_MEDIAN * median).max(BELOW_PEAK * largest);
     // Maxima of five bins: the taper's main lobe is four wide.
-    let is_top = |k: &usize| (k.saturating_sub(2).max(1)..(k + 3).min(p.len())).all(|j| j == *k || p[j] < p[*k]);
+    let is_top = |k: &usize| {
+        (k.saturating_sub(2).max(1)..(k + 3).min(p.len())).all(|j| j == *k || p[j] < p[*k])
+    };
     // The first bins hold what is left of drifts, not lines.
-    let mut tops: Vec<usize> = (3..p.len()).filter(|k| p[*k] > floor).filter(is_top).collect();
+    let mut tops: Vec<usize> = (3..p.len())
+        .filter(|k| p[*k] > floor)
+        .filter(is_top)
+        .collect();
     tops.sort_by(|a, b| p[*b].total_cmp(&p[*a]));
     let mut kept: Vec<usize> = Vec::new();
     for k in tops {
         // What the stronger lines leak here through the taper's side lobes, twice over.
-        let leaked: f64 = kept.iter().map(|j| p[*j] * side_lobe(k.abs_diff(*j) as f64)).sum();
+        let leaked: f64 = kept
+            .iter()
+            .map(|j| p[*j] * side_lobe(k.abs_diff(*j) as f64))
+            .sum();
         if p[k] > 2.0 * leaked && kept.len() < MOST {
             kept.push(k);
         }
@@ -122,14 +140,22 @@ fn peaks(s: &Spectrum, f_hz: Option<f64>) -> Vec<Peak> {
     kept.into_iter()
         .map(|k| {
             let hz = s.refine(k);
-            Peak { hz, power: p[k], kind: f_hz.map_or("other", |f| name(hz, f, s.resolution_hz)) }
+            Peak {
+                hz,
+                power: p[k],
+                kind: f_hz.map_or("other", |f| name(hz, f, s.resolution_hz)),
+            }
         })
         .collect()
 }
 
 /// The envelope of the Hann taper's side lobes in power, `d` bins from a line: 1 / (π d (d² − 1))²; 1 inside the main lobe (Harris 1978).
 fn side_lobe(d: f64) -> f64 {
-    if d < 2.0 { 1.0 } else { (std::f64::consts::PI * d * (d * d - 1.0)).powi(-2) }
+    if d < 2.0 {
+        1.0
+    } else {
+        (std::f64::consts::PI * d * (d * d - 1.0)).powi(-2)
+    }
 }
 
 /// The multiple of f/2 that lies within one resolution of `hz` (and within an eighth of f).
@@ -137,7 +163,11 @@ fn name(hz: f64, f_hz: f64, resolution_hz: f64) -> &'static str {
     let near = resolution_hz.min(f_hz / 8.0);
     let multiple = (hz / (f_hz / 2.0)).round();
     let fits = (hz - multiple * f_hz / 2.0).abs() <= near && (1.0..=6.0).contains(&multiple);
-    if fits { NAMES[multiple as usize - 1] } else { "other" }
+    if fits {
+        NAMES[multiple as usize - 1]
+    } else {
+        "other"
+    }
 }
 
 #[cfg(test)]
@@ -152,9 +182,14 @@ mod tests {
         let x: Vec<f64> = t
             .iter()
             .map(|t| {
-                state = state.wrapping_mul(6364136223846793005).wrapping_add(1442695040888963407);
+                state = state
+                    .wrapping_mul(6364136223846793005)
+                    .wrapping_add(1442695040888963407);
                 let noise = (state >> 11) as f64 / (1u64 << 53) as f64 - 0.5;
-                (TAU * 1.075 * t).sin() + 0.1 * (TAU * 2.15 * t).sin() + 0.05 * (TAU * 5.5 * t).sin() + 0.01 * noise
+                (TAU * 1.075 * t).sin()
+                    + 0.1 * (TAU * 2.15 * t).sin()
+                    + 0.05 * (TAU * 5.5 * t).sin()
+                    + 0.01 * noise
             })
             .collect();
         let s = SpectrumSummary::of(&t, &x, Window::ALL, Some(2.15), "rad").unwrap();

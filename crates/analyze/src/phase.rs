@@ -285,7 +285,7 @@ pub fn hilbert(x: &[f64]) -> Vec<Complex64> {
     let mut transform = crate::spectrum::rfft(x);
     let last = transform.len() - 1;
     for (k, z) in transform.iter_mut().enumerate() {
-        let alone = k == 0 || (n % 2 == 0 && k == last);
+        let alone = k == 0 || (n.is_multiple_of(2) && k == last);
         *z = if alone {
             Complex64::default()
         } else {

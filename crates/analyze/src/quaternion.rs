@@ -43,9 +43,17 @@ struct Found {
 impl Quaternions {
     /// Gives path and values of every angle of every quaternion in the batch.
     pub fn each(&mut self, batch: &Batch<'_>, mut sink: impl FnMut(&str, &[f64])) {
-        let entry = self.known.entry(batch.channel).or_insert_with(|| (usize::MAX, Vec::new()));
+        let entry = self
+            .known
+            .entry(batch.channel)
+            .or_insert_with(|| (usize::MAX, Vec::new()));
         let fits = entry.0 == batch.columns.len()
-            && entry.1.iter().all(|f| f.columns.iter().zip("xyzw".chars()).all(|(c, last)| batch.columns[*c].path.ends_with(last)));
+            && entry.1.iter().all(|f| {
+                f.columns
+                    .iter()
+                    .zip("xyzw".chars())
+                    .all(|(c, last)| batch.columns[*c].path.ends_with(last))
+            });
         if !fits {
             *entry = (batch.columns.len(), find(batch));
         }
@@ -66,14 +74,24 @@ impl Quaternions {
 
 /// Columns that end in .x, .y, .z and .w after the same path, with a value in every message.
 fn find(batch: &Batch<'_>) -> Vec<Found> {
-    let place: HashMap<&str, usize> =
-        batch.columns.iter().enumerate().filter(|(_, c)| c.rows.is_none()).map(|(k, c)| (c.path, k)).collect();
+    let place: HashMap<&str, usize> = batch
+        .columns
+        .iter()
+        .enumerate()
+        .filter(|(_, c)| c.rows.is_none())
+        .map(|(k, c)| (c.path, k))
+        .collect();
     let mut found = Vec::new();
     for column in batch.columns {
-        let Some(prefix) = column.path.strip_suffix(".w") else { continue };
+        let Some(prefix) = column.path.strip_suffix(".w") else {
+            continue;
+        };
         let at = |last: &str| place.get(format!("{prefix}.{last}").as_str()).copied();
         if let (Some(x), Some(y), Some(z), Some(w)) = (at("x"), at("y"), at("z"), at("w")) {
-            found.push(Found { paths: ANGLES.map(|a| format!("{prefix}.{a}")), columns: [x, y, z, w] });
+            found.push(Found {
+                paths: ANGLES.map(|a| format!("{prefix}.{a}")),
+                columns: [x, y, z, w],
+            });
         }
     }
     found
@@ -85,7 +103,12 @@ mod tests {
 
     #[test]
     fn angles_come_back_from_the_quaternion_they_made() {
-        for (roll, pitch, yaw) in [(0.1, 0.2, 0.3), (-2.0, 1.2, 3.0), (3.0, -1.5, -0.1), (0.0, 0.0, 0.0)] {
+        for (roll, pitch, yaw) in [
+            (0.1, 0.2, 0.3),
+            (-2.0, 1.2, 3.0),
+            (3.0, -1.5, -0.1),
+            (0.0, 0.0, 0.0),
+        ] {
             let half = |a: f64| (a / 2.0).sin_cos();
             let ((sr, cr), (sp, cp), (sy, cy)) = (half(roll), half(pitch), half(yaw));
             let w = cr * cp * cy + sr * sp * sy;
@@ -94,7 +117,10 @@ mod tests {
             let z = cr * cp * sy - sr * sp * cy;
             // Any multiple stands for the same rotation.
             let k = 1.1;
-            for (a, b) in angles(k * x, k * y, k * z, k * w).iter().zip([roll, pitch, yaw]) {
+            for (a, b) in angles(k * x, k * y, k * z, k * w)
+                .iter()
+                .zip([roll, pitch, yaw])
+            {
                 assert!((a - b).abs() < 1e-12, "{a} {b}");
             }
         }

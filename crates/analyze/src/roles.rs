@@ -125,18 +125,46 @@ const BY_SCHEMA: &[(&str, Role, &str)] = &[
     ("rath.Phases", Role::Phases, "phase_rad[*]"),
     ("rath.Phases", Role::BeatPhase, "beat_phase_rad"),
     ("nav_msgs/Odometry", Role::Height, "pose.pose.position.z"),
-    ("nav_msgs/Odometry", Role::Roll, "pose.pose.orientation.roll"),
-    ("nav_msgs/Odometry", Role::Pitch, "pose.pose.orientation.pitch"),
+    (
+        "nav_msgs/Odometry",
+        Role::Roll,
+        "pose.pose.orientation.roll",
+    ),
+    (
+        "nav_msgs/Odometry",
+        Role::Pitch,
+        "pose.pose.orientation.pitch",
+    ),
     ("nav_msgs/Odometry", Role::Yaw, "pose.pose.orientation.yaw"),
     ("geometry_msgs/PoseStamped", Role::Height, "pose.position.z"),
-    ("geometry_msgs/PoseStamped", Role::Roll, "pose.orientation.roll"),
-    ("geometry_msgs/PoseStamped", Role::Pitch, "pose.orientation.pitch"),
-    ("geometry_msgs/PoseStamped", Role::Yaw, "pose.orientation.yaw"),
+    (
+        "geometry_msgs/PoseStamped",
+        Role::Roll,
+        "pose.orientation.roll",
+    ),
+    (
+        "geometry_msgs/PoseStamped",
+        Role::Pitch,
+        "pose.orientation.pitch",
+    ),
+    (
+        "geometry_msgs/PoseStamped",
+        Role::Yaw,
+        "pose.orientation.yaw",
+    ),
     ("foxglove.PoseInFrame", Role::Height, "pose.position.z"),
     ("foxglove.PoseInFrame", Role::Roll, "pose.orientation.roll"),
-    ("foxglove.PoseInFrame", Role::Pitch, "pose.orientation.pitch"),
+    (
+        "foxglove.PoseInFrame",
+        Role::Pitch,
+        "pose.orientation.pitch",
+    ),
     ("foxglove.PoseInFrame", Role::Yaw, "pose.orientation.yaw"),
-    ("geometry_msgs/WrenchStamped", Role::Forces, "wrench.force.z"),
+    (
+        "geometry_msgs/WrenchStamped",
+        Role::Forces,
+        "wrench.force.z",
+    ),
 ];
 
 /// Which signals and topics play which role.
@@ -147,8 +175,13 @@ pub struct Roles {
 
 impl Roles {
     /// From the channels (topic, schema) of a recording, and what the user says; the user's word stands over inference, role by role.
-    pub fn infer<'a>(channels: impl Iterator<Item = (&'a str, &'a str)>, user: Option<&RolesFile>) -> Self {
-        let mut channels: Vec<(&str, String)> = channels.map(|(topic, schema)| (topic, schema.replacen("/msg/", "/", 1))).collect();
+    pub fn infer<'a>(
+        channels: impl Iterator<Item = (&'a str, &'a str)>,
+        user: Option<&RolesFile>,
+    ) -> Self {
+        let mut channels: Vec<(&str, String)> = channels
+            .map(|(topic, schema)| (topic, schema.replacen("/msg/", "/", 1)))
+            .collect();
         channels.sort();
         channels.dedup();
         let mut roles = Roles::default();
@@ -157,8 +190,11 @@ impl Roles {
             if roles.patterns.contains_key(role) {
                 continue;
             }
-            let mut found: Vec<String> =
-                channels.iter().filter(|(t, s)| s == schema && !is_truth(t)).map(|(t, _)| format!("{t}.{field}")).collect();
+            let mut found: Vec<String> = channels
+                .iter()
+                .filter(|(t, s)| s == schema && !is_truth(t))
+                .map(|(t, _)| format!("{t}.{field}"))
+                .collect();
             if !matches!(role, Role::Forces) {
                 found.truncate(1);
             }
@@ -167,20 +203,33 @@ impl Roles {
             }
         }
         let of_type = |schemas: &[&str]| -> Vec<String> {
-            channels.iter().filter(|(_, s)| schemas.contains(&s.as_str())).map(|(t, _)| (*t).to_owned()).collect()
+            channels
+                .iter()
+                .filter(|(_, s)| schemas.contains(&s.as_str()))
+                .map(|(t, _)| (*t).to_owned())
+                .collect()
         };
-        let (carriers, others): (Vec<String>, Vec<String>) = of_type(&["sensor_msgs/Imu"]).into_iter().partition(|t| is_carrier(t));
+        let (carriers, others): (Vec<String>, Vec<String>) = of_type(&["sensor_msgs/Imu"])
+            .into_iter()
+            .partition(|t| is_carrier(t));
         if !others.is_empty() {
             roles.patterns.insert(Role::Imu, vec![preferred(&others)]);
         }
         if !carriers.is_empty() {
-            roles.patterns.insert(Role::Carriers, natural_order(carriers));
+            roles
+                .patterns
+                .insert(Role::Carriers, natural_order(carriers));
         }
         let beats = of_type(&["rath.Beat"]);
         if !beats.is_empty() {
             roles.patterns.insert(Role::Beats, beats[..1].to_vec());
         }
-        let pose = ["geometry_msgs/PoseStamped", "nav_msgs/Odometry", "foxglove.PoseInFrame", "rath.State"];
+        let pose = [
+            "geometry_msgs/PoseStamped",
+            "nav_msgs/Odometry",
+            "foxglove.PoseInFrame",
+            "rath.State",
+        ];
         if let Some(truth) = of_type(&pose).into_iter().find(|t| is_truth(t)) {
             roles.patterns.insert(Role::Truth, vec![truth]);
         } else if let Some(state) = of_type(&["rath.State"]).first() {
@@ -227,13 +276,19 @@ fn is_truth(topic: &str) -> bool {
 
 fn is_carrier(topic: &str) -> bool {
     let topic = topic.to_lowercase();
-    ["carrier", "bearer", "walker", "person"].iter().any(|word| topic.contains(word))
+    ["carrier", "bearer", "walker", "person"]
+        .iter()
+        .any(|word| topic.contains(word))
 }
 
 /// Of several IMUs the one whose name speaks of what is carried, else the first by name.
 fn preferred(topics: &[String]) -> String {
     let about = ["rath", "palanquin", "palki", "pole", "load", "body"];
-    topics.iter().find(|t| about.iter().any(|word| t.to_lowercase().contains(word))).unwrap_or(&topics[0]).clone()
+    topics
+        .iter()
+        .find(|t| about.iter().any(|word| t.to_lowercase().contains(word)))
+        .unwrap_or(&topics[0])
+        .clone()
 }
 
 /// `carrier_2` before `carrier_10`.
@@ -276,7 +331,11 @@ mod tests {
     #[test]
     fn wildcards() {
         for (pattern, path, fits) in [
-            ("/imu/rath.angular_velocity.x", "/imu/rath.angular_velocity.x", true),
+            (
+                "/imu/rath.angular_velocity.x",
+                "/imu/rath.angular_velocity.x",
+                true,
+            ),
             ("/imu/*", "/imu/rath.angular_velocity.x", true),
             ("*.x", "/imu/rath.angular_velocity.x", true),
             ("*.x", "/imu/rath.angular_velocity.y", false),
@@ -303,20 +362,32 @@ mod tests {
         ];
         let roles = Roles::infer(channels.into_iter(), None);
         assert_eq!(roles.of_signal("/rath/state.roll_rad"), Some(Role::Roll));
-        assert_eq!(roles.of_signal("/handles/forces.normal_n[3]"), Some(Role::Forces));
+        assert_eq!(
+            roles.of_signal("/handles/forces.normal_n[3]"),
+            Some(Role::Forces)
+        );
         assert_eq!(roles.of_signal("/handles/forces.compression_m[3]"), None);
         assert_eq!(roles.topic(Role::Imu), Some("/imu/rath"));
-        assert_eq!(roles.patterns(Role::Carriers), ["/imu/carrier_2", "/imu/carrier_10"]);
+        assert_eq!(
+            roles.patterns(Role::Carriers),
+            ["/imu/carrier_2", "/imu/carrier_10"]
+        );
         assert_eq!(roles.topic(Role::Truth), Some("/rath/state"));
     }
 
     #[test]
     fn a_true_pose_is_no_measurement_and_the_user_is_right() {
-        let channels = [("/truth/pose", "geometry_msgs/msg/PoseStamped"), ("/imu/data", "sensor_msgs/msg/Imu")];
+        let channels = [
+            ("/truth/pose", "geometry_msgs/msg/PoseStamped"),
+            ("/imu/data", "sensor_msgs/msg/Imu"),
+        ];
         let roles = Roles::infer(channels.into_iter(), None);
         assert_eq!(roles.patterns(Role::Height), [""; 0]);
         assert_eq!(roles.topic(Role::Truth), Some("/truth/pose"));
-        let user = RolesFile { height: Some("/x.z".into()), ..RolesFile::default() };
+        let user = RolesFile {
+            height: Some("/x.z".into()),
+            ..RolesFile::default()
+        };
         let roles = Roles::infer(channels.into_iter(), Some(&user));
         assert_eq!(roles.of_signal("/x.z"), Some(Role::Height));
         assert_eq!(roles.topic(Role::Imu), Some("/imu/data"));

@@ -59,7 +59,11 @@ impl Moments {
                 sum[l] += d;
                 squares[l] += d * d;
                 low[l] = if chunk[l] < low[l] { chunk[l] } else { low[l] };
-                high[l] = if chunk[l] > high[l] { chunk[l] } else { high[l] };
+                high[l] = if chunk[l] > high[l] {
+                    chunk[l]
+                } else {
+                    high[l]
+                };
             }
         }
         for (l, x) in rest.iter().enumerate() {
@@ -135,14 +139,17 @@ pub struct Times {
 impl Times {
     /// The next log times.
     pub fn push(&mut self, times_ns: &[i64]) {
-        let (Some(&first), Some(&last)) = (times_ns.first(), times_ns.last()) else { return };
+        let (Some(&first), Some(&last)) = (times_ns.first(), times_ns.last()) else {
+            return;
+        };
         self.buffer.clear();
         if self.count == 0 {
             (self.first_ns, self.earliest_ns, self.latest_ns) = (first, first, first);
         } else {
             self.buffer.push(seconds(self.last_ns, first));
         }
-        self.buffer.extend(times_ns.windows(2).map(|w| seconds(w[0], w[1])));
+        self.buffer
+            .extend(times_ns.windows(2).map(|w| seconds(w[0], w[1])));
         for t in times_ns {
             self.earliest_ns = self.earliest_ns.min(*t);
             self.latest_ns = self.latest_ns.max(*t);
@@ -187,16 +194,30 @@ pub fn segment(hz: f64, messages: u64) -> usize {
     let wanted = (hz * DEFAULT_SEGMENT_S).clamp(16.0, 1e6) as usize;
     let longest = (messages.max(2) as usize).min(1 << 20);
     // The power of two below: 10 to 20 s.
-    let power = if wanted.is_power_of_two() { wanted } else { wanted.next_power_of_two() / 2 };
+    let power = if wanted.is_power_of_two() {
+        wanted
+    } else {
+        wanted.next_power_of_two() / 2
+    };
     power.min(longest)
 }
 
 impl Stream {
     /// For a signal of about `hz`; `nperseg` 0 leaves the spectrum out.
     pub fn new(hz: f64, nperseg: usize) -> Self {
-        let options = Options { nperseg, ..Options::default() };
-        let welch = (nperseg > 1 && hz > 0.0).then(|| WelchStream::new(hz, &options).ok()).flatten();
-        Stream { moments: Moments::default(), welch, held: 0.0, filled: Vec::new() }
+        let options = Options {
+            nperseg,
+            ..Options::default()
+        };
+        let welch = (nperseg > 1 && hz > 0.0)
+            .then(|| WelchStream::new(hz, &options).ok())
+            .flatten();
+        Stream {
+            moments: Moments::default(),
+            welch,
+            held: 0.0,
+            filled: Vec::new(),
+        }
     }
 
     /// The next values. Non-finite ones do not count; in the spectrum the last finite one stands for them.
@@ -212,7 +233,8 @@ impl Stream {
             return;
         }
         self.filled.clear();
-        self.filled.extend(x.iter().copied().filter(|x| x.is_finite()));
+        self.filled
+            .extend(x.iter().copied().filter(|x| x.is_finite()));
         self.moments.push_finite(&self.filled);
         self.filled.clear();
         for x in x {
@@ -244,7 +266,10 @@ impl Stream {
             max: range.map(|r| r.1),
             mean: self.moments.mean(),
             sd: self.moments.sd(),
-            peak_hz: hz.filter(|_| moves).and_then(|hz| self.spectrum(hz)).and_then(|s| s.peak_hz()),
+            peak_hz: hz
+                .filter(|_| moves)
+                .and_then(|hz| self.spectrum(hz))
+                .and_then(|s| s.peak_hz()),
             unit: unit.to_owned(),
         }
     }
@@ -262,7 +287,11 @@ mod tests {
         for batch in [1, 3, 8, 100, 1000] {
             let mut m = Moments::default();
             x.chunks(batch).for_each(|c| m.push_finite(c));
-            assert!((m.mean().unwrap() - mean).abs() < 1e-9 && (m.sd().unwrap() / sd - 1.0).abs() < 1e-9, "{batch}");
+            assert!(
+                (m.mean().unwrap() - mean).abs() < 1e-9
+                    && (m.sd().unwrap() / sd - 1.0).abs() < 1e-9,
+                "{batch}"
+            );
             let range = m.range().unwrap();
             assert_eq!(range.0, x.iter().copied().fold(f64::INFINITY, f64::min));
             assert_eq!(range.1, x.iter().copied().fold(f64::NEG_INFINITY, f64::max));
@@ -287,8 +316,15 @@ mod tests {
     fn nan_is_left_out_of_the_moments_and_held_in_the_spectrum() {
         let mut s = Stream::new(100.0, 128);
         let mut times = Times::default();
-        let x: Vec<f64> =
-            (0..1000).map(|k| if k % 100 == 7 { f64::NAN } else { (std::f64::consts::TAU * 5.0 * k as f64 / 100.0).sin() }).collect();
+        let x: Vec<f64> = (0..1000)
+            .map(|k| {
+                if k % 100 == 7 {
+                    f64::NAN
+                } else {
+                    (std::f64::consts::TAU * 5.0 * k as f64 / 100.0).sin()
+                }
+            })
+            .collect();
         s.push(&x);
         times.push(&(0..1000).map(|k| k * 10_000_000).collect::<Vec<_>>());
         let summary = s.summary(&times, "m");

@@ -57,9 +57,18 @@ pub struct Columns {
 ///
 /// # Errors
 /// [`TableError`]; nothing is left under the final name then.
-pub fn write(recording: &Recording, request: &Request, downsample: u64, out: &Path) -> Result<(), TableError> {
+pub fn write(
+    recording: &Recording,
+    request: &Request,
+    downsample: u64,
+    out: &Path,
+) -> Result<(), TableError> {
     let name = out.display().to_string();
-    let kind = out.extension().and_then(|e| e.to_str()).unwrap_or("").to_lowercase();
+    let kind = out
+        .extension()
+        .and_then(|e| e.to_str())
+        .unwrap_or("")
+        .to_lowercase();
     if !matches!(kind.as_str(), "csv" | "parquet") {
         return Err(TableError::Kind(name));
     }
@@ -67,7 +76,10 @@ pub fn write(recording: &Recording, request: &Request, downsample: u64, out: &Pa
     if columns.columns.is_empty() {
         return Err(TableError::Empty(name));
     }
-    let io = |source| TableError::Io { name: name.clone(), source };
+    let io = |source| TableError::Io {
+        name: name.clone(),
+        source,
+    };
     // Both kinds of failure in one type, sorted out afterwards.
     let written: Result<(), Trouble> = crate::whole::write_whole(out, |file| match kind.as_str() {
         "csv" => Ok(csv(&columns, file)?),
@@ -92,10 +104,23 @@ impl From<std::io::Error> for Trouble {
 }
 
 /// Reads the wanted signals and joins them by time.
-fn collect(recording: &Recording, request: &Request, downsample: u64) -> Result<Columns, ReadError> {
+fn collect(
+    recording: &Recording,
+    request: &Request,
+    downsample: u64,
+) -> Result<Columns, ReadError> {
     let lists = |path: &str| {
-        let topic = request.topics.is_empty() || request.topics.iter().any(|t| crate::roles::matches(&format!("{t}.*"), path));
-        topic && (request.signals.is_empty() || request.signals.iter().any(|p| crate::roles::matches(p, path)))
+        let topic = request.topics.is_empty()
+            || request
+                .topics
+                .iter()
+                .any(|t| crate::roles::matches(&format!("{t}.*"), path));
+        topic
+            && (request.signals.is_empty()
+                || request
+                    .signals
+                    .iter()
+                    .any(|p| crate::roles::matches(p, path)))
     };
     let select = |path: &str| {
         lists(path)
@@ -112,7 +137,8 @@ fn collect(recording: &Recording, request: &Request, downsample: u64) -> Result<
     let start_ns = recording.info().start_ns;
     let seconds = |t: i64| (i128::from(t) - i128::from(start_ns)) as f64 / 1e9;
     let inside = |t: i64| {
-        request.window.0.is_none_or(|a| seconds(t) >= a) && request.window.1.is_none_or(|b| seconds(t) <= b)
+        request.window.0.is_none_or(|a| seconds(t) >= a)
+            && request.window.1.is_none_or(|b| seconds(t) <= b)
     };
     let mut time_ns: Vec<i64> = Vec::new();
     let mut axes: Vec<*const i64> = Vec::new();
@@ -127,8 +153,15 @@ fn collect(recording: &Recording, request: &Request, downsample: u64) -> Result<
     time_ns.dedup();
     let step = usize::try_from(downsample).unwrap_or(usize::MAX).max(1);
     let time_ns: Vec<i64> = time_ns.into_iter().step_by(step).collect();
-    let columns = signals.into_iter().map(|s| (s.path.clone(), s.unit.clone(), on_axis(&s, &time_ns))).collect();
-    Ok(Columns { t_s: time_ns.iter().map(|t| seconds(*t)).collect(), time_ns, columns })
+    let columns = signals
+        .into_iter()
+        .map(|s| (s.path.clone(), s.unit.clone(), on_axis(&s, &time_ns)))
+        .collect();
+    Ok(Columns {
+        t_s: time_ns.iter().map(|t| seconds(*t)).collect(),
+        time_ns,
+        columns,
+    })
 }
 
 /// The signal's last value at each time of the axis, where it has one there.
@@ -154,15 +187,23 @@ fn quaternions(signals: &[Signal]) -> Vec<Signal> {
     let at = |path: String| signals.iter().find(|s| s.path == path);
     let mut out = Vec::new();
     for w in signals {
-        let Some(prefix) = w.path.strip_suffix(".w") else { continue };
-        let (Some(x), Some(y), Some(z)) = (at(format!("{prefix}.x")), at(format!("{prefix}.y")), at(format!("{prefix}.z"))) else {
+        let Some(prefix) = w.path.strip_suffix(".w") else {
+            continue;
+        };
+        let (Some(x), Some(y), Some(z)) = (
+            at(format!("{prefix}.x")),
+            at(format!("{prefix}.y")),
+            at(format!("{prefix}.z")),
+        ) else {
             continue;
         };
         let n = w.values.len();
         if [x, y, z].iter().any(|s| s.values.len() != n) {
             continue;
         }
-        let all: Vec<[f64; 3]> = (0..n).map(|k| angles(x.values[k], y.values[k], z.values[k], w.values[k])).collect();
+        let all: Vec<[f64; 3]> = (0..n)
+            .map(|k| angles(x.values[k], y.values[k], z.values[k], w.values[k]))
+            .collect();
         if all.iter().all(|a| a[0].is_nan()) {
             continue;
         }
@@ -182,7 +223,11 @@ fn csv(table: &Columns, out: &mut impl Write) -> std::io::Result<()> {
     let mut out = std::io::BufWriter::with_capacity(1 << 20, out);
     write!(out, "time_ns,t_s")?;
     for (path, unit, _) in &table.columns {
-        let name = if unit.is_empty() { path.clone() } else { format!("{path} [{unit}]") };
+        let name = if unit.is_empty() {
+            path.clone()
+        } else {
+            format!("{path} [{unit}]")
+        };
         write!(out, ",{}", quoted(&name))?;
     }
     writeln!(out)?;
@@ -215,9 +260,15 @@ fn parquet(table: &Columns, out: &mut (impl Write + Send), name: &str) -> Result
     use parquet::file::writer::SerializedFileWriter;
     use parquet::schema::types::Type;
 
-    let problem = |e: parquet::errors::ParquetError| TableError::Format { name: name.to_owned(), problem: e.to_string() };
+    let problem = |e: parquet::errors::ParquetError| TableError::Format {
+        name: name.to_owned(),
+        problem: e.to_string(),
+    };
     let field = |path: &str, physical, repetition| {
-        Type::primitive_type_builder(path, physical).with_repetition(repetition).build().map(Arc::new)
+        Type::primitive_type_builder(path, physical)
+            .with_repetition(repetition)
+            .build()
+            .map(Arc::new)
     };
     let mut fields = vec![
         field("time_ns", Physical::INT64, Repetition::REQUIRED).map_err(problem)?,
@@ -226,7 +277,12 @@ fn parquet(table: &Columns, out: &mut (impl Write + Send), name: &str) -> Result
     for (path, _, _) in &table.columns {
         fields.push(field(path, Physical::DOUBLE, Repetition::OPTIONAL).map_err(problem)?);
     }
-    let schema = Arc::new(Type::group_type_builder("signals").with_fields(fields).build().map_err(problem)?);
+    let schema = Arc::new(
+        Type::group_type_builder("signals")
+            .with_fields(fields)
+            .build()
+            .map_err(problem)?,
+    );
     // Units travel as metadata of the file, so that columns are named by their paths alone.
     let units = table
         .columns
@@ -249,13 +305,26 @@ fn parquet(table: &Columns, out: &mut (impl Write + Send), name: &str) -> Result
         let mut column = 0;
         while let Some(mut writer) = group.next_column().map_err(problem)? {
             match column {
-                0 => drop(writer.typed::<Int64Type>().write_batch(&table.time_ns[range.clone()], None, None).map_err(problem)?),
-                1 => drop(writer.typed::<DoubleType>().write_batch(&table.t_s[range.clone()], None, None).map_err(problem)?),
+                0 => drop(
+                    writer
+                        .typed::<Int64Type>()
+                        .write_batch(&table.time_ns[range.clone()], None, None)
+                        .map_err(problem)?,
+                ),
+                1 => drop(
+                    writer
+                        .typed::<DoubleType>()
+                        .write_batch(&table.t_s[range.clone()], None, None)
+                        .map_err(problem)?,
+                ),
                 k => {
                     let values = &table.columns[k - 2].2[range.clone()];
                     let present: Vec<f64> = values.iter().flatten().copied().collect();
                     let levels: Vec<i16> = values.iter().map(|v| i16::from(v.is_some())).collect();
-                    writer.typed::<DoubleType>().write_batch(&present, Some(&levels), None).map_err(problem)?;
+                    writer
+                        .typed::<DoubleType>()
+                        .write_batch(&present, Some(&levels), None)
+                        .map_err(problem)?;
                 }
             }
             writer.close().map_err(problem)?;

@@ -7,8 +7,14 @@ use std::path::Path;
 ///
 /// # Errors
 /// What the system says, or what `fill` returns.
-pub fn write_whole<E: From<Error>>(path: &Path, fill: impl FnOnce(&mut std::fs::File) -> Result<(), E>) -> Result<(), E> {
-    let folder = path.parent().filter(|p| !p.as_os_str().is_empty()).unwrap_or(Path::new("."));
+pub fn write_whole<E: From<Error>>(
+    path: &Path,
+    fill: impl FnOnce(&mut std::fs::File) -> Result<(), E>,
+) -> Result<(), E> {
+    let folder = path
+        .parent()
+        .filter(|p| !p.as_os_str().is_empty())
+        .unwrap_or(Path::new("."));
     let mut builder = tempfile::Builder::new();
     builder.prefix(".analyze-").suffix(".part");
     #[cfg(unix)]

@@ -140,10 +140,7 @@ fn the_mechanism_is_what_the_findings_say() {
         );
         if music {
             let context = Context::new(&inputs, Window::from(15.0));
-            let fit = mechanism_evidence(&context)
-                .unwrap()
-                .fit
-                .unwrap();
+            let fit = mechanism_evidence(&context).unwrap().fit.unwrap();
             a.push(fit.a);
             b.push(fit.b_per_s);
             r2.push(fit.r2);

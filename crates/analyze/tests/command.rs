@@ -10,7 +10,10 @@ use recording::write::{RecordingWriter, WriterOptions};
 use serde_json::Value;
 
 fn analyze(args: &[&str]) -> Output {
-    Command::new(env!("CARGO_BIN_EXE_analyze")).args(args).output().unwrap()
+    Command::new(env!("CARGO_BIN_EXE_analyze"))
+        .args(args)
+        .output()
+        .unwrap()
 }
 
 fn text(bytes: &[u8]) -> String {
@@ -28,11 +31,24 @@ fn json(args: &[&str]) -> Value {
 fn recording(folder: &Path) -> PathBuf {
     let path = folder.join("swing.mcap");
     let mut w = RecordingWriter::create(&path, &WriterOptions::default()).unwrap();
-    let metadata = [("source", "test"), ("mass_kg", "60"), ("gravity_m_per_s2", "9.81"), ("analysis_start_s", "15"), ("scene", "swing")];
-    w.metadata("rath", &metadata.map(|(k, v)| (k.to_owned(), v.to_owned())).into()).unwrap();
-    w.attachment("scene.toml", "application/toml", b"# a scene").unwrap();
+    let metadata = [
+        ("source", "test"),
+        ("mass_kg", "60"),
+        ("gravity_m_per_s2", "9.81"),
+        ("analysis_start_s", "15"),
+        ("scene", "swing"),
+    ];
+    w.metadata(
+        "rath",
+        &metadata.map(|(k, v)| (k.to_owned(), v.to_owned())).into(),
+    )
+    .unwrap();
+    w.attachment("scene.toml", "application/toml", b"# a scene")
+        .unwrap();
     let state = w.channel(topics::STATE, MessageKind::RathState).unwrap();
-    let forces = w.channel(topics::FORCES, MessageKind::HandleForces).unwrap();
+    let forces = w
+        .channel(topics::FORCES, MessageKind::HandleForces)
+        .unwrap();
     let phases = w.channel(topics::PHASES, MessageKind::Phases).unwrap();
     let extra = w.channel("/battery", MessageKind::Float64).unwrap();
     for k in 0..1801i64 {
@@ -42,18 +58,48 @@ fn recording(folder: &Path) -> PathBuf {
         let roll_rad = 0.3 * (beat / 2.0).sin();
         let message = rath::State {
             time_s: t,
-            position_m: Some(rath::Vector3 { x: 0.8 * t, y: 0.0, z: 0.8 + 0.05 * beat.sin() }),
-            orientation: Some(rath::Quaternion { x: (roll_rad / 2.0).sin(), y: 0.0, z: 0.0, w: (roll_rad / 2.0).cos() }),
+            position_m: Some(rath::Vector3 {
+                x: 0.8 * t,
+                y: 0.0,
+                z: 0.8 + 0.05 * beat.sin(),
+            }),
+            orientation: Some(rath::Quaternion {
+                x: (roll_rad / 2.0).sin(),
+                y: 0.0,
+                z: 0.0,
+                w: (roll_rad / 2.0).cos(),
+            }),
             roll_rad,
             ..Default::default()
         };
         w.message(state, t_ns, &message).unwrap();
         let n = (294.3 * (1.0 + 1.5 * beat.cos())).max(0.0);
-        w.message(forces, t_ns, &rath::HandleForces { time_s: t, normal_n: vec![n, n], ..Default::default() }).unwrap();
-        let message = rath::Phases { time_s: t, phase_rad: vec![beat, beat + 0.2], beat_phase_rad: (t >= 5.0).then_some(beat), ..Default::default() };
+        w.message(
+            forces,
+            t_ns,
+            &rath::HandleForces {
+                time_s: t,
+                normal_n: vec![n, n],
+                ..Default::default()
+            },
+        )
+        .unwrap();
+        let message = rath::Phases {
+            time_s: t,
+            phase_rad: vec![beat, beat + 0.2],
+            beat_phase_rad: (t >= 5.0).then_some(beat),
+            ..Default::default()
+        };
         w.message(phases, t_ns, &message).unwrap();
         if k % 30 == 0 {
-            w.message(extra, t_ns, &Float64 { data: 12.6 - t / 100.0 }).unwrap();
+            w.message(
+                extra,
+                t_ns,
+                &Float64 {
+                    data: 12.6 - t / 100.0,
+                },
+            )
+            .unwrap();
         }
     }
     w.finish().unwrap();
@@ -68,23 +114,44 @@ fn json_is_the_contracts() {
     assert_eq!(v["samples"], 1801);
     assert_eq!(v["window_s"], serde_json::json!([15.0, 60.0]));
     assert_eq!(v["duration_s"], 60.0);
-    for key in ["profile", "library", "messages", "topics", "salvaged", "skipped_messages", "warnings"] {
+    for key in [
+        "profile",
+        "library",
+        "messages",
+        "topics",
+        "salvaged",
+        "skipped_messages",
+        "warnings",
+    ] {
         assert!(!v["recording"][key].is_null(), "{key}");
     }
     let m = &v["metrics"];
     let near = |name: &str, expected: f64, bound: f64| {
-        let x = m[name]["value"].as_f64().unwrap_or_else(|| panic!("{name}: {}", m[name]));
-        assert!((x - expected).abs() < bound, "{name}: {x}, expected {expected}");
+        let x = m[name]["value"]
+            .as_f64()
+            .unwrap_or_else(|| panic!("{name}: {}", m[name]));
+        assert!(
+            (x - expected).abs() < bound,
+            "{name}: {x}, expected {expected}"
+        );
     };
     // 45 whole periods, 1350 samples, and one more at the zero that closes them.
-    near("rms_roll_deg", (0.3 / 2f64.sqrt() * (1350.0f64 / 1351.0).sqrt()).to_degrees(), 1e-6);
+    near(
+        "rms_roll_deg",
+        (0.3 / 2f64.sqrt() * (1350.0f64 / 1351.0).sqrt()).to_degrees(),
+        1e-6,
+    );
     near("dz_pp_m", 0.1, 1e-3);
     near("synchrony", 0.1f64.cos(), 1e-12);
     near("synchrony_chance", 2.0 / std::f64::consts::PI, 1e-12);
     near("plv", 1.0, 1e-12);
     near("beat_hz", 2.0, 1e-9);
     // 1 + 1.5 cos < 0 where cos < −2/3.
-    near("contact_loss", (2.0f64 / 3.0).acos() / std::f64::consts::PI, 0.04);
+    near(
+        "contact_loss",
+        (2.0f64 / 3.0).acos() / std::f64::consts::PI,
+        0.04,
+    );
     near("peak_hz", 2.0, 0.03);
     near("roll_peak_hz", 1.0, 0.03);
     near("force_correlation", 1.0, 1e-12);
@@ -92,21 +159,54 @@ fn json_is_the_contracts() {
     // The first full stretch inside the window.
     near("onset_time_s", 15.0 + 59.0 / 30.0, 1e-6);
     for (name, value) in m.as_object().unwrap() {
-        assert!(value.get("value").is_some() && value["unit"].is_string() && value["source"].is_string(), "{name}");
-        assert!(!value["value"].is_null() || value["reason"].is_string(), "{name}");
+        assert!(
+            value.get("value").is_some()
+                && value["unit"].is_string()
+                && value["source"].is_string(),
+            "{name}"
+        );
+        assert!(
+            !value["value"].is_null() || value["reason"].is_string(),
+            "{name}"
+        );
     }
     let signal = &v["signals"]["/battery.data"];
     assert_eq!(signal["count"], 61);
-    assert!((signal["hz"].as_f64().unwrap() - 1.0).abs() < 1e-9 && signal["min"] == 12.0 && signal["max"] == 12.6);
-    assert!(v["signals"]["/rath/state.orientation.roll"]["max"].as_f64().unwrap() > 0.29);
+    assert!(
+        (signal["hz"].as_f64().unwrap() - 1.0).abs() < 1e-9
+            && signal["min"] == 12.0
+            && signal["max"] == 12.6
+    );
+    assert!(
+        v["signals"]["/rath/state.orientation.roll"]["max"]
+            .as_f64()
+            .unwrap()
+            > 0.29
+    );
     let peaks = &v["spectra"]["/rath/state.roll_rad"]["peaks"];
     assert_eq!(peaks[0]["kind"], "f/2", "{peaks}");
-    let kinds: Vec<&str> = v["events"].as_array().unwrap().iter().map(|e| e["kind"].as_str().unwrap()).collect();
-    for kind in ["beat_start", "onset", "contact_lost", "contact_regained", "jump"] {
+    let kinds: Vec<&str> = v["events"]
+        .as_array()
+        .unwrap()
+        .iter()
+        .map(|e| e["kind"].as_str().unwrap())
+        .collect();
+    for kind in [
+        "beat_start",
+        "onset",
+        "contact_lost",
+        "contact_regained",
+        "jump",
+    ] {
         assert!(kinds.contains(&kind), "{kind}");
     }
     // Several files: an array.
-    let two = json(&[file.to_str().unwrap(), file.to_str().unwrap(), "--format", "json"]);
+    let two = json(&[
+        file.to_str().unwrap(),
+        file.to_str().unwrap(),
+        "--format",
+        "json",
+    ]);
     assert_eq!(two.as_array().unwrap().len(), 2);
 }
 
@@ -115,15 +215,32 @@ fn window_signal_and_topic_narrow_what_is_told() {
     let folder = tempfile::tempdir().unwrap();
     let file = recording(folder.path());
     let file = file.to_str().unwrap();
-    let v = json(&[file, "--format", "json", "--window", "..30", "--signal", "*.roll_rad", "--signal", "*.orientation.yaw"]);
+    let v = json(&[
+        file,
+        "--format",
+        "json",
+        "--window",
+        "..30",
+        "--signal",
+        "*.roll_rad",
+        "--signal",
+        "*.orientation.yaw",
+    ]);
     assert_eq!(v["window_s"], serde_json::json!([15.0, 30.0]));
     let names: Vec<&String> = v["signals"].as_object().unwrap().keys().collect();
-    assert_eq!(names, ["/rath/state.orientation.yaw", "/rath/state.roll_rad"]);
+    assert_eq!(
+        names,
+        ["/rath/state.orientation.yaw", "/rath/state.roll_rad"]
+    );
     let v = json(&[file, "--format", "json", "--topic", "/battery"]);
     assert_eq!(v["signals"].as_object().unwrap().len(), 1);
     let out = analyze(&[file, "--signal", "/nothing*"]);
     assert_eq!(out.status.code(), Some(1));
-    assert!(text(&out.stderr).contains("no numeric signal fits /nothing*"), "{}", text(&out.stderr));
+    assert!(
+        text(&out.stderr).contains("no numeric signal fits /nothing*"),
+        "{}",
+        text(&out.stderr)
+    );
 }
 
 #[test]
@@ -131,12 +248,28 @@ fn tables_for_people_fit_a_terminal() {
     let folder = tempfile::tempdir().unwrap();
     let file = recording(folder.path());
     let out = analyze(&[file.to_str().unwrap()]);
-    assert!(out.status.success() && out.stderr.is_empty(), "{}", text(&out.stderr));
+    assert!(
+        out.status.success() && out.stderr.is_empty(),
+        "{}",
+        text(&out.stderr)
+    );
     let table = text(&out.stdout);
-    for word in ["RMS roll", "mechanism", "Spectra", "Events", "Signals", "f/2"] {
+    for word in [
+        "RMS roll",
+        "mechanism",
+        "Spectra",
+        "Events",
+        "Signals",
+        "f/2",
+    ] {
         assert!(table.contains(word), "{word} is missing in\n{table}");
     }
-    let widest = table.lines().skip(1).map(|l| l.chars().count()).max().unwrap();
+    let widest = table
+        .lines()
+        .skip(1)
+        .map(|l| l.chars().count())
+        .max()
+        .unwrap();
     assert!(widest <= 110, "{widest}\n{table}");
     let csv = text(&analyze(&[file.to_str().unwrap(), "--format", "csv"]).stdout);
     assert_eq!(csv.lines().count(), 1 + analyze::metrics::METRICS.len());
@@ -148,7 +281,15 @@ fn roles_name_what_is_what() {
     let file = recording(folder.path());
     let roles = folder.path().join("roles.toml");
     std::fs::write(&roles, "height = \"/battery.data\"\nmass_kg = 30.0\n").unwrap();
-    let v = json(&[file.to_str().unwrap(), "--format", "json", "--roles", roles.to_str().unwrap(), "--window", "0.."]);
+    let v = json(&[
+        file.to_str().unwrap(),
+        "--format",
+        "json",
+        "--roles",
+        roles.to_str().unwrap(),
+        "--window",
+        "0..",
+    ]);
     assert_eq!(v["roles"]["height"], serde_json::json!(["/battery.data"]));
     assert!((v["metrics"]["dz_pp_m"]["value"].as_f64().unwrap() - 0.6).abs() < 1e-9);
     std::fs::write(&roles, "hight = \"/battery.data\"\n").unwrap();
@@ -162,14 +303,30 @@ fn csv_and_parquet_hold_the_signals() {
     let folder = tempfile::tempdir().unwrap();
     let file = recording(folder.path());
     let csv = folder.path().join("x.csv");
-    let out = analyze(&[file.to_str().unwrap(), "--signal", "*.orientation.roll", "--signal", "/battery*", "--out", csv.to_str().unwrap()]);
+    let out = analyze(&[
+        file.to_str().unwrap(),
+        "--signal",
+        "*.orientation.roll",
+        "--signal",
+        "/battery*",
+        "--out",
+        csv.to_str().unwrap(),
+    ]);
     assert!(out.status.success(), "{}", text(&out.stderr));
     let table = std::fs::read_to_string(&csv).unwrap();
     let mut lines = table.lines();
-    assert_eq!(lines.next(), Some("time_ns,t_s,/battery.data,/rath/state.orientation.roll [rad]"));
+    assert_eq!(
+        lines.next(),
+        Some("time_ns,t_s,/battery.data,/rath/state.orientation.roll [rad]")
+    );
     assert_eq!(lines.next(), Some("0,0,12.6,0"));
     // The battery speaks once a second.
-    assert!(lines.next().unwrap().starts_with("33333333,0.033333333,,0."));
+    assert!(
+        lines
+            .next()
+            .unwrap()
+            .starts_with("33333333,0.033333333,,0.")
+    );
     assert_eq!(table.lines().count(), 1802);
     let other = folder.path().join("x.txt");
     let out = analyze(&[file.to_str().unwrap(), "--out", other.to_str().unwrap()]);
@@ -178,14 +335,28 @@ fn csv_and_parquet_hold_the_signals() {
     #[cfg(feature = "tables")]
     {
         let parquet = folder.path().join("x.parquet");
-        let out = analyze(&[file.to_str().unwrap(), "--downsample", "10", "--out", parquet.to_str().unwrap()]);
+        let out = analyze(&[
+            file.to_str().unwrap(),
+            "--downsample",
+            "10",
+            "--out",
+            parquet.to_str().unwrap(),
+        ]);
         assert!(out.status.success(), "{}", text(&out.stderr));
         use parquet::file::reader::{FileReader, SerializedFileReader};
         let reader = SerializedFileReader::new(std::fs::File::open(&parquet).unwrap()).unwrap();
         let meta = reader.metadata().file_metadata();
         assert_eq!(meta.num_rows(), 181);
-        let names: Vec<String> = meta.schema_descr().columns().iter().map(|c| c.name().to_owned()).collect();
-        assert!(names.contains(&"/rath/state.orientation.roll".to_owned()), "{names:?}");
+        let names: Vec<String> = meta
+            .schema_descr()
+            .columns()
+            .iter()
+            .map(|c| c.name().to_owned())
+            .collect();
+        assert!(
+            names.contains(&"/rath/state.orientation.roll".to_owned()),
+            "{names:?}"
+        );
     }
 }
 
@@ -201,11 +372,17 @@ fn annotate_keeps_every_message_and_adds_findings() {
     assert_eq!(before["metrics"], after["metrics"]);
     let messages = |v: &Value, topic: &str| {
         let topics = v["recording"]["topics"].as_array().unwrap().clone();
-        topics.iter().find(|t| t["name"] == topic).map(|t| t["messages"].as_u64().unwrap())
+        topics
+            .iter()
+            .find(|t| t["name"] == topic)
+            .map(|t| t["messages"].as_u64().unwrap())
     };
     assert_eq!(messages(&after, "/rath/state"), Some(1801));
     assert_eq!(messages(&after, "/findings/order_parameter"), Some(1801));
-    assert_eq!(messages(&after, "/findings/events"), Some(before["events"].as_array().unwrap().len() as u64));
+    assert_eq!(
+        messages(&after, "/findings/events"),
+        Some(before["events"].as_array().unwrap().len() as u64)
+    );
 }
 
 #[test]
@@ -234,7 +411,10 @@ fn bad_input_gets_one_clear_sentence() {
     let empty = folder.path().join("empty.mcap");
     std::fs::write(&empty, "").unwrap();
     let bare = folder.path().join("bare.mcap");
-    RecordingWriter::create(&bare, &WriterOptions::default()).unwrap().finish().unwrap();
+    RecordingWriter::create(&bare, &WriterOptions::default())
+        .unwrap()
+        .finish()
+        .unwrap();
     for (file, said) in [
         (folder.path().join("nowhere.mcap"), "cannot be read"),
         (no_mcap, "not an MCAP"),
@@ -245,12 +425,22 @@ fn bad_input_gets_one_clear_sentence() {
         let out = analyze(&[file.to_str().unwrap()]);
         assert_eq!(out.status.code(), Some(1), "{}", file.display());
         let error = text(&out.stderr);
-        assert!(error.starts_with("analyze: ") && error.contains(said) && out.stdout.is_empty(), "{error}");
+        assert!(
+            error.starts_with("analyze: ") && error.contains(said) && out.stdout.is_empty(),
+            "{error}"
+        );
     }
     assert_eq!(analyze(&[]).status.code(), Some(2));
-    assert_eq!(analyze(&["x.mcap", "--window", "60..15"]).status.code(), Some(2));
+    assert_eq!(
+        analyze(&["x.mcap", "--window", "60..15"]).status.code(),
+        Some(2)
+    );
     let typo = analyze(&["x.mcap", "--repot", "x.html"]);
-    assert!(typo.status.code() == Some(2) && text(&typo.stderr).contains("--report"), "{}", text(&typo.stderr));
+    assert!(
+        typo.status.code() == Some(2) && text(&typo.stderr).contains("--report"),
+        "{}",
+        text(&typo.stderr)
+    );
 }
 
 #[test]
@@ -264,7 +454,11 @@ fn damage_is_said_and_survived() {
     assert_eq!(out.status.code(), Some(3), "{}", text(&out.stderr));
     let v: Value = serde_json::from_slice(&out.stdout).unwrap();
     assert_eq!(v["recording"]["salvaged"], true);
-    assert!(text(&out.stderr).contains("damaged"), "{}", text(&out.stderr));
+    assert!(
+        text(&out.stderr).contains("damaged"),
+        "{}",
+        text(&out.stderr)
+    );
 }
 
 /// The paper's runs through files: ingested, analysed, and every statistic found again.
@@ -286,7 +480,9 @@ fn archive_logs_survive_being_ingested() {
             let out = analyze(&["ingest", log.to_str().unwrap(), "--out", mcap]);
             assert!(out.status.success(), "{}", text(&out.stderr));
             let v = json(&[mcap, "--format", "json"]);
-            let stats: Value = serde_json::from_str(&std::fs::read_to_string(run.join("stats.json")).unwrap()).unwrap();
+            let stats: Value =
+                serde_json::from_str(&std::fs::read_to_string(run.join("stats.json")).unwrap())
+                    .unwrap();
             let m = &v["metrics"];
             for (ours, theirs) in [
                 ("z_mean_m", "y_mean_m"),
@@ -301,17 +497,33 @@ fn archive_logs_survive_being_ingested() {
                 ("synchrony", "synchrony_index"),
                 ("roll_excess_s", "time_roll_excess_s"),
             ] {
-                let (a, b) = (m[ours]["value"].as_f64().unwrap(), stats[theirs].as_f64().unwrap());
-                assert!((a - b).abs() <= 1e-9 * b.abs(), "{} {ours}: {a} {b}", run.display());
+                let (a, b) = (
+                    m[ours]["value"].as_f64().unwrap(),
+                    stats[theirs].as_f64().unwrap(),
+                );
+                assert!(
+                    (a - b).abs() <= 1e-9 * b.abs(),
+                    "{} {ours}: {a} {b}",
+                    run.display()
+                );
             }
             for (ours, theirs) in [
                 ("contact_loss_mean", "contact_loss_per_carrier"),
                 ("force_mean_n", "Fy_mean_per_carrier_N"),
                 ("force_sd_n", "Fy_std_per_carrier_N"),
             ] {
-                for (a, b) in m[ours]["per"].as_array().unwrap().iter().zip(stats[theirs].as_array().unwrap()) {
+                for (a, b) in m[ours]["per"]
+                    .as_array()
+                    .unwrap()
+                    .iter()
+                    .zip(stats[theirs].as_array().unwrap())
+                {
                     let (a, b) = (a.as_f64().unwrap(), b.as_f64().unwrap());
-                    assert!((a - b).abs() <= 1e-9 * b.abs(), "{} {ours}: {a} {b}", run.display());
+                    assert!(
+                        (a - b).abs() <= 1e-9 * b.abs(),
+                        "{} {ours}: {a} {b}",
+                        run.display()
+                    );
                 }
             }
             let onset = stats["uncontrolled_onset_time"].as_f64().unwrap();
@@ -319,7 +531,16 @@ fn archive_logs_survive_being_ingested() {
                 Some(t) => assert!((t - onset).abs() <= 1e-9 * onset, "{}", run.display()),
                 None => assert_eq!(onset, -1.0, "{}", run.display()),
             }
-            assert_eq!(m["mechanism"]["value"], if condition == "music" { "parametric" } else { "quiet" }, "{}", run.display());
+            assert_eq!(
+                m["mechanism"]["value"],
+                if condition == "music" {
+                    "parametric"
+                } else {
+                    "quiet"
+                },
+                "{}",
+                run.display()
+            );
             runs += 1;
         }
     }
@@ -329,10 +550,21 @@ fn archive_logs_survive_being_ingested() {
 /// docs/metrics.md says of every metric what the program says.
 #[test]
 fn the_documentation_names_every_metric() {
-    let docs = std::fs::read_to_string(Path::new(env!("CARGO_MANIFEST_DIR")).join("../../docs/metrics.md")).unwrap();
+    let docs = std::fs::read_to_string(
+        Path::new(env!("CARGO_MANIFEST_DIR")).join("../../docs/metrics.md"),
+    )
+    .unwrap();
     for metric in analyze::metrics::METRICS {
-        assert!(docs.contains(&format!("`{}`", metric.name)), "{} is missing", metric.name);
+        assert!(
+            docs.contains(&format!("`{}`", metric.name)),
+            "{} is missing",
+            metric.name
+        );
         let definition = metric.definition.replace('|', "\\|");
-        assert!(docs.contains(&definition), "{}: docs/metrics.md does not say: {definition}", metric.name);
+        assert!(
+            docs.contains(&definition),
+            "{}: docs/metrics.md does not say: {definition}",
+            metric.name
+        );
     }
 }

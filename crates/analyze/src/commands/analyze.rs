@@ -3,20 +3,27 @@
 use std::io::{Read, Write};
 use std::path::Path;
 
-use anyhow::{Context, bail};
 use analyze::examine::{Analysis, Request, examine};
 use analyze::report;
 use analyze::roles::RolesFile;
+use anyhow::{Context, bail};
 use recording::read::{ReadOptions, Recording};
 
 use super::{AnalyzeArgs, Done, Format, annotate, complain, print};
 
 pub(super) fn run(args: &AnalyzeArgs) -> anyhow::Result<Done> {
     let request = request(args)?;
-    let single = [("--out", &args.out), ("--annotate", &args.annotate), ("--report", &args.report)];
+    let single = [
+        ("--out", &args.out),
+        ("--annotate", &args.annotate),
+        ("--report", &args.report),
+    ];
     for (option, value) in single {
         if value.is_some() && args.files.len() > 1 {
-            bail!("{option} takes one recording, but {} were given: run it once for each", args.files.len());
+            bail!(
+                "{option} takes one recording, but {} were given: run it once for each",
+                args.files.len()
+            );
         }
     }
     let mut analyses = Vec::new();
@@ -38,7 +45,9 @@ pub(super) fn run(args: &AnalyzeArgs) -> anyhow::Result<Done> {
     let text = match args.format {
         Format::Json => report::json(&analyses),
         Format::Csv => report::csv(&analyses),
-        Format::Table if analyses.len() == 1 => report::table(&analyses[0], !request.signals.is_empty()),
+        Format::Table if analyses.len() == 1 => {
+            report::table(&analyses[0], !request.signals.is_empty())
+        }
         Format::Table => report::ensemble(&analyses),
     };
     print(&text)?;
@@ -59,12 +68,20 @@ fn request(args: &AnalyzeArgs) -> anyhow::Result<Request> {
         Some(path) => Some(roles(path)?),
     };
     let window = args.window.unwrap_or((None, None));
-    Ok(Request { window, signals: args.signal.clone(), topics: args.topic.clone(), roles, truth: args.truth, traces: args.draws() })
+    Ok(Request {
+        window,
+        signals: args.signal.clone(),
+        topics: args.topic.clone(),
+        roles,
+        truth: args.truth,
+        traces: args.draws(),
+    })
 }
 
 fn roles(path: &Path) -> anyhow::Result<RolesFile> {
     let name = path.display();
-    let text = std::fs::read_to_string(path).with_context(|| format!("{name}: the roles cannot be read"))?;
+    let text = std::fs::read_to_string(path)
+        .with_context(|| format!("{name}: the roles cannot be read"))?;
     toml::from_str(&text).with_context(|| format!("{name}: is not a roles file"))
 }
 
@@ -73,19 +90,34 @@ pub(super) fn open(path: &Path) -> anyhow::Result<Recording> {
     let options = ReadOptions::default();
     if path.as_os_str() == "-" {
         let mut bytes = Vec::new();
-        std::io::stdin().lock().read_to_end(&mut bytes).context("standard input cannot be read")?;
+        std::io::stdin()
+            .lock()
+            .read_to_end(&mut bytes)
+            .context("standard input cannot be read")?;
         return Ok(Recording::from_bytes(bytes, &options)?);
     }
     let opened = Recording::open(path, &options);
-    if opened.is_err() && !path.exists() && path.to_str().is_some_and(|p| strsim::damerau_levenshtein(p, "ingest") <= 2) {
-        bail!("{}: there is no such file; did you mean `analyze ingest`?", path.display());
+    if opened.is_err()
+        && !path.exists()
+        && path
+            .to_str()
+            .is_some_and(|p| strsim::damerau_levenshtein(p, "ingest") <= 2)
+    {
+        bail!(
+            "{}: there is no such file; did you mean `analyze ingest`?",
+            path.display()
+        );
     }
     Ok(opened?)
 }
 
 fn one(path: &Path, args: &AnalyzeArgs, request: &Request) -> anyhow::Result<Analysis> {
     let recording = open(path)?;
-    let name = if path.as_os_str() == "-" { "standard input".to_owned() } else { path.display().to_string() };
+    let name = if path.as_os_str() == "-" {
+        "standard input".to_owned()
+    } else {
+        path.display().to_string()
+    };
     let analysis = examine(&name, &recording, request)?;
     if analysis.is_empty() {
         bail!("{}", nothing(&analysis, request));
@@ -95,8 +127,14 @@ fn one(path: &Path, args: &AnalyzeArgs, request: &Request) -> anyhow::Result<Ana
     }
     if let Some(out) = &args.report {
         let page = report::html(&analysis, &command_line());
-        analyze::whole::write_whole(out, |file| file.write_all(page.as_bytes()))
-            .with_context(|| format!("{}: cannot be written; no file of that name was made or changed", out.display()))?;
+        analyze::whole::write_whole(out, |file| file.write_all(page.as_bytes())).with_context(
+            || {
+                format!(
+                    "{}: cannot be written; no file of that name was made or changed",
+                    out.display()
+                )
+            },
+        )?;
     }
     if let Some(out) = &args.annotate {
         annotate::write(&recording, &analysis, out)?;
@@ -114,9 +152,16 @@ fn draw(analyses: &[Analysis], folder: &Path) -> anyhow::Result<()> {
     } else {
         written += figures(&report::ensemble_plots(analyses), folder)?.len();
         for (k, a) in analyses.iter().enumerate() {
-            let stem = Path::new(&a.file).file_stem().and_then(|s| s.to_str()).unwrap_or("recording");
+            let stem = Path::new(&a.file)
+                .file_stem()
+                .and_then(|s| s.to_str())
+                .unwrap_or("recording");
             // Numbered: files of one name may come from several folders.
-            written += figures(&report::plots::plots(a), &folder.join(format!("{:03}-{stem}", k + 1)))?.len();
+            written += figures(
+                &report::plots::plots(a),
+                &folder.join(format!("{:03}-{stem}", k + 1)),
+            )?
+            .len();
         }
     }
     eprintln!("analyze: {written} files written to {}", folder.display());
@@ -126,25 +171,54 @@ fn draw(analyses: &[Analysis], folder: &Path) -> anyhow::Result<()> {
 /// The command line as it could be typed again.
 fn command_line() -> String {
     let quoted = |arg: String| {
-        let plain = !arg.is_empty() && arg.chars().all(|c| c.is_alphanumeric() || "-_./=:,+@%".contains(c));
-        if plain { arg } else { format!("'{}'", arg.replace('\'', "'\\''")) }
+        let plain = !arg.is_empty()
+            && arg
+                .chars()
+                .all(|c| c.is_alphanumeric() || "-_./=:,+@%".contains(c));
+        if plain {
+            arg
+        } else {
+            format!("'{}'", arg.replace('\'', "'\\''"))
+        }
     };
     let args = std::env::args().skip(1).map(quoted);
-    std::iter::once("analyze".to_owned()).chain(args).collect::<Vec<_>>().join(" ")
+    std::iter::once("analyze".to_owned())
+        .chain(args)
+        .collect::<Vec<_>>()
+        .join(" ")
 }
 
 /// Why there is nothing to analyse.
 fn nothing(a: &Analysis, request: &Request) -> String {
     if !request.signals.is_empty() || !request.topics.is_empty() {
-        let asked: Vec<&str> = request.signals.iter().chain(&request.topics).map(String::as_str).collect();
+        let asked: Vec<&str> = request
+            .signals
+            .iter()
+            .chain(&request.topics)
+            .map(String::as_str)
+            .collect();
         let topics: Vec<&str> = a.topics.iter().map(|t| t.name.as_str()).take(20).collect();
-        return format!("{}: no numeric signal fits {}; its topics are {}", a.file, asked.join(", "), topics.join(", "));
+        return format!(
+            "{}: no numeric signal fits {}; its topics are {}",
+            a.file,
+            asked.join(", "),
+            topics.join(", ")
+        );
     }
     if a.messages == 0 {
         return format!("{}: holds no messages", a.file);
     }
-    let found: Vec<String> = a.topics.iter().take(20).map(|t| format!("{} ({}, {})", t.name, t.schema, t.encoding)).collect();
-    format!("{}: holds no numeric signal that can be used; found {}", a.file, found.join(", "))
+    let found: Vec<String> = a
+        .topics
+        .iter()
+        .take(20)
+        .map(|t| format!("{} ({}, {})", t.name, t.schema, t.encoding))
+        .collect();
+    format!(
+        "{}: holds no numeric signal that can be used; found {}",
+        a.file,
+        found.join(", ")
+    )
 }
 
 fn loss(a: &Analysis) -> String {
@@ -152,12 +226,22 @@ fn loss(a: &Analysis) -> String {
         .quality
         .iter()
         .filter(|q| q.loss)
-        .map(|q| if q.topic.is_empty() { q.text.clone() } else { format!("{}: {}", q.topic, q.text) })
+        .map(|q| {
+            if q.topic.is_empty() {
+                q.text.clone()
+            } else {
+                format!("{}: {}", q.topic, q.text)
+            }
+        })
         .collect();
     let lost = match a.skipped_messages {
         0 => "no whole message is known to be lost".to_owned(),
         1 => "1 message is lost".to_owned(),
         n => format!("{n} messages are lost"),
     };
-    format!("{}: the file is damaged; {lost}, the rest was used: {}", a.file, told.join("; "))
+    format!(
+        "{}: the file is damaged; {lost}, the rest was used: {}",
+        a.file,
+        told.join("; ")
+    )
 }

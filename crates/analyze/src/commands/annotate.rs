@@ -41,7 +41,11 @@ pub(super) fn write(recording: &Recording, analysis: &Analysis, out: &Path) -> a
     let mut topics: Vec<(&'static str, _)> = Vec::new();
     for message in &own {
         if topics.iter().all(|(t, _)| *t != message.topic) {
-            let kind = if matches!(message.content, Content::Text(..)) { MessageKind::Log } else { MessageKind::Float64 };
+            let kind = if matches!(message.content, Content::Text(..)) {
+                MessageKind::Log
+            } else {
+                MessageKind::Float64
+            };
             topics.push((message.topic, writer.channel(message.topic, kind)?));
         }
     }
@@ -81,9 +85,13 @@ fn put(
     topics: &[(&'static str, recording::write::ChannelId)],
     message: &Message,
 ) -> anyhow::Result<()> {
-    let Some((_, channel)) = topics.iter().find(|(t, _)| *t == message.topic) else { return Ok(()) };
+    let Some((_, channel)) = topics.iter().find(|(t, _)| *t == message.topic) else {
+        return Ok(());
+    };
     match &message.content {
-        Content::Number(data) => writer.message(*channel, message.t_ns, &Float64 { data: *data })?,
+        Content::Number(data) => {
+            writer.message(*channel, message.t_ns, &Float64 { data: *data })?
+        }
         Content::Text(kind, what) => {
             let log = Log {
                 stamp: Time::from_ns(message.t_ns),
@@ -106,10 +114,16 @@ fn findings(a: &Analysis) -> std::collections::BTreeMap<String, String> {
         Datum::Word(x) => Some((*x).to_owned()),
         Datum::Missing => None,
     };
-    let mut out: std::collections::BTreeMap<String, String> =
-        a.metrics.iter().filter_map(|(name, v)| Some((name.to_owned(), text(&v.datum)?))).collect();
+    let mut out: std::collections::BTreeMap<String, String> = a
+        .metrics
+        .iter()
+        .filter_map(|(name, v)| Some((name.to_owned(), text(&v.datum)?)))
+        .collect();
     out.insert("version".into(), env!("CARGO_PKG_VERSION").into());
-    out.insert("window_s".into(), format!("{} {}", a.window.start_s, a.window.end_s));
+    out.insert(
+        "window_s".into(),
+        format!("{} {}", a.window.start_s, a.window.end_s),
+    );
     out
 }
 
@@ -119,24 +133,47 @@ fn own(a: &Analysis, start_ns: i64) -> Vec<Message> {
     let mut out: Vec<Message> = a
         .events
         .iter()
-        .map(|e| Message { t_ns: at(e.t_s), topic: "/findings/events", content: Content::Text(e.kind, e.what.clone()) })
+        .map(|e| Message {
+            t_ns: at(e.t_s),
+            topic: "/findings/events",
+            content: Content::Text(e.kind, e.what.clone()),
+        })
         .collect();
     let i = &a.inputs;
     let mut series = |topic: &'static str, t_s: &[f64], x: &[f64]| {
         let finite = t_s.iter().zip(x).filter(|(_, x)| x.is_finite());
-        out.extend(finite.map(|(t, x)| Message { t_ns: at(*t), topic, content: Content::Number(*x) }));
+        out.extend(finite.map(|(t, x)| Message {
+            t_ns: at(*t),
+            topic,
+            content: Content::Number(*x),
+        }));
     };
     let phases: Vec<&[f64]> = i.phase_rad.iter().map(|p| &p[..]).collect();
-    series("/findings/order_parameter", i.phase_times(), &phase::order_parameter(&phases));
+    series(
+        "/findings/order_parameter",
+        i.phase_times(),
+        &phase::order_parameter(&phases),
+    );
     if let Some(mass_kg) = i.mass_kg {
-        let ratio: Vec<f64> = i.total_force_n().iter().map(|n| n / (mass_kg * i.gravity_m_per_s2)).collect();
+        let ratio: Vec<f64> = i
+            .total_force_n()
+            .iter()
+            .map(|n| n / (mass_kg * i.gravity_m_per_s2))
+            .collect();
         series("/findings/support_ratio", i.force_times(), &ratio);
     }
     let step_s = analyze::inputs::mean_step_s(&i.t_s).unwrap_or(1.0);
     let m = ((STRETCH_S / step_s + 1e-3).floor() as usize).max(1);
     if i.roll_rad.len() >= m && i.roll_rad.iter().all(|r| r.is_finite()) {
-        let rms: Vec<f64> =
-            i.roll_rad.windows(m).map(|w| (w.iter().map(|r| r * r).sum::<f64>() / m as f64).sqrt().to_degrees()).collect();
+        let rms: Vec<f64> = i
+            .roll_rad
+            .windows(m)
+            .map(|w| {
+                (w.iter().map(|r| r * r).sum::<f64>() / m as f64)
+                    .sqrt()
+                    .to_degrees()
+            })
+            .collect();
         series("/findings/rms_roll_2s_deg", &i.t_s[m - 1..], &rms);
     }
     out

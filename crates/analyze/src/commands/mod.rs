@@ -159,7 +159,9 @@ fn complain(error: &anyhow::Error) {
 fn print(text: &str) -> anyhow::Result<()> {
     let mut out = std::io::stdout().lock();
     match out.write_all(text.as_bytes()).and_then(|()| out.flush()) {
-        Err(e) if e.kind() != std::io::ErrorKind::BrokenPipe => Err(anyhow::Error::new(e).context("standard output takes no more")),
+        Err(e) if e.kind() != std::io::ErrorKind::BrokenPipe => {
+            Err(anyhow::Error::new(e).context("standard output takes no more"))
+        }
         _ => Ok(()),
     }
 }
@@ -175,7 +177,10 @@ mod tests {
         assert!(Cli::try_parse_from(["analyze"]).is_err());
         assert!(Cli::try_parse_from(["analyze", "a.mcap", "b.mcap", "--window", "15..60"]).is_ok());
         assert!(Cli::try_parse_from(["analyze", "ingest", "logs.npz", "--out", "x.mcap"]).is_ok());
-        let error = Cli::try_parse_from(["analyze", "a.mcap", "--windw", "15..60"]).err().unwrap().to_string();
+        let error = Cli::try_parse_from(["analyze", "a.mcap", "--windw", "15..60"])
+            .err()
+            .unwrap()
+            .to_string();
         assert!(error.contains("--window"), "{error}");
     }
 }

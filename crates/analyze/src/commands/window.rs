@@ -2,7 +2,9 @@
 
 /// `15..60`, `15..`, `..60`, `..`: first and last moment, each optional.
 pub fn parse(text: &str) -> Result<(Option<f64>, Option<f64>), String> {
-    let (a, b) = text.split_once("..").ok_or("expected A..B in seconds, such as 15..60, 15.. or ..60")?;
+    let (a, b) = text
+        .split_once("..")
+        .ok_or("expected A..B in seconds, such as 15..60, 15.. or ..60")?;
     let number = |s: &str| -> Result<Option<f64>, String> {
         match s.trim() {
             "" => Ok(None),
@@ -16,7 +18,9 @@ pub fn parse(text: &str) -> Result<(Option<f64>, Option<f64>), String> {
     if let (Some(start_s), Some(end_s)) = (start_s, end_s)
         && start_s >= end_s
     {
-        return Err(format!("the window ends at {end_s} s, not after it begins at {start_s} s"));
+        return Err(format!(
+            "the window ends at {end_s} s, not after it begins at {start_s} s"
+        ));
     }
     Ok((start_s, end_s))
 }

@@ -14,9 +14,23 @@ pub fn csv(analyses: &[Analysis]) -> String {
                 Datum::Word(x) => (*x).to_owned(),
                 Datum::Missing => String::new(),
             };
-            let per = value.per.iter().map(f64::to_string).collect::<Vec<_>>().join(" ");
+            let per = value
+                .per
+                .iter()
+                .map(f64::to_string)
+                .collect::<Vec<_>>()
+                .join(" ");
             let reason = value.reason.as_deref().unwrap_or("");
-            let cells = [&analysis.file, name, &number, value.unit, &value.source, &per, reason].map(quoted);
+            let cells = [
+                &analysis.file,
+                name,
+                &number,
+                value.unit,
+                &value.source,
+                &per,
+                reason,
+            ]
+            .map(quoted);
             out.push_str(&cells.join(","));
             out.push('\n');
         }
@@ -26,8 +40,13 @@ pub fn csv(analyses: &[Analysis]) -> String {
 
 /// A cell by RFC 4180; one that a spreadsheet would run as a formula gets a leading apostrophe, unless it is a number.
 pub fn quoted(cell: &str) -> String {
-    let formula = cell.starts_with(['=', '+', '-', '@']) && cell.parse::<f64>().is_err() && cell.len() > 1;
-    let cell = if formula { format!("'{cell}") } else { cell.to_owned() };
+    let formula =
+        cell.starts_with(['=', '+', '-', '@']) && cell.parse::<f64>().is_err() && cell.len() > 1;
+    let cell = if formula {
+        format!("'{cell}")
+    } else {
+        cell.to_owned()
+    };
     match cell.contains([',', '"', '\n', '\r']) {
         true => format!("\"{}\"", cell.replace('"', "\"\"")),
         false => cell,
@@ -40,7 +59,14 @@ mod tests {
 
     #[test]
     fn cells_are_quoted_where_they_have_to_be() {
-        for (cell, expected) in [("a", "a"), ("a,b", "\"a,b\""), ("say \"x\"", "\"say \"\"x\"\"\""), ("=cmd()", "'=cmd()"), ("-1.5", "-1.5"), ("-", "-")] {
+        for (cell, expected) in [
+            ("a", "a"),
+            ("a,b", "\"a,b\""),
+            ("say \"x\"", "\"say \"\"x\"\"\""),
+            ("=cmd()", "'=cmd()"),
+            ("-1.5", "-1.5"),
+            ("-", "-"),
+        ] {
             assert_eq!(quoted(cell), expected);
         }
     }

@@ -28,21 +28,44 @@ pub fn ensemble(analyses: &[Analysis]) -> String {
     for a in analyses {
         let _ = write!(out, "{:<34}", super::table::shortened(&a.file, 34));
         for (name, _) in COLUMNS {
-            let cell = a.metrics.number(name).map_or("–".to_owned(), |x| eight(x));
+            let cell = a.metrics.number(name).map_or("–".to_owned(), eight);
             let _ = write!(out, " {cell:>8}");
         }
-        let word = a.metrics.get("mechanism").and_then(|v| v.as_word()).unwrap_or("–");
+        let word = a
+            .metrics
+            .get("mechanism")
+            .and_then(|v| v.as_word())
+            .unwrap_or("–");
         let _ = writeln!(out, "  {word}");
     }
-    let _ = writeln!(out, "\n{:<32} {:>10} {:>10} {:>10} {:>10} {:>5}  name", "metric", "mean", "SD", "min", "max", "n");
+    let _ = writeln!(
+        out,
+        "\n{:<32} {:>10} {:>10} {:>10} {:>10} {:>5}  name",
+        "metric", "mean", "SD", "min", "max", "n"
+    );
     for metric in METRICS {
-        let mut x: Vec<f64> = analyses.iter().filter_map(|a| a.metrics.number(metric.name)).collect();
+        let mut x: Vec<f64> = analyses
+            .iter()
+            .filter_map(|a| a.metrics.number(metric.name))
+            .collect();
         if x.is_empty() {
-            let yes: Vec<bool> = analyses.iter().filter_map(|a| a.metrics.get(metric.name)?.as_bool()).collect();
+            let yes: Vec<bool> = analyses
+                .iter()
+                .filter_map(|a| a.metrics.get(metric.name)?.as_bool())
+                .collect();
             if !yes.is_empty() {
                 let count = yes.iter().filter(|y| **y).count();
                 let share = format!("{count} of {}", yes.len());
-                let _ = writeln!(out, "{:<32} {share:>10} {:>10} {:>10} {:>10} {:>5}  {}", metric.label, "", "", "", yes.len(), metric.name);
+                let _ = writeln!(
+                    out,
+                    "{:<32} {share:>10} {:>10} {:>10} {:>10} {:>5}  {}",
+                    metric.label,
+                    "",
+                    "",
+                    "",
+                    yes.len(),
+                    metric.name
+                );
             }
             continue;
         }
@@ -50,8 +73,16 @@ pub fn ensemble(analyses: &[Analysis]) -> String {
         let n = x.len() as f64;
         let mean = x.iter().sum::<f64>() / n;
         // The sample's standard deviation: these files stand for others like them.
-        let sd = if x.len() > 1 { (x.iter().map(|x| (x - mean).powi(2)).sum::<f64>() / (n - 1.0)).sqrt() } else { 0.0 };
-        let label = if metric.unit == "1" { metric.label.to_owned() } else { format!("{}, {}", metric.label, metric.unit) };
+        let sd = if x.len() > 1 {
+            (x.iter().map(|x| (x - mean).powi(2)).sum::<f64>() / (n - 1.0)).sqrt()
+        } else {
+            0.0
+        };
+        let label = if metric.unit == "1" {
+            metric.label.to_owned()
+        } else {
+            format!("{}, {}", metric.label, metric.unit)
+        };
         let _ = writeln!(
             out,
             "{label:<32} {:>10} {:>10} {:>10} {:>10} {:>5}  {}",

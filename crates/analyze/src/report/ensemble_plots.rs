@@ -16,8 +16,19 @@ const DISTRIBUTIONS: [(&str, &str); 6] = [
 
 /// The condition a recording belongs to: its scene, else its folder.
 fn condition(a: &Analysis) -> String {
-    let scene = a.metadata.iter().find(|(k, _)| k == "scene").or_else(|| a.metadata.iter().find(|(k, _)| k == "condition"));
-    let folder = || std::path::Path::new(&a.file).parent().and_then(|p| p.file_name()).and_then(|n| n.to_str()).unwrap_or("all").to_owned();
+    let scene = a
+        .metadata
+        .iter()
+        .find(|(k, _)| k == "scene")
+        .or_else(|| a.metadata.iter().find(|(k, _)| k == "condition"));
+    let folder = || {
+        std::path::Path::new(&a.file)
+            .parent()
+            .and_then(|p| p.file_name())
+            .and_then(|n| n.to_str())
+            .unwrap_or("all")
+            .to_owned()
+    };
     scene.map_or_else(folder, |(_, v)| v.clone())
 }
 
@@ -41,20 +52,39 @@ pub fn ensemble_plots(analyses: &[Analysis]) -> Vec<Plot> {
     for (name, id) in DISTRIBUTIONS {
         out.extend(distribution(&groups, name, id).map(Plot::Panel));
     }
-    for (role, id, title) in [("roll", "mean_psd_roll", "Mean spectrum of the roll"), ("height", "mean_psd_height", "Mean spectrum of the height")] {
+    for (role, id, title) in [
+        ("roll", "mean_psd_roll", "Mean spectrum of the roll"),
+        ("height", "mean_psd_height", "Mean spectrum of the height"),
+    ] {
         out.extend(mean_psd(&groups, role, id, title).map(Plot::Panel));
     }
     out
 }
 
 /// Shares of runs up to each value, one staircase per condition.
-fn distribution(groups: &[(String, Vec<&Analysis>)], name: &str, id: &'static str) -> Option<Panel> {
+fn distribution(
+    groups: &[(String, Vec<&Analysis>)],
+    name: &str,
+    id: &'static str,
+) -> Option<Panel> {
     let metric = metrics::find(name)?;
-    let unit = if metric.unit == "1" { String::new() } else { format!(", {}", metric.unit) };
+    let unit = if metric.unit == "1" {
+        String::new()
+    } else {
+        format!(", {}", metric.unit)
+    };
     let label = format!("{}{unit}", metric.label);
-    let mut p = Panel::new(id, &format!("Distribution: {}", metric.label), &label, "share of runs up to the value");
+    let mut p = Panel::new(
+        id,
+        &format!("Distribution: {}", metric.label),
+        &label,
+        "share of runs up to the value",
+    );
     for (k, (group, members)) in groups.iter().enumerate() {
-        let mut values: Vec<f64> = members.iter().filter_map(|a| a.metrics.number(name)).collect();
+        let mut values: Vec<f64> = members
+            .iter()
+            .filter_map(|a| a.metrics.number(name))
+            .collect();
         if values.is_empty() {
             continue;
         }
@@ -65,19 +95,44 @@ fn distribution(groups: &[(String, Vec<&Analysis>)], name: &str, id: &'static st
             x.extend([*v, *v]);
             y.extend([i as f64 / n, (i + 1) as f64 / n]);
         }
-        p.series.push(Series { name: format!("{group} ({})", values.len()), x, y, colour: k % COLOURS.len() });
+        p.series.push(Series {
+            name: format!("{group} ({})", values.len()),
+            x,
+            y,
+            colour: k % COLOURS.len(),
+        });
     }
     p.note = "Each step is one run.".into();
+    let all = p.series.iter().flat_map(|s| s.x.iter().copied());
+    let (low, high) = all.fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), x| {
+        (l.min(x), h.max(x))
+    });
+    let room = 0.05 * (high - low);
+    p.x_range = (room > 0.0).then_some((low - room, high + room));
     (!p.series.is_empty()).then_some(p)
 }
 
 /// Mean of the runs' densities, and the mean plus and minus their standard deviation where that is above zero.
-fn mean_psd(groups: &[(String, Vec<&Analysis>)], role: &str, id: &'static str, title: &str) -> Option<Panel> {
+fn mean_psd(
+    groups: &[(String, Vec<&Analysis>)],
+    role: &str,
+    id: &'static str,
+    title: &str,
+) -> Option<Panel> {
     let mut p: Option<Panel> = None;
     for (k, (group, members)) in groups.iter().enumerate() {
-        let spectra: Vec<_> = members.iter().filter_map(|a| super::plots::role_spectrum(a, role)).map(|(_, s)| s).collect();
-        let Some(first) = spectra.first() else { continue };
-        let same: Vec<_> = spectra.iter().filter(|s| s.spectrum.hz == first.spectrum.hz).collect();
+        let spectra: Vec<_> = members
+            .iter()
+            .filter_map(|a| super::plots::role_spectrum(a, role))
+            .map(|(_, s)| s)
+            .collect();
+        let Some(first) = spectra.first() else {
+            continue;
+        };
+        let same: Vec<_> = spectra
+            .iter()
+            .filter(|s| s.spectrum.hz == first.spectrum.hz)
+            .collect();
         let n = same.len() as f64;
         let panel = p.get_or_insert_with(|| {
             let unit = first.unit.replace("^2", "²");
@@ -93,13 +148,26 @@ fn mean_psd(groups: &[(String, Vec<&Analysis>)], role: &str, id: &'static str, t
         let rows: Vec<(f64, f64, f64)> = bins
             .map(|b| {
                 let mean = same.iter().map(|s| s.spectrum.power[b]).sum::<f64>() / n;
-                let variance = same.iter().map(|s| (s.spectrum.power[b] - mean).powi(2)).sum::<f64>() / (n - 1.0).max(1.0);
+                let variance = same
+                    .iter()
+                    .map(|s| (s.spectrum.power[b] - mean).powi(2))
+                    .sum::<f64>()
+                    / (n - 1.0).max(1.0);
                 (first.spectrum.hz[b], mean, variance.sqrt())
             })
             .collect();
         let mut line = |name: String, value: &dyn Fn(f64, f64) -> f64| {
-            let (x, y): (Vec<f64>, Vec<f64>) = rows.iter().map(|(f, m, s)| (*f, value(*m, *s))).filter(|(_, y)| *y > 0.0).unzip();
-            panel.series.push(Series { name, x, y, colour: k % COLOURS.len() });
+            let (x, y): (Vec<f64>, Vec<f64>) = rows
+                .iter()
+                .map(|(f, m, s)| (*f, value(*m, *s)))
+                .filter(|(_, y)| *y > 0.0)
+                .unzip();
+            panel.series.push(Series {
+                name,
+                x,
+                y,
+                colour: k % COLOURS.len(),
+            });
         };
         line(format!("{group} ({})", same.len()), &|m, _| m);
         if same.len() > 1 {

@@ -63,11 +63,15 @@ pub fn figures(plots: &[Plot], folder: &Path) -> Result<Vec<PathBuf>, FigureErro
         let png = RasterBackend::new()
             .with_scale(SCALE)
             .render_scene(&scene)
-            .map_err(|problem| FigureError::Draw { name: stem.clone(), problem })?;
+            .map_err(|problem| FigureError::Draw {
+                name: stem.clone(),
+                problem,
+            })?;
         let svg = SvgBackend::default().render_scene(&scene);
         for (extension, bytes) in [("svg", svg.as_bytes()), ("png", &png[..])] {
             let path = folder.join(format!("{stem}.{extension}"));
-            crate::whole::write_whole(&path, |file| std::io::Write::write_all(file, bytes)).map_err(io(&path))?;
+            crate::whole::write_whole(&path, |file| std::io::Write::write_all(file, bytes))
+                .map_err(io(&path))?;
             written.push(path);
         }
     }
@@ -75,15 +79,30 @@ pub fn figures(plots: &[Plot], folder: &Path) -> Result<Vec<PathBuf>, FigureErro
 }
 
 fn panel(p: &Panel) -> Scene {
-    let log = |y: f64| if p.log_y { y.max(f64::MIN_POSITIVE).log10() } else { y };
-    let (mut x0, mut x1, mut y0, mut y1) = (f64::INFINITY, f64::NEG_INFINITY, f64::INFINITY, f64::NEG_INFINITY);
+    let log = |y: f64| {
+        if p.log_y {
+            y.max(f64::MIN_POSITIVE).log10()
+        } else {
+            y
+        }
+    };
+    let (mut x0, mut x1, mut y0, mut y1) = (
+        f64::INFINITY,
+        f64::NEG_INFINITY,
+        f64::INFINITY,
+        f64::NEG_INFINITY,
+    );
     for s in &p.series {
         for (x, y) in s.x.iter().zip(&s.y) {
             (x0, x1) = (x0.min(*x), x1.max(*x));
             (y0, y1) = (y0.min(log(*y)), y1.max(log(*y)));
         }
     }
-    let others = p.levels.iter().map(|(y, _)| *y).chain(p.band.iter().flat_map(|(a, b, _)| [*a, *b]));
+    let others = p
+        .levels
+        .iter()
+        .map(|(y, _)| *y)
+        .chain(p.band.iter().flat_map(|(a, b, _)| [*a, *b]));
     for y in others {
         (y0, y1) = (y0.min(log(y)), y1.max(log(y)));
     }
@@ -97,8 +116,17 @@ fn panel(p: &Panel) -> Scene {
         (x0, x1) = (x0 - 1.0, x0 + 1.0);
     }
     let room = 0.06 * (y1 - y0);
-    let (low, high) = (y0 - room, y1 + room);
-    let range = if p.log_y { (10f64.powf(low), 10f64.powf(high)) } else { (low, high) };
+    // Whole decades: the library's logarithmic axis ends on them.
+    let (low, high) = if p.log_y {
+        (y0.floor(), (y1 + 0.05).ceil())
+    } else {
+        (y0 - room, y1 + room)
+    };
+    let range = if p.log_y {
+        (10f64.powf(low), 10f64.powf(high))
+    } else {
+        (low, high)
+    };
     let several = p.series.len() > 1;
     let marks: Vec<Mark> = p
         .series
@@ -107,13 +135,20 @@ fn panel(p: &Panel) -> Scene {
             let points: Vec<(f64, f64)> = s.x.iter().copied().zip(s.y.iter().copied()).collect();
             let colour = COLOURS[s.colour % COLOURS.len()];
             if p.points {
-                let mut cloud = ScatterPlot::new().with_data(points).with_color(colour).with_size(2.0).with_marker_opacity(0.5);
+                let mut cloud = ScatterPlot::new()
+                    .with_data(points)
+                    .with_color(colour)
+                    .with_size(2.0)
+                    .with_marker_opacity(0.5);
                 if several {
                     cloud = cloud.with_legend(s.name.clone());
                 }
                 cloud.into()
             } else {
-                let mut line = LinePlot::new().with_data(points).with_color(colour).with_stroke_width(1.2);
+                let mut line = LinePlot::new()
+                    .with_data(points)
+                    .with_color(colour)
+                    .with_stroke_width(1.2);
                 if several {
                     line = line.with_legend(s.name.clone());
                 }
@@ -121,11 +156,16 @@ fn panel(p: &Panel) -> Scene {
             }
         })
         .collect();
-    let mut layout = look(Layout::new((x0, x1), range).with_title(p.title.clone()).with_x_label(p.x_label.clone()).with_y_label(p.y_label.clone()))
-        .with_x_axis_min(x0)
-        .with_x_axis_max(x1)
-        .with_y_axis_min(range.0)
-        .with_y_axis_max(range.1);
+    let mut layout = look(
+        Layout::new((x0, x1), range)
+            .with_title(p.title.clone())
+            .with_x_label(p.x_label.clone())
+            .with_y_label(p.y_label.clone()),
+    )
+    .with_x_axis_min(x0)
+    .with_x_axis_max(x1)
+    .with_y_axis_min(range.0)
+    .with_y_axis_max(range.1);
     if p.log_y {
         layout = layout.with_log_y();
     }
@@ -134,34 +174,81 @@ fn panel(p: &Panel) -> Scene {
         layout = layout.with_legend_position(LegendPosition::OutsideRightTop);
     }
     if let Some((a, b)) = p.window {
-        layout = layout.with_shaded_region(ShadedRegion::vertical(a.max(x0), b.min(x1)).with_color(COLOURS[0]).with_opacity(0.07));
+        layout = layout.with_shaded_region(
+            ShadedRegion::vertical(a.max(x0), b.min(x1))
+                .with_color(COLOURS[0])
+                .with_opacity(0.07),
+        );
     }
     if let Some((a, b, name)) = &p.band {
-        layout = layout.with_shaded_region(ShadedRegion::horizontal(*a, *b).with_color("#7F7F7F").with_opacity(0.2));
-        layout = layout.with_annotation(note(name, x0 + 0.09 * (x1 - x0), a + 0.04 * (range.1 - range.0)));
+        layout = layout.with_shaded_region(
+            ShadedRegion::horizontal(*a, *b)
+                .with_color("#7F7F7F")
+                .with_opacity(0.2),
+        );
+        layout = layout.with_annotation(note(
+            name,
+            x0 + 0.09 * (x1 - x0),
+            a + 0.04 * (range.1 - range.0),
+        ));
     }
     for (y, name) in &p.levels {
-        layout = layout.with_reference_line(ReferenceLine::horizontal(*y).with_color(GREY).with_label(name.clone()));
+        layout = layout.with_reference_line(
+            ReferenceLine::horizontal(*y)
+                .with_color(GREY)
+                .with_label(name.clone()),
+        );
     }
-    for (k, (x, name)) in p.marks.iter().filter(|(x, _)| (x0..=x1).contains(x)).enumerate() {
-        layout = layout.with_reference_line(ReferenceLine::vertical(*x).with_color(GREY).with_dasharray("2 3"));
+    for (k, (x, name)) in p
+        .marks
+        .iter()
+        .filter(|(x, _)| (x0..=x1).contains(x))
+        .enumerate()
+    {
+        layout = layout.with_reference_line(
+            ReferenceLine::vertical(*x)
+                .with_color(GREY)
+                .with_dasharray("2 3"),
+        );
         // Names of neighbours at different heights.
         let up = 1.0 - 0.05 * (1 + k % 4) as f64;
-        let y = if p.log_y { 10f64.powf(low + up * (high - low)) } else { low + up * (high - low) };
-        layout = layout.with_annotation(note(name, (x + 0.035 * (x1 - x0)).min(x1 - 0.035 * (x1 - x0)), y));
+        let y = if p.log_y {
+            10f64.powf(low + up * (high - low))
+        } else {
+            low + up * (high - low)
+        };
+        layout = layout.with_annotation(note(
+            name,
+            (x + 0.035 * (x1 - x0)).min(x1 - 0.035 * (x1 - x0)),
+            y,
+        ));
     }
     render_multiple(marks, layout)
 }
 
 fn note(text: &str, x: f64, y: f64) -> TextAnnotation {
-    TextAnnotation::new(text, x, y).with_color(GREY).with_font_size(11)
+    TextAnnotation::new(text, x, y)
+        .with_color(GREY)
+        .with_font_size(11)
 }
 
 fn image(i: &Image) -> Scene {
-    let high = i.values.iter().flatten().copied().fold(f64::NEG_INFINITY, f64::max);
+    let high = i
+        .values
+        .iter()
+        .flatten()
+        .copied()
+        .fold(f64::NEG_INFINITY, f64::max);
     let bins = i.values.first().map_or(0, Vec::len);
-    // Rows from the top: the highest frequency first.
-    let rows: Vec<Vec<f64>> = (0..bins).rev().map(|b| i.values.iter().map(|column| column[b].max(high - 60.0)).collect()).collect();
+    // Rows from the bottom, where the range says what they are.
+    let rows: Vec<Vec<f64>> = (0..bins)
+        .map(|b| {
+            i.values
+                .iter()
+                .map(|column| column[b].max(high - 60.0))
+                .collect()
+        })
+        .collect();
     let map = Heatmap::new()
         .with_data(rows)
         .with_color_map(ColorMap::Cividis)
@@ -171,12 +258,20 @@ fn image(i: &Image) -> Scene {
         .with_legend(i.value_label.clone());
     let marks: Vec<Mark> = vec![map.into()];
     let layout = look(
-        Layout::auto_from_plots(&marks).with_title(i.title.clone()).with_x_label("time, s").with_y_label(i.y_label.clone()),
+        Layout::auto_from_plots(&marks)
+            .with_title(i.title.clone())
+            .with_x_label("time, s")
+            .with_y_label(i.y_label.clone()),
     );
     render_multiple(marks, layout)
 }
 
 /// What all figures share.
 fn look(layout: Layout) -> Layout {
-    layout.with_width(WIDTH).with_height(HEIGHT).with_title_size(16).with_label_size(13).with_tick_size(11)
+    layout
+        .with_width(WIDTH)
+        .with_height(HEIGHT)
+        .with_title_size(16)
+        .with_label_size(13)
+        .with_tick_size(11)
 }

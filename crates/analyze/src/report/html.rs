@@ -41,7 +41,10 @@ const MOST_EVENTS: usize = 400;
 pub fn html(a: &Analysis, command: &str) -> String {
     let plots = plots(a);
     let mut out = String::with_capacity(1 << 20);
-    let title = std::path::Path::new(&a.file).file_name().and_then(|n| n.to_str()).unwrap_or(&a.file);
+    let title = std::path::Path::new(&a.file)
+        .file_name()
+        .and_then(|n| n.to_str())
+        .unwrap_or(&a.file);
     let _ = write!(
         out,
         "<!doctype html>\n<html lang=\"en\">\n<head>\n<meta charset=\"utf-8\">\n<meta name=\"viewport\" content=\"width=device-width, initial-scale=1\">\n\
@@ -75,8 +78,19 @@ pub fn html(a: &Analysis, command: &str) -> String {
 }
 
 fn head(out: &mut String, a: &Analysis, title: &str) {
-    let _ = write!(out, "<header>\n<h1>{}</h1>\n<p class=\"faint\">", escaped(title));
-    let _ = write!(out, "{:.3} s, {} samples; analysed from {:.3} to {:.3} s", a.duration_s, thousands(a.samples), a.window.start_s, a.window.end_s);
+    let _ = write!(
+        out,
+        "<header>\n<h1>{}</h1>\n<p class=\"faint\">",
+        escaped(title)
+    );
+    let _ = write!(
+        out,
+        "{:.3} s, {} samples; analysed from {:.3} to {:.3} s",
+        a.duration_s,
+        thousands(a.samples),
+        a.window.start_s,
+        a.window.end_s
+    );
     for key in ["scene", "seed", "source", "method"] {
         if let Some((_, value)) = a.metadata.iter().find(|(k, _)| k == key) {
             let _ = write!(out, " · {key} {}", escaped(value));
@@ -87,7 +101,11 @@ fn head(out: &mut String, a: &Analysis, title: &str) {
         let _ = writeln!(out, "<p class=\"warn\">{}</p>", escaped(warning));
     }
     if a.skipped_messages > 0 {
-        let _ = writeln!(out, "<p class=\"warn\">{} messages are lost.</p>", thousands(a.skipped_messages));
+        let _ = writeln!(
+            out,
+            "<p class=\"warn\">{} messages are lost.</p>",
+            thousands(a.skipped_messages)
+        );
     }
     out.push_str("</header>\n");
 }
@@ -102,15 +120,27 @@ fn shown(datum: &Datum) -> String {
 }
 
 fn tiles(out: &mut String, a: &Analysis) {
-    let known: Vec<_> = TILES.iter().filter_map(|(name, label)| Some((*name, label, a.metrics.get(name)?))).filter(|(_, _, v)| v.datum != Datum::Missing).collect();
+    let known: Vec<_> = TILES
+        .iter()
+        .filter_map(|(name, label)| Some((*name, label, a.metrics.get(name)?)))
+        .filter(|(_, _, v)| v.datum != Datum::Missing)
+        .collect();
     if known.is_empty() {
         return;
     }
     out.push_str("<div class=\"tiles\">\n");
     for (name, label, value) in known {
-        let chance = (name == "synchrony").then(|| a.metrics.number("synchrony_chance")).flatten();
-        let beside = chance.map(|c| format!(", {} by chance", figures(c))).unwrap_or_default();
-        let _ = writeln!(out, "<div class=\"tile\"><b>{}</b><span>{label}{beside}</span></div>", shown(&value.datum));
+        let chance = (name == "synchrony")
+            .then(|| a.metrics.number("synchrony_chance"))
+            .flatten();
+        let beside = chance
+            .map(|c| format!(", {} by chance", figures(c)))
+            .unwrap_or_default();
+        let _ = writeln!(
+            out,
+            "<div class=\"tile\"><b>{}</b><span>{label}{beside}</span></div>",
+            shown(&value.datum)
+        );
     }
     out.push_str("</div>\n");
 }
@@ -128,9 +158,9 @@ fn figures_section(out: &mut String, plots: &[Plot]) {
             Plot::Panel(p) => (&p.title, &p.note, p.time),
             Plot::Image(i) => (&i.title, &i.note, true),
         };
-        let _ = write!(
+        let _ = writeln!(
             out,
-            "<figure data-plot=\"{k}\"{}><h3>{t}</h3><svg role=\"img\" tabindex=\"0\" aria-label=\"{t}\"></svg><div class=\"legend\"></div><figcaption>{}</figcaption></figure>\n",
+            "<figure data-plot=\"{k}\"{}><h3>{t}</h3><svg role=\"img\" tabindex=\"0\" aria-label=\"{t}\"></svg><div class=\"legend\"></div><figcaption>{}</figcaption></figure>",
             if wide { " class=\"wide\"" } else { "" },
             escaped(note),
             t = escaped(title)
@@ -142,9 +172,19 @@ fn figures_section(out: &mut String, plots: &[Plot]) {
 fn metrics_section(out: &mut String, a: &Analysis) {
     out.push_str("<h2 id=\"metrics\">Metrics</h2>\n<div class=\"scroll\"><table class=\"metrics\"><thead><tr><th>metric</th><th class=\"n\">value</th><th>unit</th><th>from</th></tr></thead><tbody>\n");
     for (name, value) in a.metrics.iter() {
-        let Some(metric) = metrics::find(name) else { continue };
-        let unit = if matches!(value.unit, "1" | "bool" | "-") { "" } else { value.unit };
-        let mut more = format!("<p>{}</p><p class=\"faint\">Definition from: {}. Name: <code>{name}</code>.</p>", escaped(metric.definition), escaped(metric.origin));
+        let Some(metric) = metrics::find(name) else {
+            continue;
+        };
+        let unit = if matches!(value.unit, "1" | "bool" | "-") {
+            ""
+        } else {
+            value.unit
+        };
+        let mut more = format!(
+            "<p>{}</p><p class=\"faint\">Definition from: {}. Name: <code>{name}</code>.</p>",
+            escaped(metric.definition),
+            escaped(metric.origin)
+        );
         if let Some(reason) = &value.reason {
             let _ = write!(more, "<p>{}</p>", escaped(reason));
         }
@@ -153,7 +193,12 @@ fn metrics_section(out: &mut String, a: &Analysis) {
             let _ = write!(more, "<p class=\"faint\">In detail: {}</p>", per.join(", "));
         }
         if let Some([low, high]) = value.ci95 {
-            let _ = write!(more, "<p class=\"faint\">95 % interval: {} … {}</p>", figures(low), figures(high));
+            let _ = write!(
+                more,
+                "<p class=\"faint\">95 % interval: {} … {}</p>",
+                figures(low),
+                figures(high)
+            );
         }
         let _ = writeln!(
             out,
@@ -180,8 +225,16 @@ fn lines_section(out: &mut String, a: &Analysis) {
                 kind => format!("{:.3} Hz = {kind}", p.hz),
             })
             .collect();
-        let lines = if lines.is_empty() { "none stands out".to_owned() } else { lines.join(", ") };
-        let _ = writeln!(out, "<tr><td><code>{}</code></td><td>{lines}</td></tr>", escaped(path));
+        let lines = if lines.is_empty() {
+            "none stands out".to_owned()
+        } else {
+            lines.join(", ")
+        };
+        let _ = writeln!(
+            out,
+            "<tr><td><code>{}</code></td><td>{lines}</td></tr>",
+            escaped(path)
+        );
     }
     out.push_str("</tbody></table></div>\n");
 }
@@ -190,14 +243,27 @@ fn events_section(out: &mut String, a: &Analysis) {
     if a.events.is_empty() {
         return;
     }
-    let _ = write!(out, "<h2 id=\"events\">Events</h2>\n<details{}><summary>{} events</summary>\n<div class=\"scroll\"><table><thead><tr><th class=\"n\">time, s</th><th>kind</th><th>what</th></tr></thead><tbody>\n",
-        if a.events.len() <= 20 { " open" } else { "" }, thousands(a.events.len() as u64));
+    let _ = write!(
+        out,
+        "<h2 id=\"events\">Events</h2>\n<details{}><summary>{} events</summary>\n<div class=\"scroll\"><table><thead><tr><th class=\"n\">time, s</th><th>kind</th><th>what</th></tr></thead><tbody>\n",
+        if a.events.len() <= 20 { " open" } else { "" },
+        thousands(a.events.len() as u64)
+    );
     for e in a.events.iter().take(MOST_EVENTS) {
-        let _ = writeln!(out, "<tr><td class=\"n\">{:.3}</td><td>{}</td><td>{}</td></tr>", e.t_s, e.kind.replace('_', " "), escaped(&e.what));
+        let _ = writeln!(
+            out,
+            "<tr><td class=\"n\">{:.3}</td><td>{}</td><td>{}</td></tr>",
+            e.t_s,
+            e.kind.replace('_', " "),
+            escaped(&e.what)
+        );
     }
     out.push_str("</tbody></table></div></details>\n");
     if a.events.len() > MOST_EVENTS {
-        let _ = writeln!(out, "<p class=\"faint\">The first {MOST_EVENTS} are listed.</p>");
+        let _ = writeln!(
+            out,
+            "<p class=\"faint\">The first {MOST_EVENTS} are listed.</p>"
+        );
     }
 }
 
@@ -228,7 +294,11 @@ fn recording_section(out: &mut String, a: &Analysis) {
         thousands(a.messages),
         escaped(&a.profile),
         escaped(&a.library),
-        if a.salvaged { "; its summary is missing or wrong, it was searched from end to end" } else { "" }
+        if a.salvaged {
+            "; its summary is missing or wrong, it was searched from end to end"
+        } else {
+            ""
+        }
     );
     out.push_str("<div class=\"scroll\"><table><thead><tr><th>topic</th><th>schema</th><th>encoding</th><th class=\"n\">messages</th><th class=\"n\">Hz</th></tr></thead><tbody>\n");
     for t in a.topics.iter().take(500) {
@@ -246,14 +316,24 @@ fn recording_section(out: &mut String, a: &Analysis) {
     if !a.roles.is_empty() {
         out.push_str("<p>Who plays which role:</p>\n<div class=\"scroll\"><table><tbody>\n");
         for (role, players) in &a.roles {
-            let _ = writeln!(out, "<tr><td>{}</td><td><code>{}</code></td></tr>", role.replace('_', " "), escaped(&players.join(", ")));
+            let _ = writeln!(
+                out,
+                "<tr><td>{}</td><td><code>{}</code></td></tr>",
+                role.replace('_', " "),
+                escaped(&players.join(", "))
+            );
         }
         out.push_str("</tbody></table></div>\n");
     }
     if !a.metadata.is_empty() {
         out.push_str("<details><summary>Metadata</summary><div class=\"scroll\"><table><tbody>\n");
         for (key, value) in &a.metadata {
-            let _ = writeln!(out, "<tr><td>{}</td><td>{}</td></tr>", escaped(key), escaped(value));
+            let _ = writeln!(
+                out,
+                "<tr><td>{}</td><td>{}</td></tr>",
+                escaped(key),
+                escaped(value)
+            );
         }
         out.push_str("</tbody></table></div></details>\n");
     }
@@ -263,9 +343,14 @@ fn signals_section(out: &mut String, a: &Analysis) {
     if a.signals.is_empty() {
         return;
     }
-    let _ = write!(out, "<h2 id=\"signals\">Signals</h2>\n<details><summary>{} numeric signals</summary><div class=\"scroll\"><table><thead><tr><th>signal</th><th>unit</th><th class=\"n\">count</th><th class=\"n\">Hz</th><th class=\"n\">min</th><th class=\"n\">mean</th><th class=\"n\">max</th><th class=\"n\">SD</th><th class=\"n\">peak, Hz</th></tr></thead><tbody>\n", a.signals.len());
+    let _ = write!(
+        out,
+        "<h2 id=\"signals\">Signals</h2>\n<details><summary>{} numeric signals</summary><div class=\"scroll\"><table><thead><tr><th>signal</th><th>unit</th><th class=\"n\">count</th><th class=\"n\">Hz</th><th class=\"n\">min</th><th class=\"n\">mean</th><th class=\"n\">max</th><th class=\"n\">SD</th><th class=\"n\">peak, Hz</th></tr></thead><tbody>\n",
+        a.signals.len()
+    );
     for (path, s) in a.signals.iter().take(2000) {
-        let cell = |x: Option<f64>| format!("<td class=\"n\">{}</td>", x.map_or("–".into(), figures));
+        let cell =
+            |x: Option<f64>| format!("<td class=\"n\">{}</td>", x.map_or("–".into(), figures));
         let _ = writeln!(
             out,
             "<tr><td><code>{}</code></td><td>{}</td><td class=\"n\">{}</td>{}{}{}{}{}{}</tr>",
@@ -322,14 +407,26 @@ fn image(i: &Image) -> Value {
 fn rounded(x: &[f64], digits: usize) -> Value {
     let round = |x: &f64| {
         let text = format!("{x:.*e}", digits - 1);
-        text.parse::<f64>().ok().filter(|x| x.is_finite()).map_or(Value::Null, |x| if x == x.trunc() && x.abs() < 1e15 { json!(x as i64) } else { json!(x) })
+        text.parse::<f64>()
+            .ok()
+            .filter(|x| x.is_finite())
+            .map_or(Value::Null, |x| {
+                if x == x.trunc() && x.abs() < 1e15 {
+                    json!(x as i64)
+                } else {
+                    json!(x)
+                }
+            })
     };
     Value::Array(x.iter().map(round).collect())
 }
 
 /// Text that is safe between tags and in attributes.
 fn escaped(text: &str) -> String {
-    text.replace('&', "&amp;").replace('<', "&lt;").replace('>', "&gt;").replace('"', "&quot;")
+    text.replace('&', "&amp;")
+        .replace('<', "&lt;")
+        .replace('>', "&gt;")
+        .replace('"', "&quot;")
 }
 
 #[cfg(test)]
@@ -344,6 +441,9 @@ mod tests {
 
     #[test]
     fn numbers_are_rounded_to_what_is_shown() {
-        assert_eq!(rounded(&[0.123456789, 15.015, 3.0, f64::NAN], 5).to_string(), "[0.12346,15.015,3,null]");
+        assert_eq!(
+            rounded(&[0.123456789, 15.015, 3.0, f64::NAN], 5).to_string(),
+            "[0.12346,15.015,3,null]"
+        );
     }
 }

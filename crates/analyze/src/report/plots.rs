@@ -9,7 +9,9 @@ use crate::phase;
 use crate::spectrum::{Mode, Options, spectrogram};
 
 /// Okabe and Ito's colours, distinct to every kind of colour vision (jfly, 2008); black comes last: it vanishes on dark paper.
-pub const COLOURS: [&str; 7] = ["#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9", "#7F7F7F"];
+pub const COLOURS: [&str; 7] = [
+    "#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9", "#7F7F7F",
+];
 
 /// A line or a cloud of points.
 #[derive(Clone, Debug)]
@@ -79,13 +81,22 @@ impl Panel {
 
     fn over_time(id: &'static str, title: &str, y_label: &str, a: &Analysis) -> Self {
         let window = Some((a.window.start_s, a.window.end_s));
-        Panel { time: true, window, ..Panel::new(id, title, "time, s", y_label) }
+        Panel {
+            time: true,
+            window,
+            ..Panel::new(id, title, "time, s", y_label)
+        }
     }
 
     fn line(&mut self, name: impl Into<String>, t_s: &[f64], x: &[f64]) {
         let (x, y) = outline(t_s, x);
         if !x.is_empty() {
-            self.series.push(Series { name: name.into(), x, y, colour: self.series.len() % COLOURS.len() });
+            self.series.push(Series {
+                name: name.into(),
+                x,
+                y,
+                colour: self.series.len() % COLOURS.len(),
+            });
         }
     }
 }
@@ -164,13 +175,21 @@ pub fn plots(a: &Analysis) -> Vec<Plot> {
         }
         _ => support.line("specific force", &i.t_s, &i.support_ratio),
     }
-    support.levels = vec![(crate::metrics::FLOAT_SHARE, "0.05".into()), (1.0, "at rest".into())];
+    support.levels = vec![
+        (crate::metrics::FLOAT_SHARE, "0.05".into()),
+        (1.0, "at rest".into()),
+    ];
     panel(support);
 
     if i.phase_rad.len() > 1 {
         let phases: Vec<&[f64]> = i.phase_rad.iter().map(|p| &p[..]).collect();
         let chance = phase::chance_level(phases.len());
-        let mut sync = Panel::over_time("synchrony", "Synchrony of the carriers", "order parameter r", a);
+        let mut sync = Panel::over_time(
+            "synchrony",
+            "Synchrony of the carriers",
+            "order parameter r",
+            a,
+        );
         sync.note = format!(
             "The band holds 95 % of what {} independent carriers show at a moment; their mean is {:.3}.",
             phases.len(),
@@ -183,13 +202,19 @@ pub fn plots(a: &Analysis) -> Vec<Plot> {
         panel(sync);
     }
 
-    for (id, title, name) in [("psd_roll", "Spectrum of the roll", "roll"), ("psd_height", "Spectrum of the height", "height")] {
+    for (id, title, name) in [
+        ("psd_roll", "Spectrum of the roll", "roll"),
+        ("psd_height", "Spectrum of the height", "height"),
+    ] {
         if let Some((_, s)) = role_spectrum(a, name) {
             panel(psd(id, title, name, s));
         }
     }
 
-    portrait(a).into_iter().chain(force_plane(a)).for_each(&mut panel);
+    portrait(a)
+        .into_iter()
+        .chain(force_plane(a))
+        .for_each(&mut panel);
     for trace in &a.traces {
         let mut p = Panel::over_time("signals", &trace.topic, &trace.label, a);
         for (name, t_s, x) in &trace.series {
@@ -208,31 +233,64 @@ pub fn plots(a: &Analysis) -> Vec<Plot> {
 /// Onset, beat and locking always; other kinds while they are few.
 fn marks(a: &Analysis) -> Vec<(f64, String)> {
     let count = |kind: &str| a.events.iter().filter(|e| e.kind == kind).count();
-    a.events.iter().filter(|e| count(e.kind) <= MOST_MARKS && e.kind != "jump").map(|e| (e.t_s, e.kind.replace('_', " "))).collect()
+    a.events
+        .iter()
+        .filter(|e| count(e.kind) <= MOST_MARKS && e.kind != "jump")
+        .map(|e| (e.t_s, e.kind.replace('_', " ")))
+        .collect()
 }
 
 /// The spectrum of the signal that plays a role.
-pub(super) fn role_spectrum<'a>(a: &'a Analysis, role: &str) -> Option<&'a (String, SpectrumSummary)> {
-    let path = a.roles.iter().find(|(r, _)| *r == role).and_then(|(_, p)| p.first()).map_or(role, |p| p.as_str());
+pub(super) fn role_spectrum<'a>(
+    a: &'a Analysis,
+    role: &str,
+) -> Option<&'a (String, SpectrumSummary)> {
+    let path = a
+        .roles
+        .iter()
+        .find(|(r, _)| *r == role)
+        .and_then(|(_, p)| p.first())
+        .map_or(role, |p| p.as_str());
     a.spectra.iter().find(|(p, _)| p == path || p == role)
 }
 
 fn psd(id: &'static str, title: &str, name: &str, s: &SpectrumSummary) -> Panel {
     let nyquist = s.spectrum.hz.last().copied().unwrap_or(1.0);
-    let reach = s.f_hz.map_or(nyquist, |f| (SPECTRUM_REACH * f).min(nyquist));
-    let mut p = Panel::new(id, title, "frequency, Hz", &format!("density, {}", s.unit.replace("^2", "²")));
+    let reach = s
+        .f_hz
+        .map_or(nyquist, |f| (SPECTRUM_REACH * f).min(nyquist));
+    let mut p = Panel::new(
+        id,
+        title,
+        "frequency, Hz",
+        &format!("density, {}", s.unit.replace("^2", "²")),
+    );
     p.note = format!(
         "Welch, {} segments of {:.1} s, bins {:.3} Hz apart, 95 % of the noise within ×{:.2} … ×{:.2}.",
         s.segments, s.segment_s, s.resolution_hz, s.confidence_95[0], s.confidence_95[1]
     );
-    let shown = s.spectrum.hz.iter().zip(&s.spectrum.power).filter(|(f, p)| **f > 0.0 && **f <= reach && **p > 0.0);
+    let shown = s
+        .spectrum
+        .hz
+        .iter()
+        .zip(&s.spectrum.power)
+        .filter(|(f, p)| **f > 0.0 && **f <= reach && **p > 0.0);
     let (x, y) = shown.map(|(f, p)| (*f, *p)).unzip();
-    p.series.push(Series { name: name.into(), x, y, colour: 0 });
+    p.series.push(Series {
+        name: name.into(),
+        x,
+        y,
+        colour: 0,
+    });
     p.log_y = true;
     p.x_range = Some((0.0, reach));
     if let Some(f) = s.f_hz {
         let lines = [(0.5, "f/2"), (1.0, "f"), (2.0, "2f"), (3.0, "3f")];
-        p.marks = lines.iter().filter(|(m, _)| m * f <= reach).map(|(m, name)| (m * f, (*name).to_owned())).collect();
+        p.marks = lines
+            .iter()
+            .filter(|(m, _)| m * f <= reach)
+            .map(|(m, name)| (m * f, (*name).to_owned()))
+            .collect();
     }
     p
 }
@@ -251,24 +309,53 @@ fn portrait(a: &Analysis) -> Option<Panel> {
     let step_s = crate::inputs::mean_step_s(&i.t_s[range.clone()])?;
     let roll = &i.roll_rad[range];
     let (rate, _) = spline_derivatives(roll, step_s)?;
-    let mut p = Panel::new("portrait", "Phase portrait of the roll", "roll, deg", "roll rate, deg/s");
+    let mut p = Panel::new(
+        "portrait",
+        "Phase portrait of the roll",
+        "roll, deg",
+        "roll rate, deg/s",
+    );
     p.note = "A closed loop is a steady swing; a spiral grows or dies.".into();
-    let (x, y): (Vec<f64>, Vec<f64>) =
-        roll.iter().zip(&rate).filter(|(a, b)| a.is_finite() && b.is_finite()).map(|(a, b)| (a.to_degrees(), b.to_degrees())).unzip();
-    p.series.push(Series { name: "roll".into(), x: thin(x), y: thin(y), colour: 0 });
+    let (x, y): (Vec<f64>, Vec<f64>) = roll
+        .iter()
+        .zip(&rate)
+        .filter(|(a, b)| a.is_finite() && b.is_finite())
+        .map(|(a, b)| (a.to_degrees(), b.to_degrees()))
+        .unzip();
+    p.series.push(Series {
+        name: "roll".into(),
+        x: thin(x),
+        y: thin(y),
+        colour: 0,
+    });
     Some(p)
 }
 
 /// The first two handles' forces against each other in the window.
 fn force_plane(a: &Analysis) -> Option<Panel> {
     let i = &a.inputs;
-    let [first, second, ..] = &i.normal_n[..] else { return None };
+    let [first, second, ..] = &i.normal_n[..] else {
+        return None;
+    };
     let range = inside(i.force_times(), a.window);
-    let mut p = Panel::new("force_plane", "One handle against the other", "force of handle 1, N", "force of handle 2, N");
+    let mut p = Panel::new(
+        "force_plane",
+        "One handle against the other",
+        "force of handle 1, N",
+        "force of handle 2, N",
+    );
     p.note = "On the diagonal the handles carry alike; on an axis one of them is slack.".into();
-    let both = first[range.clone()].iter().zip(&second[range]).filter(|(a, b)| a.is_finite() && b.is_finite());
+    let both = first[range.clone()]
+        .iter()
+        .zip(&second[range])
+        .filter(|(a, b)| a.is_finite() && b.is_finite());
     let (x, y): (Vec<f64>, Vec<f64>) = both.map(|(a, b)| (*a, *b)).unzip();
-    p.series.push(Series { name: "samples".into(), x: thin(x), y: thin(y), colour: 0 });
+    p.series.push(Series {
+        name: "samples".into(),
+        x: thin(x),
+        y: thin(y),
+        colour: 0,
+    });
     p.points = true;
     Some(p)
 }
@@ -295,18 +382,40 @@ fn roll_spectrogram(a: &Analysis) -> Option<Image> {
     }
     // About 240 columns, whatever the length.
     let step = ((i.roll_rad.len() - nperseg) / 240).max(1).min(nperseg / 2);
-    let options = Options { noverlap: Some(nperseg - step), ..Options { nperseg, ..Options::default() } };
+    let options = Options {
+        noverlap: Some(nperseg - step),
+        ..Options {
+            nperseg,
+            ..Options::default()
+        }
+    };
     let degrees: Vec<f64> = i.roll_rad.iter().map(|x| x.to_degrees()).collect();
     let s = spectrogram(&degrees, fs_hz, &options, Mode::Psd).ok()?;
-    let f_hz = a.metrics.number("beat_hz").or_else(|| a.metrics.number("peak_hz"));
+    let f_hz = a
+        .metrics
+        .number("beat_hz")
+        .or_else(|| a.metrics.number("peak_hz"));
     let reach = f_hz.map_or(fs_hz / 2.0, |f| (2.5 * f).min(fs_hz / 2.0));
     let bins = s.hz.iter().take_while(|f| **f <= reach).count();
     let every = s.power.len().div_ceil(300).max(1);
-    let values: Vec<Vec<f64>> = s.power.iter().step_by(every).map(|p| p[..bins].iter().map(|p| 10.0 * p.max(1e-12).log10()).collect()).collect();
+    let values: Vec<Vec<f64>> = s
+        .power
+        .iter()
+        .step_by(every)
+        .map(|p| {
+            p[..bins]
+                .iter()
+                .map(|p| 10.0 * p.max(1e-12).log10())
+                .collect()
+        })
+        .collect();
     Some(Image {
         id: "spectrogram",
         title: "Spectrogram of the roll".into(),
-        note: format!("Segments of {SPECTROGRAM_SEGMENT_S:.0} s, {:.3} Hz apart.", s.hz[1]),
+        note: format!(
+            "Segments of {SPECTROGRAM_SEGMENT_S:.0} s, {:.3} Hz apart.",
+            s.hz[1]
+        ),
         y_label: "frequency, Hz".into(),
         value_label: "dB re 1 deg²/Hz".into(),
         x_range: (i.t_s[0] + s.t_s[0], i.t_s[0] + s.t_s[s.t_s.len() - 1]),

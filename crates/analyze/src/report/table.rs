@@ -39,10 +39,22 @@ fn head(out: &mut String, a: &Analysis) {
         plain(a.window.start_s, 3),
         plain(a.window.end_s, 3)
     );
-    let library = if a.library.is_empty() { "unnamed software".to_owned() } else { a.library.clone() };
-    line!(out, "  {} messages on {} topics, written by {library}", thousands(a.messages), a.topics.len());
-    let told: Vec<String> =
-        ["scene", "seed", "method", "source"].iter().filter_map(|key| a.metadata.iter().find(|(k, _)| k == key)).map(|(k, v)| format!("{k} {v}")).collect();
+    let library = if a.library.is_empty() {
+        "unnamed software".to_owned()
+    } else {
+        a.library.clone()
+    };
+    line!(
+        out,
+        "  {} messages on {} topics, written by {library}",
+        thousands(a.messages),
+        a.topics.len()
+    );
+    let told: Vec<String> = ["scene", "seed", "method", "source"]
+        .iter()
+        .filter_map(|key| a.metadata.iter().find(|(k, _)| k == key))
+        .map(|(k, v)| format!("{k} {v}"))
+        .collect();
     if !told.is_empty() {
         line!(out, "  {}", told.join(", "));
     }
@@ -57,15 +69,26 @@ fn head(out: &mut String, a: &Analysis) {
         wrapped(out, "  ! ", warning);
     }
     if a.salvaged {
-        line!(out, "  ! its summary is missing or wrong: the file was searched from end to end");
+        line!(
+            out,
+            "  ! its summary is missing or wrong: the file was searched from end to end"
+        );
     }
     if a.skipped_messages > 0 {
-        line!(out, "  ! {} messages are lost", thousands(a.skipped_messages));
+        line!(
+            out,
+            "  ! {} messages are lost",
+            thousands(a.skipped_messages)
+        );
     }
 }
 
 fn metrics_section(out: &mut String, a: &Analysis) {
-    let known: Vec<(&str, &Value)> = a.metrics.iter().filter(|(_, v)| v.datum != Datum::Missing).collect();
+    let known: Vec<(&str, &Value)> = a
+        .metrics
+        .iter()
+        .filter(|(_, v)| v.datum != Datum::Missing)
+        .collect();
     let mut missing: Vec<(&str, Vec<&str>)> = Vec::new();
     for (name, value) in a.metrics.iter().filter(|(_, v)| v.datum == Datum::Missing) {
         let reason = value.reason.as_deref().unwrap_or("");
@@ -110,8 +133,13 @@ fn metrics_section(out: &mut String, a: &Analysis) {
 }
 
 fn spectra_section(out: &mut String, a: &Analysis) {
-    let Some((_, first)) = a.spectra.first() else { return };
-    let f = first.f_hz.map(|f| format!(", f = {} Hz", figures(f))).unwrap_or_default();
+    let Some((_, first)) = a.spectra.first() else {
+        return;
+    };
+    let f = first
+        .f_hz
+        .map(|f| format!(", f = {} Hz", figures(f)))
+        .unwrap_or_default();
     line!(
         out,
         "\nSpectra (Welch, {} × {} s, {} Hz apart, noise bandwidth {} Hz, 95 %: × {} … {}{f})",
@@ -132,7 +160,11 @@ fn spectra_section(out: &mut String, a: &Analysis) {
                 kind => format!("{} Hz = {kind}", plain(p.hz, 3)),
             })
             .collect();
-        let told = if told.is_empty() { "no line stands out".to_owned() } else { told.join(", ") };
+        let told = if told.is_empty() {
+            "no line stands out".to_owned()
+        } else {
+            told.join(", ")
+        };
         line!(out, "  {:<32} {told}", shortened(path, 32));
     }
 }
@@ -150,13 +182,27 @@ fn events_section(out: &mut String, a: &Analysis) {
     }
     for kind in kinds {
         let of_kind: Vec<_> = a.events.iter().filter(|e| e.kind == kind).collect();
-        let told = if of_kind.len() > MOST_EVENTS { 1 } else { of_kind.len() };
+        let told = if of_kind.len() > MOST_EVENTS {
+            1
+        } else {
+            of_kind.len()
+        };
         for e in &of_kind[..told] {
-            wrapped_after(out, &format!("  {:>9} s  {:<17} ", plain(e.t_s, 3), e.kind), &e.what);
+            wrapped_after(
+                out,
+                &format!("  {:>9} s  {:<17} ", plain(e.t_s, 3), e.kind),
+                &e.what,
+            );
         }
         if told < of_kind.len() {
             let last = of_kind[of_kind.len() - 1];
-            line!(out, "  {:>11}  {kind:<17} … {} in all, the last at {} s", "", thousands(of_kind.len() as u64), plain(last.t_s, 3));
+            line!(
+                out,
+                "  {:>11}  {kind:<17} … {} in all, the last at {} s",
+                "",
+                thousands(of_kind.len() as u64),
+                plain(last.t_s, 3)
+            );
         }
     }
 }
@@ -166,13 +212,33 @@ fn signals_section(out: &mut String, a: &Analysis, all: bool) {
         return;
     }
     // What never changes, and stamps, are no news unless they were asked for.
-    let news = |(path, s): &&(String, crate::summary::Summary)| all || (s.min != s.max && !path.contains(".stamp."));
+    let news = |(path, s): &&(String, crate::summary::Summary)| {
+        all || (s.min != s.max && !path.contains(".stamp."))
+    };
     let listed: Vec<&(String, crate::summary::Summary)> = a.signals.iter().filter(news).collect();
-    let shown = if all { listed.len() } else { listed.len().min(MOST_SIGNALS) };
-    line!(out, "\n{:<41} {:>8} {:>8} {:>9} {:>9} {:>9} {:>9}", "Signals", "Hz", "min", "mean", "max", "SD", "peak Hz");
+    let shown = if all {
+        listed.len()
+    } else {
+        listed.len().min(MOST_SIGNALS)
+    };
+    line!(
+        out,
+        "\n{:<41} {:>8} {:>8} {:>9} {:>9} {:>9} {:>9}",
+        "Signals",
+        "Hz",
+        "min",
+        "mean",
+        "max",
+        "SD",
+        "peak Hz"
+    );
     let cell = |x: Option<f64>| x.map_or("–".to_owned(), short);
     for (path, s) in &listed[..shown] {
-        let name = if s.unit.is_empty() { path.clone() } else { format!("{path} [{}]", s.unit) };
+        let name = if s.unit.is_empty() {
+            path.clone()
+        } else {
+            format!("{path} [{}]", s.unit)
+        };
         line!(
             out,
             "  {:<39} {:>8} {:>8} {:>9} {:>9} {:>9} {:>9}",
@@ -192,7 +258,10 @@ fn signals_section(out: &mut String, a: &Analysis, all: bool) {
         (more, 0) => format!("{more} more"),
         (more, still) => format!("{more} more, and {still} that never change, or are stamps"),
     };
-    line!(out, "  … and {more}: --signal '*' lists all, --signal PATH some of them");
+    line!(
+        out,
+        "  … and {more}: --signal '*' lists all, --signal PATH some of them"
+    );
 }
 
 fn quality_section(out: &mut String, a: &Analysis) {
@@ -201,9 +270,20 @@ fn quality_section(out: &mut String, a: &Analysis) {
     }
     line!(out, "\nQuality");
     for q in &a.quality {
-        let at = q.t_s.map(|t| format!(" (first at {} s)", plain(t, 3))).unwrap_or_default();
-        let topic = if q.topic.is_empty() { String::new() } else { format!("{}: ", q.topic) };
-        wrapped(out, if q.loss { "  ! " } else { "  – " }, &format!("{topic}{}{at}", q.text));
+        let at = q
+            .t_s
+            .map(|t| format!(" (first at {} s)", plain(t, 3)))
+            .unwrap_or_default();
+        let topic = if q.topic.is_empty() {
+            String::new()
+        } else {
+            format!("{}: ", q.topic)
+        };
+        wrapped(
+            out,
+            if q.loss { "  ! " } else { "  – " },
+            &format!("{topic}{}{at}", q.text),
+        );
     }
 }
 
@@ -267,7 +347,7 @@ pub(super) fn thousands(n: u64) -> String {
     let digits = n.to_string();
     let mut out = String::new();
     for (k, c) in digits.chars().enumerate() {
-        if k > 0 && (digits.len() - k) % 3 == 0 {
+        if k > 0 && (digits.len() - k).is_multiple_of(3) {
             out.push(',');
         }
         out.push(c);

@@ -78,6 +78,9 @@ impl WelchStream {
         if self.count == 0 {
             return super::welch(&self.buffer, fs_hz, &self.options);
         }
-        Ok(self.segments.at_rate(fs_hz)?.spectrum(self.sums.clone(), self.count))
+        Ok(self
+            .segments
+            .at_rate(fs_hz)?
+            .spectrum(self.sums.clone(), self.count))
     }
 }
