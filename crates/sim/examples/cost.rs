@@ -12,7 +12,9 @@ use sim::solve::method;
 #[inline(never)]
 fn counted(model: &Model) -> (u64, u64) {
     let method = method(&model.scene.solver.method).unwrap_or_else(|e| panic!("{e}"));
-    let (stats, outcome) = run_model(model, method, &settings(&model.scene), &mut |_: &Sample| true);
+    let (stats, outcome) = run_model(model, method, &settings(&model.scene), &mut |_: &Sample| {
+        true
+    });
     outcome.unwrap_or_else(|e| panic!("{e}"));
     (stats.steps, stats.evaluations)
 }
@@ -22,5 +24,8 @@ fn main() {
     let scene = arguments.next().unwrap_or_else(|| "music".into());
     let scene = load(&scene, &arguments.collect::<Vec<_>>()).unwrap_or_else(|e| panic!("{e}"));
     let (steps, evaluations) = counted(&Model::new(&scene));
-    println!("{} s, {steps} steps, {evaluations} evaluations", scene.duration_s);
+    println!(
+        "{} s, {steps} steps, {evaluations} evaluations",
+        scene.duration_s
+    );
 }

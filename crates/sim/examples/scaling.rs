@@ -63,7 +63,8 @@ fn rhs_ns(scene: &Scene) -> f64 {
 fn peak_mb() -> f64 {
     let status = std::fs::read_to_string("/proc/self/status").unwrap_or_default();
     let line = status.lines().find_map(|l| l.strip_prefix("VmHWM:"));
-    line.and_then(|l| l.split_whitespace().next()?.parse::<f64>().ok()).map_or(0.0, |kb| kb / 1024.0)
+    line.and_then(|l| l.split_whitespace().next()?.parse::<f64>().ok())
+        .map_or(0.0, |kb| kb / 1024.0)
 }
 
 fn timed(n: usize, seconds: f64) -> (f64, u64) {
@@ -74,16 +75,28 @@ fn timed(n: usize, seconds: f64) -> (f64, u64) {
 }
 
 fn main() {
-    let arguments: Vec<f64> = std::env::args().skip(1).filter_map(|a| a.parse().ok()).collect();
+    let arguments: Vec<f64> = std::env::args()
+        .skip(1)
+        .filter_map(|a| a.parse().ok())
+        .collect();
     if let [n, seconds] = arguments[..] {
         let (wall_s, evaluations) = timed(n as usize, seconds);
-        println!("{n} carriers, {seconds} s: {wall_s:.3} s, {evaluations} evaluations, {:.1} MB", peak_mb());
+        println!(
+            "{n} carriers, {seconds} s: {wall_s:.3} s, {evaluations} evaluations, {:.1} MB",
+            peak_mb()
+        );
         return;
     }
-    println!("{:>7} {:>14} {:>12} {:>12} {:>9}", "N", "rhs, ns", "60 s, s", "evaluations", "RAM, MB");
+    println!(
+        "{:>7} {:>14} {:>12} {:>12} {:>9}",
+        "N", "rhs, ns", "60 s, s", "evaluations", "RAM, MB"
+    );
     for n in [1, 2, 5, 10, 30, 100, 300, 1000, 3000, 10_000] {
         let rhs = rhs_ns(&scene(n, 60.0));
         let (wall_s, evaluations) = timed(n, 60.0);
-        println!("{n:>7} {rhs:>14.0} {wall_s:>12.3} {evaluations:>12} {:>9.1}", peak_mb());
+        println!(
+            "{n:>7} {rhs:>14.0} {wall_s:>12.3} {evaluations:>12} {:>9.1}",
+            peak_mb()
+        );
     }
 }

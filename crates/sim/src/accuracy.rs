@@ -64,22 +64,40 @@ impl Course {
     }
 
     fn quoted(&self, scene: &Scene) -> Quoted {
-        let from = self.t_s.partition_point(|&t| t < scene.analysis_start_s - 1e-9);
+        let from = self
+            .t_s
+            .partition_point(|&t| t < scene.analysis_start_s - 1e-9);
         let n = scene.carriers.count();
-        let (t, roll, force) = (&self.t_s[from..], &self.roll_rad[from..], &self.normal_n[from * n..]);
+        let (t, roll, force) = (
+            &self.t_s[from..],
+            &self.roll_rad[from..],
+            &self.normal_n[from * n..],
+        );
         if t.is_empty() {
             return Quoted::default();
         }
         let count = t.len() as f64;
-        let g = scene.body.gravity_m_per_s2.iter().map(|x| x * x).sum::<f64>().sqrt();
+        let g = scene
+            .body
+            .gravity_m_per_s2
+            .iter()
+            .map(|x| x * x)
+            .sum::<f64>()
+            .sqrt();
         let weight = scene.body.mass_kg * g;
         let window = ((ONSET_S * scene.log_rate_hz).round() as usize).max(1);
-        let onset = roll.windows(window).position(|w| (w.iter().map(|r| r * r).sum::<f64>() / window as f64).sqrt() > ONSET_RAD);
+        let onset = roll.windows(window).position(|w| {
+            (w.iter().map(|r| r * r).sum::<f64>() / window as f64).sqrt() > ONSET_RAD
+        });
         Quoted {
             rms_roll_rad: (roll.iter().map(|r| r * r).sum::<f64>() / count).sqrt(),
             contact_loss: force.iter().filter(|&&f| f <= 0.0).count() as f64 / force.len() as f64,
             onset_s: onset.map(|i| t[i + window - 1]),
-            t_float: force.chunks_exact(n).filter(|f| f.iter().sum::<f64>() <= FLOATING * weight).count() as f64 / count,
+            t_float: force
+                .chunks_exact(n)
+                .filter(|f| f.iter().sum::<f64>() <= FLOATING * weight)
+                .count() as f64
+                / count,
         }
     }
 }
@@ -131,7 +149,11 @@ pub struct Study {
 }
 
 fn solve(model: &Model, method: &Method, setting: f64) -> (Course, Stats, Option<String>) {
-    let settings = Settings { tolerance: setting, step_s: setting, most_evaluations: MOST_EVALUATIONS };
+    let settings = Settings {
+        tolerance: setting,
+        step_s: setting,
+        most_evaluations: MOST_EVALUATIONS,
+    };
     let mut course = Course::default();
     let (stats, outcome) = run_model(model, method, &settings, &mut |s: &Sample| {
         course.push(s);
@@ -141,22 +163,37 @@ fn solve(model: &Model, method: &Method, setting: f64) -> (Course, Stats, Option
 }
 
 fn worst(a: &[f64], b: &[f64]) -> f64 {
-    a.iter().zip(b).map(|(x, y)| (x - y).abs()).fold(0.0, f64::max)
+    a.iter()
+        .zip(b)
+        .map(|(x, y)| (x - y).abs())
+        .fold(0.0, f64::max)
 }
 
 /// Roll is an angle: a whole turn is no error.
 fn worst_angle(a: &[f64], b: &[f64]) -> f64 {
     let turn = std::f64::consts::TAU;
-    a.iter().zip(b).map(|(x, y)| (x - y - turn * ((x - y) / turn).round()).abs()).fold(0.0, f64::max)
+    a.iter()
+        .zip(b)
+        .map(|(x, y)| (x - y - turn * ((x - y) / turn).round()).abs())
+        .fold(0.0, f64::max)
 }
 
 /// Runs every method over its ladder. `progress` hears each rung before it is run. `repeats` runs are timed, the first warms up.
 ///
 /// # Errors
 /// When a reference stops early: a sentence with its cause.
-pub fn study(scene: &Scene, repeats: usize, mut progress: impl FnMut(&str)) -> Result<Study, String> {
+pub fn study(
+    scene: &Scene,
+    repeats: usize,
+    mut progress: impl FnMut(&str),
+) -> Result<Study, String> {
     let model = Model::new(scene);
-    let named = |name: &str| METHODS.iter().find(|m| m.name == name).expect("a method of the table");
+    let named = |name: &str| {
+        METHODS
+            .iter()
+            .find(|m| m.name == name)
+            .expect("a method of the table")
+    };
     let mut reference = |name: &str, tolerance: f64| {
         progress(&format!("reference: {name} at {tolerance:e}"));
         match solve(&model, named(name), tolerance) {
@@ -188,18 +225,28 @@ pub fn study(scene: &Scene, repeats: usize, mut progress: impl FnMut(&str)) -> R
                 error_z_m: worst(&course.height_m, &best.height_m),
                 error_normal_n: worst(&course.normal_n, &best.normal_n),
                 quoted: course.quoted(scene),
-                unexplained: (course.throughput_j > 0.0).then(|| course.unexplained_j / course.throughput_j),
+                unexplained: (course.throughput_j > 0.0)
+                    .then(|| course.unexplained_j / course.throughput_j),
                 failed,
             });
         }
     }
-    let mut by_time: Vec<usize> = (0..runs.len()).filter(|&i| runs[i].failed.is_none()).collect();
+    let mut by_time: Vec<usize> = (0..runs.len())
+        .filter(|&i| runs[i].failed.is_none())
+        .collect();
     by_time.sort_by(|&a, &b| runs[a].wall_s.total_cmp(&runs[b].wall_s));
     let mut least = f64::INFINITY;
-    let front = by_time.into_iter().filter(|&i| runs[i].error_roll_rad < least && { least = runs[i].error_roll_rad; true });
+    let front = by_time.into_iter().filter(|&i| {
+        runs[i].error_roll_rad < least && {
+            least = runs[i].error_roll_rad;
+            true
+        }
+    });
     Ok(Study {
         scene: scene.name.clone(),
-        reference: format!("dop853 at {REFERENCE_TOLERANCE:e}, against dopri5 at {SECOND_TOLERANCE:e}"),
+        reference: format!(
+            "dop853 at {REFERENCE_TOLERANCE:e}, against dopri5 at {SECOND_TOLERANCE:e}"
+        ),
         estimated_error_rad: worst_angle(&best.roll_rad, &second.roll_rad),
         estimated_error_m: worst(&best.height_m, &second.height_m),
         quoted: best.quoted(scene),
@@ -215,7 +262,10 @@ impl Study {
     }
 
     fn cheapest_where(&self, right: impl Fn(&Rung) -> bool) -> Option<&Rung> {
-        self.runs.iter().filter(|r| r.failed.is_none() && right(r)).min_by(|a, b| a.wall_s.total_cmp(&b.wall_s))
+        self.runs
+            .iter()
+            .filter(|r| r.failed.is_none() && right(r))
+            .min_by(|a, b| a.wall_s.total_cmp(&b.wall_s))
     }
 
     /// What a further digit of roll costs: the factor in time per factor ten in error along the front (least squares in
@@ -224,23 +274,37 @@ impl Study {
         let points: Vec<(f64, f64)> = self
             .front
             .iter()
-            .map(|&i| (-self.runs[i].error_roll_rad.max(1e-300).log10(), self.runs[i].wall_s.log10()))
+            .map(|&i| {
+                (
+                    -self.runs[i].error_roll_rad.max(1e-300).log10(),
+                    self.runs[i].wall_s.log10(),
+                )
+            })
             .collect();
         let n = points.len() as f64;
-        let (mx, my) = (points.iter().map(|p| p.0).sum::<f64>() / n, points.iter().map(|p| p.1).sum::<f64>() / n);
+        let (mx, my) = (
+            points.iter().map(|p| p.0).sum::<f64>() / n,
+            points.iter().map(|p| p.1).sum::<f64>() / n,
+        );
         let spread: f64 = points.iter().map(|p| (p.0 - mx).powi(2)).sum();
-        (points.len() > 1 && spread > 0.0)
-            .then(|| 10f64.powf(points.iter().map(|p| (p.0 - mx) * (p.1 - my)).sum::<f64>() / spread))
+        (points.len() > 1 && spread > 0.0).then(|| {
+            10f64.powf(points.iter().map(|p| (p.0 - mx) * (p.1 - my)).sum::<f64>() / spread)
+        })
     }
 
     /// The finding, in one sentence.
     pub fn sentence(&self) -> String {
         let truth = self.quoted.rms_roll_rad;
-        let Some(r) = self.cheapest_where(|r| (r.quoted.rms_roll_rad - truth).abs() <= 0.01 * truth) else {
+        let Some(r) =
+            self.cheapest_where(|r| (r.quoted.rms_roll_rad - truth).abs() <= 0.01 * truth)
+        else {
             return "no setting gives RMS roll to 1 %".into();
         };
         let what = if r.adaptive { "tolerance" } else { "step" };
-        let digit = self.cost_of_a_digit().map(|c| format!("; each further digit of roll costs × {c:.2}")).unwrap_or_default();
+        let digit = self
+            .cost_of_a_digit()
+            .map(|c| format!("; each further digit of roll costs × {c:.2}"))
+            .unwrap_or_default();
         format!(
             "for RMS roll to 1 % the cheapest is {} at {what} {:e}{}: {:.2} ms{digit}",
             r.method,

@@ -30,11 +30,19 @@ impl Body {
         if !tensor.iter().all(|x| x.is_finite()) {
             return Err("found a moment that is not a finite number".into());
         }
-        let mut moments: Vec<f64> = SymmetricEigen::new(tensor).eigenvalues.iter().copied().collect();
+        let mut moments: Vec<f64> = SymmetricEigen::new(tensor)
+            .eigenvalues
+            .iter()
+            .copied()
+            .collect();
         moments.sort_by(f64::total_cmp);
-        let [small, middle, large] = moments[..] else { unreachable!("three moments") };
+        let [small, middle, large] = moments[..] else {
+            unreachable!("three moments")
+        };
         if small <= 0.0 || small < large * 1e-14 {
-            return Err(format!("its smallest principal moment is {small:.4e}, expected one above zero"));
+            return Err(format!(
+                "its smallest principal moment is {small:.4e}, expected one above zero"
+            ));
         }
         // The eigenvalues carry rounding of the order of ε·I₃, and a flat plate meets the bound exactly.
         if small + middle < large * (1.0 - 1e-12) {
@@ -42,7 +50,9 @@ impl Body {
                 "its principal moments {small:.6}, {middle:.6}, {large:.6} break the triangle inequality I1 + I2 >= I3: no body has them"
             ));
         }
-        let inverse = tensor.try_inverse().ok_or("the tensor cannot be inverted")?;
+        let inverse = tensor
+            .try_inverse()
+            .ok_or("the tensor cannot be inverted")?;
         Ok(Self {
             mass_kg: spec.mass_kg,
             inertia_kg_m2: tensor,
@@ -58,16 +68,40 @@ mod tests {
     use crate::scene::Inertia;
 
     fn with(inertia: Inertia) -> Result<Body, String> {
-        Body::new(&BodySpec { inertia_kg_m2: inertia, ..BodySpec::default() })
+        Body::new(&BodySpec {
+            inertia_kg_m2: inertia,
+            ..BodySpec::default()
+        })
     }
 
     #[test]
     fn impossible_inertias_are_refused() {
-        let plain = Inertia { xx: 1.0, yy: 2.0, zz: 2.5, xy: 0.0, xz: 0.0, yz: 0.0 };
+        let plain = Inertia {
+            xx: 1.0,
+            yy: 2.0,
+            zz: 2.5,
+            xy: 0.0,
+            xz: 0.0,
+            yz: 0.0,
+        };
         assert!(with(plain).is_ok());
-        assert!(with(Inertia { zz: 3.0, ..plain }).is_ok(), "a flat plate is a body");
-        assert!(with(Inertia { zz: 3.1, ..plain }).unwrap_err().contains("triangle"));
-        assert!(with(Inertia { xx: -1.0, ..plain }).unwrap_err().contains("above zero"));
-        assert!(with(Inertia { xy: 1.5, ..plain }).is_err(), "a product beyond its moments");
+        assert!(
+            with(Inertia { zz: 3.0, ..plain }).is_ok(),
+            "a flat plate is a body"
+        );
+        assert!(
+            with(Inertia { zz: 3.1, ..plain })
+                .unwrap_err()
+                .contains("triangle")
+        );
+        assert!(
+            with(Inertia { xx: -1.0, ..plain })
+                .unwrap_err()
+                .contains("above zero")
+        );
+        assert!(
+            with(Inertia { xy: 1.5, ..plain }).is_err(),
+            "a product beyond its moments"
+        );
     }
 }

@@ -23,7 +23,12 @@ pub struct Energy {
 
 impl Energy {
     /// The balance at an evaluated state; `at_start_j` keeps K + P + S of the first call. `None` without a ledger.
-    pub(crate) fn of(model: &Model, y: &[f64], w: &Workspace, at_start_j: &mut Option<f64>) -> Option<Self> {
+    pub(crate) fn of(
+        model: &Model,
+        y: &[f64],
+        w: &Workspace,
+        at_start_j: &mut Option<f64>,
+    ) -> Option<Self> {
         if !model.scene.solver.energy {
             return None;
         }
@@ -37,6 +42,13 @@ impl Energy {
             dissipated_j += page[1];
         }
         let unexplained_j = held_j - began_j - work_in_j + dissipated_j;
-        Some(Self { kinetic_j, potential_j, elastic_j, work_in_j, dissipated_j, unexplained_j })
+        Some(Self {
+            kinetic_j,
+            potential_j,
+            elastic_j,
+            work_in_j,
+            dissipated_j,
+            unexplained_j,
+        })
     }
 }

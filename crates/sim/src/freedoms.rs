@@ -36,7 +36,11 @@ impl Pose {
         if cos_pitch < 1e-9 {
             // ±90°: q = R_z(yaw) R_y(±90°) R_x(roll) depends on roll ∓ yaw only.
             let turn = 2.0 * x.atan2(w);
-            return [turn - std::f64::consts::TAU * (turn / std::f64::consts::TAU).round(), pitch, 0.0];
+            return [
+                turn - std::f64::consts::TAU * (turn / std::f64::consts::TAU).round(),
+                pitch,
+                0.0,
+            ];
         }
         let roll = (2.0 * (w * x + y * z)).atan2(1.0 - 2.0 * (x * x + y * y));
         [roll, pitch, across.atan2(level)]
@@ -100,17 +104,29 @@ struct Tensor {
 impl Tensor {
     fn new(m: &Matrix3<f64>) -> Self {
         let products = [m[(1, 2)], m[(0, 2)], m[(0, 1)]];
-        Self { moments: [m[(0, 0)], m[(1, 1)], m[(2, 2)]], products, diagonal: products == [0.0; 3] }
+        Self {
+            moments: [m[(0, 0)], m[(1, 1)], m[(2, 2)]],
+            products,
+            diagonal: products == [0.0; 3],
+        }
     }
 
     #[inline(always)]
     fn times(&self, v: [f64; 3]) -> [f64; 3] {
-        let own = [self.moments[0] * v[0], self.moments[1] * v[1], self.moments[2] * v[2]];
+        let own = [
+            self.moments[0] * v[0],
+            self.moments[1] * v[1],
+            self.moments[2] * v[2],
+        ];
         if self.diagonal {
             return own;
         }
         let [yz, xz, xy] = self.products;
-        [own[0] + xy * v[1] + xz * v[2], own[1] + xy * v[0] + yz * v[2], own[2] + xz * v[0] + yz * v[1]]
+        [
+            own[0] + xy * v[1] + xz * v[2],
+            own[1] + xy * v[0] + yz * v[2],
+            own[2] + xz * v[0] + yz * v[1],
+        ]
     }
 }
 
@@ -157,8 +173,19 @@ impl Freedoms for Six {
 
     fn names(&self) -> &[&'static str] {
         &[
-            "x_m", "y_m", "z_m", "qx", "qy", "qz", "qw", "vx_m_per_s", "vy_m_per_s", "vz_m_per_s", "wx_rad_per_s",
-            "wy_rad_per_s", "wz_rad_per_s",
+            "x_m",
+            "y_m",
+            "z_m",
+            "qx",
+            "qy",
+            "qz",
+            "qw",
+            "vx_m_per_s",
+            "vy_m_per_s",
+            "vz_m_per_s",
+            "wx_rad_per_s",
+            "wy_rad_per_s",
+            "wz_rad_per_s",
         ]
     }
 
@@ -167,7 +194,9 @@ impl Freedoms for Six {
     }
 
     fn scales(&self) -> &[f64] {
-        &[0.1, 0.1, 0.1, 0.1, 0.1, 0.1, 0.1, 1.0, 1.0, 1.0, 1.0, 1.0, 1.0]
+        &[
+            0.1, 0.1, 0.1, 0.1, 0.1, 0.1, 0.1, 1.0, 1.0, 1.0, 1.0, 1.0, 1.0,
+        ]
     }
 
     fn place(&self, start: &Start, height_m: f64, y: &mut [f64]) {
@@ -186,7 +215,8 @@ impl Freedoms for Six {
         w.spin = spin;
         w.rotation = r;
         // ω in the world: the rates of the arms are ω × arm there.
-        let world = r.map(|row| f64x2::splat(row[0] * spin[0] + row[1] * spin[1] + row[2] * spin[2]));
+        let world =
+            r.map(|row| f64x2::splat(row[0] * spin[0] + row[1] * spin[1] + row[2] * spin[2]));
         let rows = r.map(|row| row.map(f64x2::splat));
         let position = [y[0], y[1], y[2]].map(f64x2::splat);
         let velocity = [y[7], y[8], y[9]].map(f64x2::splat);
@@ -220,7 +250,8 @@ impl Freedoms for Six {
             torque[2] += ax * fy - ay * fx;
         }
         let (force, t, r) = (force.map(sum), torque.map(sum), &w.rotation);
-        let in_body = [0, 1, 2].map(|a| r[0][a] * t[0] + r[1][a] * t[1] + r[2][a] * t[2] + w.body_torque[a]);
+        let in_body =
+            [0, 1, 2].map(|a| r[0][a] * t[0] + r[1][a] * t[1] + r[2][a] * t[2] + w.body_torque[a]);
         let [wx, wy, wz] = w.spin;
         let momentum = self.inertia.times([wx, wy, wz]);
         let angular = self.inverse_inertia.times([
@@ -274,8 +305,15 @@ impl Freedoms for Six {
 
     fn energy_j(&self, y: &[f64]) -> [f64; 2] {
         let v = Vector3::new(y[7], y[8], y[9]);
-        let kinetic = 0.5 * (self.mass * v.norm_squared() + (0..3).map(|a| y[10 + a] * self.inertia.times([y[10], y[11], y[12]])[a]).sum::<f64>());
-        [kinetic, -self.mass * (0..3).map(|a| self.gravity[a] * y[a]).sum::<f64>()]
+        let kinetic = 0.5
+            * (self.mass * v.norm_squared()
+                + (0..3)
+                    .map(|a| y[10 + a] * self.inertia.times([y[10], y[11], y[12]])[a])
+                    .sum::<f64>());
+        [
+            kinetic,
+            -self.mass * (0..3).map(|a| self.gravity[a] * y[a]).sum::<f64>(),
+        ]
     }
 }
 
@@ -293,7 +331,12 @@ mod tests {
     use super::*;
 
     fn pose(orientation: [f64; 4]) -> Pose {
-        Pose { position_m: [0.0; 3], orientation, velocity_m_per_s: [0.0; 3], spin_rad_per_s: [0.0; 3] }
+        Pose {
+            position_m: [0.0; 3],
+            orientation,
+            velocity_m_per_s: [0.0; 3],
+            spin_rad_per_s: [0.0; 3],
+        }
     }
 
     #[test]
@@ -314,7 +357,10 @@ mod tests {
                 let q = UnitQuaternion::from_euler_angles(roll, pitch, yaw);
                 let [r, p, y] = pose([q.i, q.j, q.k, q.w]).roll_pitch_yaw_rad();
                 let back = UnitQuaternion::from_euler_angles(r, p, y);
-                assert!(q.angle_to(&back) < 1e-8, "{roll} {pitch} {yaw} -> {r} {p} {y}");
+                assert!(
+                    q.angle_to(&back) < 1e-8,
+                    "{roll} {pitch} {yaw} -> {r} {p} {y}"
+                );
             }
         }
     }

@@ -3,9 +3,9 @@
 //! Carrier i sits in lane i mod 2 of pair i / 2. With an odd number of carriers the last lane is padding: its
 //! parameters are zero, so that it exerts nothing.
 
+use wide::bytemuck::cast;
 pub use wide::f64x2;
 use wide::i64x2;
-use wide::bytemuck::cast;
 
 /// Lanes in a pair.
 pub const LANES: usize = 2;
@@ -27,7 +27,13 @@ pub fn pack(values: impl ExactSizeIterator<Item = f64>) -> Vec<f64x2> {
 /// Reads `y` (one number per carrier, contiguous) pair by pair; padding is zero.
 #[inline(always)]
 pub fn load(y: &[f64]) -> impl Iterator<Item = f64x2> {
-    y.chunks(LANES).map(|c| f64x2::new(if let [a, b] = c { [*a, *b] } else { [c[0], 0.0] }))
+    y.chunks(LANES).map(|c| {
+        f64x2::new(if let [a, b] = c {
+            [*a, *b]
+        } else {
+            [c[0], 0.0]
+        })
+    })
 }
 
 /// Writes pairs into `y` (one number per carrier, contiguous).
@@ -102,7 +108,11 @@ const fn both<const N: usize>(values: [f64; N]) -> [f64x2; N] {
 }
 
 /// π/2 in three parts; the first two have 31 bits, so that their products with n < 2²² are exact.
-const HALF_PI: [f64x2; 3] = both([1.570_796_326_734_125_6, 6.077_100_503_593_46e-11, 2.912_732_056_093_356e-20]);
+const HALF_PI: [f64x2; 3] = both([
+    1.570_796_326_734_125_6,
+    6.077_100_503_593_46e-11,
+    2.912_732_056_093_356e-20,
+]);
 const SIN: [f64x2; 6] = both([
     1.589_623_015_765_465_6e-10,
     -2.505_074_776_285_780_7e-8,
@@ -133,7 +143,9 @@ mod tests {
             let (s, c) = sin_cos(f64x2::new([x, -x]));
             let [s, c] = [s.to_array(), c.to_array()];
             assert!(s[0] == -s[1] && c[0] == c[1]);
-            worst = worst.max((s[0] - x.sin()).abs()).max((c[0] - x.cos()).abs());
+            worst = worst
+                .max((s[0] - x.sin()).abs())
+                .max((c[0] - x.cos()).abs());
         }
         assert!(worst <= f64::EPSILON, "{worst:e}"); // measured 1.7e-16
         let (s, c) = sin_cos(f64x2::new([f64::INFINITY, f64::NAN]));

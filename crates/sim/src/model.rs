@@ -12,8 +12,8 @@
 
 use crate::body::Body;
 use crate::effects;
-pub use crate::effects::music::Beat;
 use crate::effects::flexure::Bending;
+pub use crate::effects::music::Beat;
 use crate::freedoms::{Freedoms, Six, choose};
 use crate::lanes::{self, LANES, f64x2, pack, pairs};
 use crate::random::{Stream, normal};
@@ -218,10 +218,17 @@ impl Model {
         let freedoms = Box::new(Six::new(&body, &scene.carriers.handles_m));
         let mut model = Self {
             scene: scene.clone(),
-            layout: Layout { body: freedoms.size(), phases: 0, extra: 0, ledger: 0 },
+            layout: Layout {
+                body: freedoms.size(),
+                phases: 0,
+                extra: 0,
+                ledger: 0,
+            },
             freedoms,
             body,
-            natural_rad_per_s: (0..n).map(|i| std::f64::consts::TAU * scene.carriers.frequency_hz.get(i)).collect(),
+            natural_rad_per_s: (0..n)
+                .map(|i| std::f64::consts::TAU * scene.carriers.frequency_hz.get(i))
+                .collect(),
             initial_phases: (0..n)
                 .map(|i| {
                     let spread = match scene.carriers.initial_phase_sd_rad {
@@ -255,8 +262,17 @@ impl Model {
             model.accounts.clear();
         }
         if scene.freedom.len() < 6 {
-            let height_m = scene.start.height_m.unwrap_or_else(|| model.resting_height_m());
-            model.freedoms = choose(&model.body, &scene.carriers.handles_m, &scene.freedom, &scene.start, height_m);
+            let height_m = scene
+                .start
+                .height_m
+                .unwrap_or_else(|| model.resting_height_m());
+            model.freedoms = choose(
+                &model.body,
+                &scene.carriers.handles_m,
+                &scene.freedom,
+                &scene.start,
+                height_m,
+            );
             model.layout.body = model.freedoms.size();
         }
         model.layout.phases = if model.has_phases { n } else { 0 };
@@ -310,7 +326,12 @@ impl Model {
         self.beat = Some(beat);
     }
 
-    pub(crate) fn set_contact_springs(&mut self, bilateral: bool, stiffness: impl Iterator<Item = f64>, exponent: f64) {
+    pub(crate) fn set_contact_springs(
+        &mut self,
+        bilateral: bool,
+        stiffness: impl Iterator<Item = f64>,
+        exponent: f64,
+    ) {
         self.contact_exponent = exponent;
         self.contact_stiffness = stiffness.collect();
         self.watches_contact = !bilateral;
@@ -319,10 +340,13 @@ impl Model {
     /// The clock that ticks at `rate_hz`; sensors of one rate share it.
     pub(crate) fn sensor_clock(&mut self, rate_hz: f64) -> usize {
         let clock = Clock { rate_hz };
-        self.sensor_clocks.iter().position(|c| *c == clock).unwrap_or_else(|| {
-            self.sensor_clocks.push(clock);
-            self.sensor_clocks.len() - 1
-        })
+        self.sensor_clocks
+            .iter()
+            .position(|c| *c == clock)
+            .unwrap_or_else(|| {
+                self.sensor_clocks.push(clock);
+                self.sensor_clocks.len() - 1
+            })
     }
 
     pub(crate) fn set_track(&mut self, track: Track) {
@@ -387,7 +411,12 @@ impl Model {
 
     /// Every state by name, in order.
     pub fn state_names(&self) -> Vec<String> {
-        let mut names: Vec<String> = self.freedoms.names().iter().map(|n| (*n).to_string()).collect();
+        let mut names: Vec<String> = self
+            .freedoms
+            .names()
+            .iter()
+            .map(|n| (*n).to_string())
+            .collect();
         names.extend((1..=self.layout.phases).map(|i| format!("phase_{i}_rad")));
         names.extend(self.extra.iter().map(|(name, _)| name.clone()));
         for (name, _) in &self.accounts {
@@ -408,7 +437,11 @@ impl Model {
             pack((0..n).map(|i| self.scene.carriers.shoulder_height_m.get(i))),
         ];
         let zero = f64x2::ZERO;
-        let floor = if self.watches_contact { 0.0 } else { f64::NEG_INFINITY };
+        let floor = if self.watches_contact {
+            0.0
+        } else {
+            f64::NEG_INFINITY
+        };
         let pair = |p: usize| {
             let rest = [rest[0][p], rest[1][p], rest[2][p]];
             Pair {
@@ -464,7 +497,9 @@ impl Model {
             // Σ k δ^p falls as the body rises: halve the interval where it meets the weight.
             let weight = -self.body.mass_kg * self.body.gravity_m_per_s2.z;
             let push = |z: f64| {
-                let of = |i: usize| self.contact_stiffness[i] * (above(i) - z).max(0.0).powf(self.contact_exponent);
+                let of = |i: usize| {
+                    self.contact_stiffness[i] * (above(i) - z).max(0.0).powf(self.contact_exponent)
+                };
                 (0..n).map(of).sum::<f64>()
             };
             let mut high = (0..n).map(above).fold(f64::NEG_INFINITY, f64::max);
@@ -474,11 +509,18 @@ impl Model {
             }
             for _ in 0..200 {
                 let middle = 0.5 * (low + high);
-                if push(middle) < weight { high = middle } else { low = middle }
+                if push(middle) < weight {
+                    high = middle
+                } else {
+                    low = middle
+                }
             }
             0.5 * (low + high)
         } else if stiffness > 0.0 {
-            let level: f64 = (0..n).map(|i| self.contact_stiffness[i] * above(i)).sum::<f64>() / stiffness;
+            let level: f64 = (0..n)
+                .map(|i| self.contact_stiffness[i] * above(i))
+                .sum::<f64>()
+                / stiffness;
             level + self.body.mass_kg * self.body.gravity_m_per_s2.z / stiffness
         } else {
             (0..n).map(above).sum::<f64>() / n as f64
@@ -487,7 +529,10 @@ impl Model {
 
     /// The first moment after `after_s` at which the right-hand side may jump.
     pub fn next_switch_s(&self, after_s: f64) -> f64 {
-        self.switches.iter().map(|s| s.next_s(after_s)).fold(f64::INFINITY, f64::min)
+        self.switches
+            .iter()
+            .map(|s| s.next_s(after_s))
+            .fold(f64::INFINITY, f64::min)
     }
 
     /// Begins a segment at `t_s`: noise, music and contacts take the values they have just after it.
@@ -509,7 +554,11 @@ impl Model {
         let phases = self.layout.phase_range();
         lanes::store(w.pair.iter().map(|p| p.rate), &mut dy[phases]);
         dy[self.layout.extra_range()].copy_from_slice(&w.extra_rate);
-        for ((_, account), out) in self.accounts.iter().zip(dy[self.layout.ledger_range()].chunks_exact_mut(2)) {
+        for ((_, account), out) in self
+            .accounts
+            .iter()
+            .zip(dy[self.layout.ledger_range()].chunks_exact_mut(2))
+        {
             let power = account.power(w);
             out.copy_from_slice(&[power.work_w, power.dissipated_w]);
         }
@@ -540,7 +589,11 @@ impl Model {
 
     #[inline]
     fn phases(&self, t_s: f64, y: &[f64], w: &mut Workspace) {
-        for (pair, phase) in w.pair.iter_mut().zip(lanes::load(&y[self.layout.phase_range()])) {
+        for (pair, phase) in w
+            .pair
+            .iter_mut()
+            .zip(lanes::load(&y[self.layout.phase_range()]))
+        {
             (pair.sin, pair.cos) = lanes::sin_cos(phase);
             pair.rate = pair.constant_rate;
             for axis in 0..3 {
@@ -571,7 +624,11 @@ impl Model {
     /// Applies the terms of one effect alone to an evaluated workspace, stage by stage.
     pub fn apply_only(&self, effect: &str, t_s: f64, w: &mut Workspace) {
         for (terms, owners) in self.terms.iter().zip(&self.owners) {
-            for (term, _) in terms.iter().zip(owners).filter(|(_, owner)| **owner == effect) {
+            for (term, _) in terms
+                .iter()
+                .zip(owners)
+                .filter(|(_, owner)| **owner == effect)
+            {
                 term.apply(t_s, w);
             }
         }
@@ -586,11 +643,16 @@ impl Model {
 impl Model {
     /// Books what the contact spring of a handle loses when it opens, or is given when it closes, at `gap_m` ≠ 0.
     pub(crate) fn book_contact(&self, handle: usize, opened: bool, gap_m: f64, y: &mut [f64]) {
-        if let Some(page) = self.accounts.iter().position(|(name, _)| *name == "contact") {
+        if let Some(page) = self
+            .accounts
+            .iter()
+            .position(|(name, _)| *name == "contact")
+        {
             // ∫ k δ^p dδ; for δ < 0 a linear spring that is frozen in contact holds ½kδ² too.
             let p = self.contact_exponent;
             let spring_j = self.contact_stiffness[handle] * gap_m.abs().powf(p + 1.0) / (p + 1.0);
-            y[self.layout.ledger_range().start + 2 * page + 1] += if opened { spring_j } else { -spring_j };
+            y[self.layout.ledger_range().start + 2 * page + 1] +=
+                if opened { spring_j } else { -spring_j };
         }
     }
 }

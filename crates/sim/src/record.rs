@@ -84,7 +84,12 @@ impl<'m> Recorder<'m> {
         let imus = model
             .imus()
             .iter()
-            .map(|imu| Ok((imu.topic.clone(), writer.channel(&imu.topic, MessageKind::Imu)?)))
+            .map(|imu| {
+                Ok((
+                    imu.topic.clone(),
+                    writer.channel(&imu.topic, MessageKind::Imu)?,
+                ))
+            })
             .collect::<Result<_, WriteError>>()?;
         let description =
             writer.channel(topics::ROBOT_DESCRIPTION, MessageKind::RobotDescription)?;
@@ -103,7 +108,9 @@ impl<'m> Recorder<'m> {
             audio,
             next_block: 0,
             imus,
-            strokes: model.beat().map_or_else(Vec::new, |b| b.strokes(scene.duration_s)),
+            strokes: model
+                .beat()
+                .map_or_else(Vec::new, |b| b.strokes(scene.duration_s)),
             next_beat: 0,
             frames: (1..=model.carriers())
                 .map(|i| format!("carrier_{i}"))
@@ -196,13 +203,21 @@ impl<'m> Recorder<'m> {
         let Some(channel) = self.beat else {
             return Ok(());
         };
-        while let Some(stroke) = self.strokes.get(self.next_beat).filter(|s| s.t_s <= until_s) {
+        while let Some(stroke) = self
+            .strokes
+            .get(self.next_beat)
+            .filter(|s| s.t_s <= until_s)
+        {
             let message = rath::Beat {
                 number: self.next_beat as u64,
                 time_s: stroke.t_s,
                 tempo_hz: stroke.tempo_hz,
             };
-            self.writer.message(channel, self.epoch_ns + (stroke.t_s * 1e9).round() as i64, &message)?;
+            self.writer.message(
+                channel,
+                self.epoch_ns + (stroke.t_s * 1e9).round() as i64,
+                &message,
+            )?;
             self.next_beat += 1;
         }
         Ok(())
@@ -236,8 +251,12 @@ impl<'m> Recorder<'m> {
     /// A sensor's sample, stamped by the sensor's own clock.
     fn write_reading(&mut self, r: &Reading<'_>) -> Result<(), WriteError> {
         let t_ns = self.stamp_ns(r.stamp_s);
-        let mut message =
-            Imu::raw(t_ns, r.frame, r.angular_velocity_rad_per_s, r.specific_force_m_per_s2);
+        let mut message = Imu::raw(
+            t_ns,
+            r.frame,
+            r.angular_velocity_rad_per_s,
+            r.specific_force_m_per_s2,
+        );
         for axis in [0, 4, 8] {
             message.angular_velocity_covariance[axis] = r.angular_velocity_variance;
             message.linear_acceleration_covariance[axis] = r.specific_force_variance;

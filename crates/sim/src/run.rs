@@ -40,7 +40,10 @@ impl Sample {
         if self.phase_rad.is_empty() {
             return None;
         }
-        let (s, c) = self.phase_rad.iter().fold((0.0, 0.0), |(s, c), p| (s + p.sin(), c + p.cos()));
+        let (s, c) = self
+            .phase_rad
+            .iter()
+            .fold((0.0, 0.0), |(s, c), p| (s + p.sin(), c + p.cos()));
         Some(f64::hypot(s, c) / self.phase_rad.len() as f64)
     }
 }
@@ -91,7 +94,13 @@ pub fn run_model(
     settings: &Settings,
     listener: &mut dyn Listener,
 ) -> (Stats, Result<(), Stopped>) {
-    let mut bridge = Bridge { model, listener, sample: blank(model), at_start_j: None, sensors: Sensors::new(model) };
+    let mut bridge = Bridge {
+        model,
+        listener,
+        sample: blank(model),
+        at_start_j: None,
+        sensors: Sensors::new(model),
+    };
     (method.run)(model, settings, &mut bridge)
 }
 
@@ -132,8 +141,12 @@ impl Observer for Bridge<'_> {
         s.t_s = t_s;
         s.pose = model.freedoms().pose(y);
         s.roll_pitch_yaw_rad = s.pose.roll_pitch_yaw_rad();
-        s.phase_rad.copy_from_slice(&y[model.layout().phase_range()]);
-        s.beat_phase_rad = model.beat().filter(|b| b.sounds(t_s)).map(|b| b.phase_at(t_s));
+        s.phase_rad
+            .copy_from_slice(&y[model.layout().phase_range()]);
+        s.beat_phase_rad = model
+            .beat()
+            .filter(|b| b.sounds(t_s))
+            .map(|b| b.phase_at(t_s));
         let walked = walk.map(|v| v * t_s);
         for i in 0..model.carriers() {
             s.normal_n[i] = w.of(i, |p| p.normal);
@@ -154,7 +167,8 @@ impl Observer for Bridge<'_> {
 
     fn tick(&mut self, clock: usize, tick: u64, t_s: f64, y: &[f64], w: &mut Workspace) {
         let listener = &mut self.listener;
-        self.sensors.read(clock, tick, t_s, y, w, |reading| listener.reading(reading));
+        self.sensors
+            .read(clock, tick, t_s, y, w, |reading| listener.reading(reading));
     }
 
     fn event(&mut self, event: &Event) {

@@ -22,7 +22,10 @@ fn a_complete_graph_is_the_mean_field() {
             "#
         )));
         let first = names.iter().position(|n| n == "phase_1_rad").unwrap();
-        rates[first..first + 4].iter().map(|r| r - TAU * 2.0).collect::<Vec<f64>>()
+        rates[first..first + 4]
+            .iter()
+            .map(|r| r - TAU * 2.0)
+            .collect::<Vec<f64>>()
     };
     let all = with("\"all\"");
     let complete = with("{ edges = [[0, 1], [0, 2], [0, 3], [1, 2], [1, 3], [2, 3]] }");
@@ -32,7 +35,12 @@ fn a_complete_graph_is_the_mean_field() {
     // Along the pole y = 0 the order is 2, 0, 1; the carrier of the other pole stands alone.
     let chain = with("\"chain\"");
     let pull = |a: f64, b: f64| (b - a).sin();
-    let expected = [0.7 / 3.0 * (pull(0.3, 2.2) + pull(0.3, 1.4)), 0.35 * pull(1.4, 0.3), 0.35 * pull(2.2, 0.3), 0.0];
+    let expected = [
+        0.7 / 3.0 * (pull(0.3, 2.2) + pull(0.3, 1.4)),
+        0.35 * pull(1.4, 0.3),
+        0.35 * pull(2.2, 0.3),
+        0.0,
+    ];
     for (a, b) in chain.iter().zip(expected) {
         assert!((a - b).abs() < 1e-14, "{chain:?} {expected:?}");
     }
@@ -91,7 +99,11 @@ fn val_feedback_under_a_steady_load() {
         assert!((all[0].normal_n[i] - [450.0, 150.0][i]).abs() < 1e-9);
         for turn in all[3..].windows(2) {
             let turned = turn[1].phase_rad[i] - turn[0].phase_rad[i];
-            assert!((turned - TAU).abs() < 1e-7, "carrier {i}: {:.1e}", turned - TAU);
+            assert!(
+                (turned - TAU).abs() < 1e-7,
+                "carrier {i}: {:.1e}",
+                turned - TAU
+            );
         }
     }
 }
@@ -120,7 +132,10 @@ fn val_bristles_stick_and_slide() {
         (last.tangential_n[0][0], last.normal_n[0])
     };
     let (force, normal) = slide(1.0, 0.4);
-    assert!((force / (-0.4 * normal) - 1.0).abs() < 1e-6, "{force} {normal}");
+    assert!(
+        (force / (-0.4 * normal) - 1.0).abs() < 1e-6,
+        "{force} {normal}"
+    );
     // Let go on a gentle slope below the angle of friction it comes to rest; the force holds the weight's share.
     let all = samples(&scene(
         r#"
@@ -141,8 +156,14 @@ fn val_bristles_stick_and_slide() {
     let late = &all[all.len() - 30..];
     for s in late {
         let held: f64 = s.tangential_n.iter().map(|t| t[0]).sum();
-        assert!((held - 60.0 * 9.81 * 5.0_f64.to_radians().sin()).abs() < 0.05, "{held}");
-        assert!((s.pose.position_m[0] - late[0].pose.position_m[0]).abs() < 1e-6, "it creeps");
+        assert!(
+            (held - 60.0 * 9.81 * 5.0_f64.to_radians().sin()).abs() < 0.05,
+            "{held}"
+        );
+        assert!(
+            (s.pose.position_m[0] - late[0].pose.position_m[0]).abs() < 1e-6,
+            "it creeps"
+        );
     }
 }
 
@@ -171,7 +192,12 @@ fn val_hunt_crossley() {
     };
     assert!(all.iter().any(|s| s.normal_n[0] == 0.0) && all.iter().any(|s| s.normal_n[0] > 0.0));
     for s in &all {
-        assert!((total(s) - total(&all[0])).abs() < 1e-5, "t = {}: {:.1e} J", s.t_s, total(s) - total(&all[0]));
+        assert!(
+            (total(s) - total(&all[0])).abs() < 1e-5,
+            "t = {}: {:.1e} J",
+            s.t_s,
+            total(s) - total(&all[0])
+        );
     }
     let resting = samples(&scene(
         "name = \"rest\"\nduration_s = 1.0\n[effects.contact]\nlaw = \"hunt-crossley\"\nexponent = 1.5\nstiffness_n_per_m = 20000.0",
@@ -203,7 +229,11 @@ fn val_flexure_at_rest_carries_the_load() {
     let sunk = all[0].pose.position_m[2] - last.pose.position_m[2];
     assert!((sunk - q).abs() < 1e-7, "{sunk} {q}");
     for s in &all {
-        assert!(s.energy.unwrap().unexplained_j.abs() < 1e-5, "{:.1e}", s.energy.unwrap().unexplained_j);
+        assert!(
+            s.energy.unwrap().unexplained_j.abs() < 1e-5,
+            "{:.1e}",
+            s.energy.unwrap().unexplained_j
+        );
     }
 }
 
@@ -228,13 +258,30 @@ fn val_a_turn_takes_the_body_round() {
     ));
     let all = samples(&s);
     let last = all.last().unwrap();
-    assert!((last.roll_pitch_yaw_rad[2] - turn).abs() < 1e-4, "{:?}", last.roll_pitch_yaw_rad);
-    assert!(last.pose.velocity_m_per_s[0].abs() < 1e-3 && (last.pose.velocity_m_per_s[1] - speed).abs() < 1e-3);
+    assert!(
+        (last.roll_pitch_yaw_rad[2] - turn).abs() < 1e-4,
+        "{:?}",
+        last.roll_pitch_yaw_rad
+    );
+    assert!(
+        last.pose.velocity_m_per_s[0].abs() < 1e-3
+            && (last.pose.velocity_m_per_s[1] - speed).abs() < 1e-3
+    );
     // In the middle of the turn χ̇ = 15/8 Δχ/T: the hold pulls inwards with M v χ̇, across the heading.
-    let middle = all.iter().min_by(|a, b| (a.t_s - 15.0).abs().total_cmp(&(b.t_s - 15.0).abs())).unwrap();
-    let inward: f64 = middle.tangential_n.iter().map(|t| (-t[0] + t[1]) / 2.0_f64.sqrt()).sum();
+    let middle = all
+        .iter()
+        .min_by(|a, b| (a.t_s - 15.0).abs().total_cmp(&(b.t_s - 15.0).abs()))
+        .unwrap();
+    let inward: f64 = middle
+        .tangential_n
+        .iter()
+        .map(|t| (-t[0] + t[1]) / 2.0_f64.sqrt())
+        .sum();
     let expected = 60.0 * speed * 1.875 * turn / time;
-    assert!((inward / expected - 1.0).abs() < 0.02, "{inward} {expected}");
+    assert!(
+        (inward / expected - 1.0).abs() < 0.02,
+        "{inward} {expected}"
+    );
 }
 
 /// On a slope the hold carries M g sin s and the shoulders M g cos s.
@@ -259,7 +306,10 @@ fn val_a_slope_divides_the_weight() {
     for (found, expected) in [
         (sum(&|i| last.normal_n[i]), weight * b.cos() * s.cos()),
         (sum(&|i| last.tangential_n[i][0]), weight * s.sin()),
-        (sum(&|i| last.tangential_n[i][1]), weight * b.sin() * s.cos()),
+        (
+            sum(&|i| last.tangential_n[i][1]),
+            weight * b.sin() * s.cos(),
+        ),
     ] {
         assert!((found - expected).abs() < 1e-4, "{found} {expected}");
     }
@@ -277,11 +327,18 @@ fn lift_and_spread_do_what_they_say() {
     }
     let mut many = scene("name = \"b\"\n[effects.frequency_spread]\nsd_hz = 0.05");
     many.carriers.handles_m = vec![[0.0; 3]; 4000];
-    let w: Vec<f64> = Model::new(&many).natural_rad_per_s().iter().map(|w| w / TAU).collect();
+    let w: Vec<f64> = Model::new(&many)
+        .natural_rad_per_s()
+        .iter()
+        .map(|w| w / TAU)
+        .collect();
     let mean = w.iter().sum::<f64>() / 4000.0;
     let sd = (w.iter().map(|x| (x - mean).powi(2)).sum::<f64>() / 4000.0).sqrt();
     // Four standard errors.
-    assert!((mean - 2.0).abs() < 4.0 * 0.05 / 63.2 && (sd / 0.05 - 1.0).abs() < 4.0 / 89.0, "{mean} {sd}");
+    assert!(
+        (mean - 2.0).abs() < 4.0 * 0.05 / 63.2 && (sd / 0.05 - 1.0).abs() < 4.0 / 89.0,
+        "{mean} {sd}"
+    );
 }
 
 /// A pause lets the phases go: without a drum they run at their own frequency, and the beat counts on.
@@ -302,7 +359,11 @@ fn music_pauses_and_changes_tempo() {
     ));
     let at = |t: f64| all.iter().find(|s| (s.t_s - t).abs() < 1e-9).unwrap();
     let rate = |i: usize, a: f64, b: f64| (at(b).phase_rad[i] - at(a).phase_rad[i]) / (b - a) / TAU;
-    assert!((rate(0, 8.0, 9.0) - 2.1).abs() < 1e-6, "{}", rate(0, 8.0, 9.0));
+    assert!(
+        (rate(0, 8.0, 9.0) - 2.1).abs() < 1e-6,
+        "{}",
+        rate(0, 8.0, 9.0)
+    );
     assert!((rate(0, 11.0, 19.0) - 2.0).abs() < 1e-9 && at(15.0).beat_phase_rad.is_none());
     assert!((rate(0, 28.0, 29.0) - 2.1).abs() < 1e-6 && (rate(0, 38.0, 39.0) - 1.9).abs() < 1e-6);
     // The carrier with strength zero never hears it.

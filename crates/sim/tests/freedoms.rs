@@ -96,16 +96,35 @@ fn every_subset_balances_its_energy() {
             names.join(", ")
         ));
         let model = Model::new(&scene);
-        let attitude_is_a_quaternion = names.iter().filter(|n| ["\"roll\"", "\"tilt\"", "\"yaw\""].contains(&n.as_str())).count() == 3;
-        let expected = if attitude_is_a_quaternion { 13 } else { 2 * names.len() };
+        let attitude_is_a_quaternion = names
+            .iter()
+            .filter(|n| ["\"roll\"", "\"tilt\"", "\"yaw\""].contains(&n.as_str()))
+            .count()
+            == 3;
+        let expected = if attitude_is_a_quaternion {
+            13
+        } else {
+            2 * names.len()
+        };
         assert_eq!(model.layout().body, expected, "{names:?}");
         for s in samples(&scene) {
             let e = s.energy.unwrap();
             // The ledger is a quadrature beside the motion and steers no step: it is held to a part of what went through it.
             let through = 1.0 + e.work_in_j.abs() + e.dissipated_j.abs();
             let off = e.unexplained_j.abs() / through;
-            assert!(off < 1e-6, "{names:?} at {} s: {:.1e} J, {off:.1e} of {through} J", s.t_s, e.unexplained_j);
-            assert!(s.pose.position_m.iter().chain(&s.roll_pitch_yaw_rad).all(|x| x.is_finite()));
+            assert!(
+                off < 1e-6,
+                "{names:?} at {} s: {:.1e} J, {off:.1e} of {through} J",
+                s.t_s,
+                e.unexplained_j
+            );
+            assert!(
+                s.pose
+                    .position_m
+                    .iter()
+                    .chain(&s.roll_pitch_yaw_rad)
+                    .all(|x| x.is_finite())
+            );
         }
     }
 }
@@ -127,6 +146,8 @@ fn one_free_angle_spins_on() {
     );
     for s in samples(&s) {
         let turned = 1.5 * s.t_s;
-        assert!((turned - s.roll_pitch_yaw_rad[0]).sin().abs() < 1e-7 && s.pose.position_m[2] == 3.0);
+        assert!(
+            (turned - s.roll_pitch_yaw_rad[0]).sin().abs() < 1e-7 && s.pose.position_m[2] == 3.0
+        );
     }
 }

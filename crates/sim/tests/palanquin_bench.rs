@@ -20,26 +20,53 @@ fn errors(case: &str, name: &str, tolerance: f64) -> Errors {
     let text = std::fs::read_to_string(format!("{folder}/{case}.toml")).unwrap();
     let model = Model::new(&parse(case, &text, &[]).unwrap());
     let reference = std::fs::read_to_string(format!("{folder}/ref_{case}.csv")).unwrap();
-    let rows: Vec<Vec<f64>> =
-        reference.lines().skip(1).map(|l| l.split(',').map(|x| x.parse().unwrap()).collect()).collect();
-    let mut e = Errors { roll_rad: 0.0, z_m: 0.0, turn_rad: 0.0, stats: Stats::default() };
+    let rows: Vec<Vec<f64>> = reference
+        .lines()
+        .skip(1)
+        .map(|l| l.split(',').map(|x| x.parse().unwrap()).collect())
+        .collect();
+    let mut e = Errors {
+        roll_rad: 0.0,
+        z_m: 0.0,
+        turn_rad: 0.0,
+        stats: Stats::default(),
+    };
     let mut seen = 0;
-    let settings = Settings { tolerance, step_s: tolerance, most_evaluations: 1 << 40 };
-    let (stats, outcome) = run_model(&model, method(name).unwrap(), &settings, &mut |s: &Sample| {
-        let row = &rows[seen];
-        seen += 1;
-        assert!((s.t_s - row[0]).abs() < 1e-9);
-        let [x, y, z, w] = s.pose.orientation;
-        let [rw, rx, ry, rz] = [row[5], row[6], row[7], row[8]];
-        // The rotation between the two: q* ∘ q_ref.
-        let real = w * rw + x * rx + y * ry + z * rz;
-        let part = [w * rx - x * rw - y * rz + z * ry, w * ry - y * rw - z * rx + x * rz, w * rz - z * rw - x * ry + y * rx];
-        let turn = 2.0 * part.iter().map(|p| p * p).sum::<f64>().sqrt().atan2(real.abs());
-        e.roll_rad = e.roll_rad.max((s.roll_pitch_yaw_rad[0] - row[1]).abs());
-        e.z_m = e.z_m.max((s.pose.position_m[2] - row[2]).abs());
-        e.turn_rad = e.turn_rad.max(turn);
-        true
-    });
+    let settings = Settings {
+        tolerance,
+        step_s: tolerance,
+        most_evaluations: 1 << 40,
+    };
+    let (stats, outcome) = run_model(
+        &model,
+        method(name).unwrap(),
+        &settings,
+        &mut |s: &Sample| {
+            let row = &rows[seen];
+            seen += 1;
+            assert!((s.t_s - row[0]).abs() < 1e-9);
+            let [x, y, z, w] = s.pose.orientation;
+            let [rw, rx, ry, rz] = [row[5], row[6], row[7], row[8]];
+            // The rotation between the two: q* ∘ q_ref.
+            let real = w * rw + x * rx + y * ry + z * rz;
+            let part = [
+                w * rx - x * rw - y * rz + z * ry,
+                w * ry - y * rw - z * rx + x * rz,
+                w * rz - z * rw - x * ry + y * rx,
+            ];
+            let turn = 2.0
+                * part
+                    .iter()
+                    .map(|p| p * p)
+                    .sum::<f64>()
+                    .sqrt()
+                    .atan2(real.abs());
+            e.roll_rad = e.roll_rad.max((s.roll_pitch_yaw_rad[0] - row[1]).abs());
+            e.z_m = e.z_m.max((s.pose.position_m[2] - row[2]).abs());
+            e.turn_rad = e.turn_rad.max(turn);
+            true
+        },
+    );
     outcome.unwrap();
     assert_eq!(seen, rows.len(), "one sample per row, the last included");
     e.stats = stats;
@@ -51,7 +78,12 @@ fn val_case_a_and_its_507_events() {
     // What a tolerance promises: ten times itself (tests/tolerance.rs). Measured 4e-4, 1.3e-6, 5e-11.
     for (tolerance, roll_rad) in [(1e-3, 1e-2), (1e-6, 1e-5), (1e-9, 1e-8)] {
         let e = errors("A", "auto", tolerance);
-        assert!(e.roll_rad <= roll_rad && e.z_m <= roll_rad, "{tolerance:e}: roll {:e} z {:e}", e.roll_rad, e.z_m);
+        assert!(
+            e.roll_rad <= roll_rad && e.z_m <= roll_rad,
+            "{tolerance:e}: roll {:e} z {:e}",
+            e.roll_rad,
+            e.z_m
+        );
         assert_eq!(e.stats.events, 507, "at {tolerance:e}");
     }
 }
@@ -60,7 +92,12 @@ fn val_case_a_and_its_507_events() {
 fn val_case_b_and_its_1779_events() {
     for (tolerance, roll_rad) in [(1e-6, 1e-5), (1e-9, 1e-8)] {
         let e = errors("B", "auto", tolerance);
-        assert!(e.roll_rad <= roll_rad && e.z_m <= roll_rad, "{tolerance:e}: roll {:e} z {:e}", e.roll_rad, e.z_m);
+        assert!(
+            e.roll_rad <= roll_rad && e.z_m <= roll_rad,
+            "{tolerance:e}: roll {:e} z {:e}",
+            e.roll_rad,
+            e.z_m
+        );
         assert_eq!(e.stats.events, 1779, "at {tolerance:e}");
     }
 }
@@ -77,7 +114,11 @@ fn loose_tolerances_neither_chatter_nor_fail() {
     for name in ["dopri5", "dop853"] {
         let e = errors("B", name, 1e-3);
         assert!(e.roll_rad < 1e-2, "{name}: {:e}", e.roll_rad);
-        assert!((1600..2200).contains(&e.stats.events), "{name}: {} events, the truth has 1779", e.stats.events);
+        assert!(
+            (1600..2200).contains(&e.stats.events),
+            "{name}: {} events, the truth has 1779",
+            e.stats.events
+        );
     }
 }
 

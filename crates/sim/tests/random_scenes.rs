@@ -34,7 +34,11 @@ impl Dice {
 /// A scene that a person could have meant.
 fn valid(seed: u64) -> String {
     let mut d = Dice(seed);
-    let n = if d.chance(0.5) { 1 + d.below(8) } else { 1 + d.below(64) };
+    let n = if d.chance(0.5) {
+        1 + d.below(8)
+    } else {
+        1 + d.below(64)
+    };
     let poles = 1 + d.below(n.min(4));
     let mut t = format!(
         "name = \"random {seed}\"\nduration_s = {:?}\nlog_rate_hz = {:?}\nseed = {seed}\n",
@@ -42,14 +46,22 @@ fn valid(seed: u64) -> String {
         d.from(1.0, 120.0)
     );
     if d.chance(0.4) {
-        let mut free: Vec<&str> = ["x", "y", "height", "roll", "tilt", "yaw"].into_iter().filter(|_| d.chance(0.5)).collect();
+        let mut free: Vec<&str> = ["x", "y", "height", "roll", "tilt", "yaw"]
+            .into_iter()
+            .filter(|_| d.chance(0.5))
+            .collect();
         if free.is_empty() {
             free.push("height");
         }
         t += &format!("freedom = {free:?}\n");
     }
     // Moments of a box: they always belong to a body.
-    let (m, a, b, c) = (d.from(1.0, 300.0), d.from(0.1, 3.0), d.from(0.1, 3.0), d.from(0.1, 3.0));
+    let (m, a, b, c) = (
+        d.from(1.0, 300.0),
+        d.from(0.1, 3.0),
+        d.from(0.1, 3.0),
+        d.from(0.1, 3.0),
+    );
     let moment = |p: f64, q: f64| m * (p * p + q * q) / 12.0;
     t += &format!(
         "[body]\nmass_kg = {m:?}\ninertia_kg_m2 = {{ xx = {:?}, yy = {:?}, zz = {:?} }}\n",
@@ -84,37 +96,67 @@ fn valid(seed: u64) -> String {
         d.from(-2.0, 2.0),
         d.from(-2.0, 2.0)
     );
-    t += &format!("[solver]\ntolerance = {:?}\nenergy = {}\n", 10f64.powf(d.from(-9.0, -3.0)), d.chance(0.5));
+    t += &format!(
+        "[solver]\ntolerance = {:?}\nenergy = {}\n",
+        10f64.powf(d.from(-9.0, -3.0)),
+        d.chance(0.5)
+    );
     if d.chance(0.8) {
-        t += &format!("[effects.contact]\nstiffness_n_per_m = {:?}\ndamping_n_s_per_m = {:?}\n", d.from(200.0, 2e4), d.from(0.0, 800.0));
+        t += &format!(
+            "[effects.contact]\nstiffness_n_per_m = {:?}\ndamping_n_s_per_m = {:?}\n",
+            d.from(200.0, 2e4),
+            d.from(0.0, 800.0)
+        );
         match d.below(4) {
             0 => t += "bilateral = true\n",
-            1 => t += &format!("law = \"hunt-crossley\"\nexponent = {:?}\n", d.from(1.0, 2.0)),
+            1 => {
+                t += &format!(
+                    "law = \"hunt-crossley\"\nexponent = {:?}\n",
+                    d.from(1.0, 2.0)
+                )
+            }
             _ => {}
         }
     }
     let hold = d.chance(0.6);
     if hold {
-        t += &format!("[effects.hold]\nstiffness_n_per_m = {:?}\n", d.from(0.0, 6000.0));
+        t += &format!(
+            "[effects.hold]\nstiffness_n_per_m = {:?}\n",
+            d.from(0.0, 6000.0)
+        );
     }
     let sling = d.chance(0.2);
     if sling {
         t += &format!("[effects.sling]\nlength_m = {:?}\n", d.from(0.3, 2.0));
     }
     if d.chance(0.4) {
-        let law = if hold || sling { "regularised" } else { d.pick(&["regularised", "bristle"]) };
-        t += &format!("[effects.friction]\nlaw = \"{law}\"\ncoefficient = {:?}\n", d.from(0.05, 1.0));
+        let law = if hold || sling {
+            "regularised"
+        } else {
+            d.pick(&["regularised", "bristle"])
+        };
+        t += &format!(
+            "[effects.friction]\nlaw = \"{law}\"\ncoefficient = {:?}\n",
+            d.from(0.05, 1.0)
+        );
     }
     if d.chance(0.5) {
         t += &format!("[effects.pole_friction]\narm_m = {:?}\n", d.from(0.0, 0.01));
     }
     if d.chance(0.8) {
-        t += &format!("[effects.gait]\namplitude_m = {:?}\nsway_m = {:?}\n", d.from(0.0, 0.1), d.from(0.0, 0.02));
+        t += &format!(
+            "[effects.gait]\namplitude_m = {:?}\nsway_m = {:?}\n",
+            d.from(0.0, 0.1),
+            d.from(0.0, 0.02)
+        );
         if d.chance(0.3) {
             t += "harmonics = [{ order = 2, amplitude_m = [0.001, 0.0, 0.004] }]\n";
         }
         if d.chance(0.4) {
-            t += &format!("[effects.lift]\ngain = {:?}\nonset_s = 0.5\nbuild_up_s = 0.7\n", d.from(0.5, 1.5));
+            t += &format!(
+                "[effects.lift]\ngain = {:?}\nonset_s = 0.5\nbuild_up_s = 0.7\n",
+                d.from(0.5, 1.5)
+            );
         }
     }
     for (name, p) in [("frequency_spread", 0.5), ("noise", 0.5), ("feedback", 0.3)] {
@@ -123,10 +165,19 @@ fn valid(seed: u64) -> String {
         }
     }
     if d.chance(0.4) {
-        t += &format!("[effects.coupling]\nstrength_rad_per_s = {:?}\ngraph = \"{}\"\n", d.from(0.0, 3.0), d.pick(&["all", "chain"]));
+        t += &format!(
+            "[effects.coupling]\nstrength_rad_per_s = {:?}\ngraph = \"{}\"\n",
+            d.from(0.0, 3.0),
+            d.pick(&["all", "chain"])
+        );
     }
     if d.chance(0.5) {
-        t += &format!("[effects.music]\nbeat_hz = {:?}\nonset_s = {:?}\nbuild_up_s = {:?}\n", d.from(1.0, 3.0), d.from(0.0, 2.0), d.from(0.0, 2.0));
+        t += &format!(
+            "[effects.music]\nbeat_hz = {:?}\nonset_s = {:?}\nbuild_up_s = {:?}\n",
+            d.from(1.0, 3.0),
+            d.from(0.0, 2.0),
+            d.from(0.0, 2.0)
+        );
         if d.chance(0.3) {
             t += "tempo_changes = [{ at_s = 1.0, over_s = 0.5, beat_hz = 2.2 }]\npauses = [{ from_s = 0.3, to_s = 0.6 }]\n";
         }
@@ -135,10 +186,17 @@ fn valid(seed: u64) -> String {
         }
     }
     if d.chance(0.3) {
-        t += &format!("[effects.path]\nturn_deg = {:?}\nturn_start_s = 0.3\nslope_deg = {:?}\n", d.from(-90.0, 90.0), d.from(-15.0, 15.0));
+        t += &format!(
+            "[effects.path]\nturn_deg = {:?}\nturn_start_s = 0.3\nslope_deg = {:?}\n",
+            d.from(-90.0, 90.0),
+            d.from(-15.0, 15.0)
+        );
     }
     if d.chance(0.3) {
-        t += &format!("[effects.flexure]\nfrequency_hz = {:?}\n", d.from(2.0, 10.0));
+        t += &format!(
+            "[effects.flexure]\nfrequency_hz = {:?}\n",
+            d.from(2.0, 10.0)
+        );
     }
     if d.chance(0.3) {
         t += "[effects.imu]\nsensors = [{ on = \"rath\", place_m = [0.3, 0.1, 0.2] }, { on = \"carrier_1\", clock_drift_ppm = 30.0 }]\n";
@@ -150,25 +208,50 @@ fn valid(seed: u64) -> String {
 fn three_hundred_random_scenes_run() {
     for seed in 0..300 {
         let text = valid(seed);
-        let scene = parse("random", &text, &[]).unwrap_or_else(|e| panic!("scene {seed}: {e}\n{text}"));
-        assert_eq!(parse("again", &to_toml(&scene), &[]).unwrap(), scene, "scene {seed}");
+        let scene =
+            parse("random", &text, &[]).unwrap_or_else(|e| panic!("scene {seed}: {e}\n{text}"));
+        assert_eq!(
+            parse("again", &to_toml(&scene), &[]).unwrap(),
+            scene,
+            "scene {seed}"
+        );
         let mut settings = settings(&scene);
         // Far more than any of them needs: a run that reaches it hangs.
         settings.most_evaluations = 3_000_000;
         let model = Model::new(&scene);
         let mut samples = 0;
         let mut all_finite = true;
-        let (_, outcome) = run_model(&model, method("auto").unwrap(), &settings, &mut |s: &Sample| {
-            samples += 1;
-            let numbers = s.pose.position_m.iter().chain(&s.roll_pitch_yaw_rad).chain(&s.normal_n).chain(&s.phase_rad);
-            all_finite &= numbers.chain(s.tangential_n.iter().flatten()).all(|x| x.is_finite());
-            true
-        });
+        let (_, outcome) = run_model(
+            &model,
+            method("auto").unwrap(),
+            &settings,
+            &mut |s: &Sample| {
+                samples += 1;
+                let numbers = s
+                    .pose
+                    .position_m
+                    .iter()
+                    .chain(&s.roll_pitch_yaw_rad)
+                    .chain(&s.normal_n)
+                    .chain(&s.phase_rad);
+                all_finite &= numbers
+                    .chain(s.tangential_n.iter().flatten())
+                    .all(|x| x.is_finite());
+                true
+            },
+        );
         if let Err(why) = outcome {
             panic!("scene {seed}: {why}\n{text}");
         }
-        assert!(all_finite, "scene {seed} gave a number that is none\n{text}");
-        assert_eq!(samples, (scene.duration_s * scene.log_rate_hz).floor() as usize + 1, "scene {seed}");
+        assert!(
+            all_finite,
+            "scene {seed} gave a number that is none\n{text}"
+        );
+        assert_eq!(
+            samples,
+            (scene.duration_s * scene.log_rate_hz).floor() as usize + 1,
+            "scene {seed}"
+        );
     }
 }
 
@@ -176,20 +259,58 @@ fn three_hundred_random_scenes_run() {
 fn spoilt(seed: u64) -> String {
     let mut d = Dice(seed ^ 0xBAD);
     let text = valid(seed);
-    let number = d.pick(&["-1.0", "nan", "inf", "-inf", "1e400", "\"heavy\"", "[]", "true", "0.0"]);
+    let number = d.pick(&[
+        "-1.0",
+        "nan",
+        "inf",
+        "-inf",
+        "1e400",
+        "\"heavy\"",
+        "[]",
+        "true",
+        "0.0",
+    ]);
     match d.below(8) {
         0 => text.replacen("mass_kg = ", &format!("mass_kg = {number} # "), 1),
         1 => text.replacen("duration_s = ", &format!("duration_s = {number} # "), 1),
-        2 => text.replacen("length_m = ", &format!("length_m = {} # ", d.pick(&["-1.0", "nan", "inf", "\"x\"", "[]"])), 1),
+        2 => text.replacen(
+            "length_m = ",
+            &format!(
+                "length_m = {} # ",
+                d.pick(&["-1.0", "nan", "inf", "\"x\"", "[]"])
+            ),
+            1,
+        ),
         3 => text.replacen("tolerance = ", &format!("tolerance = {number} # "), 1),
-        4 => text.replacen("count = ", &format!("count = {} # ", d.pick(&["-3", "0", "2.5", "\"two\"", "99999999999"])), 1),
-        5 => text + d.pick(&["[effects.musik]\n", "[effect.gait]\n", "[body]\nmass = 3\n", "[", "x = = 3\n", "\"\n", "[effects.lift]\ngain = -3.0\n"]),
+        4 => text.replacen(
+            "count = ",
+            &format!(
+                "count = {} # ",
+                d.pick(&["-3", "0", "2.5", "\"two\"", "99999999999"])
+            ),
+            1,
+        ),
+        5 => {
+            text + d.pick(&[
+                "[effects.musik]\n",
+                "[effect.gait]\n",
+                "[body]\nmass = 3\n",
+                "[",
+                "x = = 3\n",
+                "\"\n",
+                "[effects.lift]\ngain = -3.0\n",
+            ])
+        }
         6 => {
             // Cut off in the middle of a key or of a value.
             let at = text.find("[solver]").unwrap_or(text.len());
             format!("{}\n[solver]\ntoleran", &text[..at])
         }
-        _ => text.replacen("inertia_kg_m2 = ", "inertia_kg_m2 = { xx = 1.0, yy = 1.0, zz = 9.0 } # ", 1),
+        _ => text.replacen(
+            "inertia_kg_m2 = ",
+            "inertia_kg_m2 = { xx = 1.0, yy = 1.0, zz = 9.0 } # ",
+            1,
+        ),
     }
 }
 
@@ -197,12 +318,18 @@ fn spoilt(seed: u64) -> String {
 fn three_hundred_spoilt_scenes_are_each_refused_in_one_sentence() {
     for seed in 0..300 {
         let text = spoilt(seed);
-        let outcome = catch_unwind(|| parse("spoilt.toml", &text, &[])).unwrap_or_else(|_| panic!("scene {seed} panics\n{text}"));
+        let outcome = catch_unwind(|| parse("spoilt.toml", &text, &[]))
+            .unwrap_or_else(|_| panic!("scene {seed} panics\n{text}"));
         let said = match outcome {
             Ok(_) => panic!("scene {seed} passes\n{text}"),
             Err(e) => e.to_string(),
         };
-        assert!(said.starts_with("spoilt.toml") && !said.contains('\n') && (20..500).contains(&said.len()), "scene {seed}: {said}");
+        assert!(
+            said.starts_with("spoilt.toml")
+                && !said.contains('\n')
+                && (20..500).contains(&said.len()),
+            "scene {seed}: {said}"
+        );
     }
 }
 

@@ -8,7 +8,10 @@ use sim::scene::{BUILTIN, SceneError, load, parse, to_toml};
 fn message(text: &str) -> String {
     let error = parse("scene.toml", text, &[]).expect_err(text);
     let said = error.to_string();
-    assert!(!said.contains('\n') && !said.contains("Err(") && said.len() < 600, "{said}");
+    assert!(
+        !said.contains('\n') && !said.contains("Err(") && said.len() < 600,
+        "{said}"
+    );
     said
 }
 
@@ -23,47 +26,153 @@ fn expect(text: &str, place: &str, words: &[&str]) {
 
 #[test]
 fn unknown_keys_are_answered_with_the_nearest() {
-    expect("name = \"a\"\ndurration_s = 3", "2:1", &["durration_s", "Did you mean `duration_s`?"]);
-    expect("name = \"a\"\n[effects.musik]", "2:10", &["musik", "Did you mean `music`?"]);
-    expect("name = \"a\"\n[effects.gait]\namplitud_m = 0.1", "3:1", &["Did you mean `amplitude_m`?"]);
-    expect("name = \"a\"\nfreedom = [\"height\", \"rol\"]", "2:22", &["Did you mean `roll`?"]);
+    expect(
+        "name = \"a\"\ndurration_s = 3",
+        "2:1",
+        &["durration_s", "Did you mean `duration_s`?"],
+    );
+    expect(
+        "name = \"a\"\n[effects.musik]",
+        "2:10",
+        &["musik", "Did you mean `music`?"],
+    );
+    expect(
+        "name = \"a\"\n[effects.gait]\namplitud_m = 0.1",
+        "3:1",
+        &["Did you mean `amplitude_m`?"],
+    );
+    expect(
+        "name = \"a\"\nfreedom = [\"height\", \"rol\"]",
+        "2:22",
+        &["Did you mean `roll`?"],
+    );
     let said = load("basline", &[]).unwrap_err().to_string();
-    assert!(said.contains("Did you mean `baseline`?") && said.contains("stand-still"), "{said}");
+    assert!(
+        said.contains("Did you mean `baseline`?") && said.contains("stand-still"),
+        "{said}"
+    );
     let said = load("missing/scene.toml", &[]).unwrap_err().to_string();
-    assert!(said.starts_with("cannot read the scene missing/scene.toml"), "{said}");
+    assert!(
+        said.starts_with("cannot read the scene missing/scene.toml"),
+        "{said}"
+    );
 }
 
 #[test]
 fn wrong_types_and_signs_are_pointed_at() {
     expect("name = 3", "1:8", &["string"]);
-    expect("name = \"a\"\nduration_s = \"long\"", "2:14", &["found string", "expected a number"]);
-    expect("name = \"a\"\nduration_s = 0", "2:14", &["duration_s", "above zero"]);
-    expect("name = \"a\"\nduration_s = -1.0", "2:14", &["found -1", "above zero"]);
+    expect(
+        "name = \"a\"\nduration_s = \"long\"",
+        "2:14",
+        &["found string", "expected a number"],
+    );
+    expect(
+        "name = \"a\"\nduration_s = 0",
+        "2:14",
+        &["duration_s", "above zero"],
+    );
+    expect(
+        "name = \"a\"\nduration_s = -1.0",
+        "2:14",
+        &["found -1", "above zero"],
+    );
     expect("name = \"a\"\nduration_s = nan", "2:14", &["NaN"]);
     expect("name = \"a\"\nlog_rate_hz = 0.0", "2:15", &["above zero"]);
     expect("name = \"a\"\nlog_rate_hz = 1e12", "2:15", &["samples"]);
     expect("name = \"a\"\nseed = -4", "2:8", &["-4"]);
-    expect("name = \"a\"\n[body]\nmass_kg = 0.0", "3:11", &["body.mass_kg", "found 0", "above zero"]);
-    expect("name = \"a\"\n[body]\nmass_kg = -60.0", "3:11", &["found -60"]);
+    expect(
+        "name = \"a\"\n[body]\nmass_kg = 0.0",
+        "3:11",
+        &["body.mass_kg", "found 0", "above zero"],
+    );
+    expect(
+        "name = \"a\"\n[body]\nmass_kg = -60.0",
+        "3:11",
+        &["found -60"],
+    );
     expect("name = \"a\"\n[body]\nmass_kg = inf", "3:11", &["inf"]);
-    expect("name = \"a\"\n[body]\ninertia_kg_m2 = { xx = 1.0, yy = 1.0, zz = 3.0 }", "3:17", &["triangle inequality"]);
-    expect("name = \"a\"\n[body]\ninertia_kg_m2 = { xx = 1.0, yy = 1.0 }", "3:17", &["zz"]);
-    expect("name = \"a\"\n[carriers]\nhandles_m = []", "3:13", &["at least one handle"]);
-    expect("name = \"a\"\n[carriers]\nhandles_m = [[1.0, 2.0]]", "3:14", &["3"]);
-    expect("name = \"a\"\n[carriers]\nfrequency_hz = [2.0, 2.0, 2.0]", "3:16", &["3 values for 2 carriers"]);
-    expect("name = \"a\"\n[carriers.along_poles]\ncount = 0", "3:9", &["found 0"]);
-    expect("name = \"a\"\n[carriers.along_poles]\ncount = 2\npoles = 3", "4:9", &["poles"]);
-    expect("name = \"a\"\n[solver]\nmethod = \"rk5\"", "3:10", &["Did you mean `rk4`?"]);
-    expect("name = \"a\"\n[solver]\ntolerance = 1e-20", "3:13", &["1e-13"]);
+    expect(
+        "name = \"a\"\n[body]\ninertia_kg_m2 = { xx = 1.0, yy = 1.0, zz = 3.0 }",
+        "3:17",
+        &["triangle inequality"],
+    );
+    expect(
+        "name = \"a\"\n[body]\ninertia_kg_m2 = { xx = 1.0, yy = 1.0 }",
+        "3:17",
+        &["zz"],
+    );
+    expect(
+        "name = \"a\"\n[carriers]\nhandles_m = []",
+        "3:13",
+        &["at least one handle"],
+    );
+    expect(
+        "name = \"a\"\n[carriers]\nhandles_m = [[1.0, 2.0]]",
+        "3:14",
+        &["3"],
+    );
+    expect(
+        "name = \"a\"\n[carriers]\nfrequency_hz = [2.0, 2.0, 2.0]",
+        "3:16",
+        &["3 values for 2 carriers"],
+    );
+    expect(
+        "name = \"a\"\n[carriers.along_poles]\ncount = 0",
+        "3:9",
+        &["found 0"],
+    );
+    expect(
+        "name = \"a\"\n[carriers.along_poles]\ncount = 2\npoles = 3",
+        "4:9",
+        &["poles"],
+    );
+    expect(
+        "name = \"a\"\n[solver]\nmethod = \"rk5\"",
+        "3:10",
+        &["Did you mean `rk4`?"],
+    );
+    expect(
+        "name = \"a\"\n[solver]\ntolerance = 1e-20",
+        "3:13",
+        &["1e-13"],
+    );
     expect("name = \"a\"\nfreedom = []", "2:11", &["empty"]);
-    expect("name = \"a\"\nfreedom = [\"roll\", \"roll\"]", "2:11", &["twice"]);
-    expect("name = \"a\"\n[effects.contact]\nstiffness_n_per_m = -3.0", "3:21", &["zero or more"]);
+    expect(
+        "name = \"a\"\nfreedom = [\"roll\", \"roll\"]",
+        "2:11",
+        &["twice"],
+    );
+    expect(
+        "name = \"a\"\n[effects.contact]\nstiffness_n_per_m = -3.0",
+        "3:21",
+        &["zero or more"],
+    );
     expect("name = \"a\"\n[effects.lift]", "2:1", &["effects.gait"]);
-    expect("name = \"a\"\n[effects.imu]\nsensors = []", "3:11", &["empty"]);
-    expect("name = \"a\"\n[effects.imu]\nsensors = [{ on = \"carrier_3\" }]", "3:19", &["carrier_2"]);
-    expect("name = \"a\"\n[effects.music]\npauses = [{ from_s = 3.0, to_s = 2.0 }]", "3:34", &["from_s"]);
-    expect("name = \"a\"\n[effects.coupling]\ngraph = { edges = [[0, 2]] }", "3:9", &["carrier 2"]);
-    expect("name = \"a\"\n[effects.hold]\n[effects.friction]\nlaw = \"bristle\"", "4:7", &["hold"]);
+    expect(
+        "name = \"a\"\n[effects.imu]\nsensors = []",
+        "3:11",
+        &["empty"],
+    );
+    expect(
+        "name = \"a\"\n[effects.imu]\nsensors = [{ on = \"carrier_3\" }]",
+        "3:19",
+        &["carrier_2"],
+    );
+    expect(
+        "name = \"a\"\n[effects.music]\npauses = [{ from_s = 3.0, to_s = 2.0 }]",
+        "3:34",
+        &["from_s"],
+    );
+    expect(
+        "name = \"a\"\n[effects.coupling]\ngraph = { edges = [[0, 2]] }",
+        "3:9",
+        &["carrier 2"],
+    );
+    expect(
+        "name = \"a\"\n[effects.hold]\n[effects.friction]\nlaw = \"bristle\"",
+        "4:7",
+        &["hold"],
+    );
     expect("name = \"a\"\n\n[body\nmass_kg = 3", "3:6", &[]);
     expect("", "1:1", &["name"]);
 }
@@ -71,10 +180,32 @@ fn wrong_types_and_signs_are_pointed_at() {
 #[test]
 fn settings_are_checked_like_the_scene() {
     let with = |setting: &str| parse("s", "name = \"a\"\n[effects.music]", &[setting.into()]);
-    assert_eq!(with("effects.music.beat_hz=2.5").unwrap().effects.music.unwrap().beat_hz, 2.5);
-    assert_eq!(with("effects.music.beat_hz=2").unwrap().effects.music.unwrap().beat_hz, 2.0);
+    assert_eq!(
+        with("effects.music.beat_hz=2.5")
+            .unwrap()
+            .effects
+            .music
+            .unwrap()
+            .beat_hz,
+        2.5
+    );
+    assert_eq!(
+        with("effects.music.beat_hz=2")
+            .unwrap()
+            .effects
+            .music
+            .unwrap()
+            .beat_hz,
+        2.0
+    );
     assert!(with("effects.music=false").unwrap().effects.music.is_none());
-    assert!(with("effects.gait.amplitude_m=0.07").unwrap().effects.gait.is_some());
+    assert!(
+        with("effects.gait.amplitude_m=0.07")
+            .unwrap()
+            .effects
+            .gait
+            .is_some()
+    );
     for (setting, words) in [
         ("effects.music.beat_hs=2", "Did you mean `beat_hz`?"),
         ("effects.music.beat_hz=fast", "expected a number"),
@@ -86,7 +217,10 @@ fn settings_are_checked_like_the_scene() {
     ] {
         let said = with(setting).unwrap_err();
         assert!(matches!(said, SceneError::Value { .. }), "{said:?}");
-        assert!(said.to_string().starts_with("--set") && said.to_string().contains(words), "{said}");
+        assert!(
+            said.to_string().starts_with("--set") && said.to_string().contains(words),
+            "{said}"
+        );
     }
 }
 
@@ -95,8 +229,17 @@ fn settings_are_checked_like_the_scene() {
 fn built_in_scenes_are_complete_and_run() {
     let names: Vec<&str> = BUILTIN.iter().map(|(n, _)| *n).collect();
     for name in [
-        "baseline", "music", "strict-contact", "one-handle-drop", "eight-carriers", "long-pole", "detuned-beat",
-        "tempo-change", "tumble", "stand-still", "field-imu",
+        "baseline",
+        "music",
+        "strict-contact",
+        "one-handle-drop",
+        "eight-carriers",
+        "long-pole",
+        "detuned-beat",
+        "tempo-change",
+        "tumble",
+        "stand-still",
+        "field-imu",
     ] {
         assert!(names.contains(&name), "{name}");
     }
@@ -104,7 +247,11 @@ fn built_in_scenes_are_complete_and_run() {
         let mut scene = load(name, &[]).unwrap();
         assert_eq!(scene.name, name);
         assert!(!scene.about.is_empty());
-        assert_eq!(parse(name, &to_toml(&scene), &[]).unwrap(), scene, "{name} does not survive its own TOML");
+        assert_eq!(
+            parse(name, &to_toml(&scene), &[]).unwrap(),
+            scene,
+            "{name} does not survive its own TOML"
+        );
         scene.duration_s = scene.duration_s.min(8.0);
         let mut worst: f64 = 0.0;
         let mut moved: f64 = 1.0;
@@ -116,7 +263,10 @@ fn built_in_scenes_are_complete_and_run() {
             true
         })
         .unwrap_or_else(|e| panic!("{name}: {e}"));
-        assert!(worst < 1e-5 * moved, "{name}: {worst:.1e} J of {moved:.1e} J unexplained");
+        assert!(
+            worst < 1e-5 * moved,
+            "{name}: {worst:.1e} J of {moved:.1e} J unexplained"
+        );
     }
 }
 
@@ -138,16 +288,40 @@ fn states_have_names_of_their_own() {
 fn the_schema_and_the_page_know_every_parameter() {
     let schema = sim::scene::json_schema();
     let effects = &schema["$defs"]["Effects"]["properties"];
-    let page = std::fs::read_to_string(concat!(env!("CARGO_MANIFEST_DIR"), "/../../docs/model.md")).unwrap();
+    let page = std::fs::read_to_string(concat!(env!("CARGO_MANIFEST_DIR"), "/../../docs/model.md"))
+        .unwrap();
     let mut parameters = 0;
     for effect in sim::effects::TABLE {
-        assert!(effects.get(effect.name).is_some(), "the schema lacks {}", effect.name);
-        assert!(page.contains(&format!("### `{}`", effect.name)), "docs/model.md lacks {}", effect.name);
+        assert!(
+            effects.get(effect.name).is_some(),
+            "the schema lacks {}",
+            effect.name
+        );
+        assert!(
+            page.contains(&format!("### `{}`", effect.name)),
+            "docs/model.md lacks {}",
+            effect.name
+        );
         let of = effects[effect.name].to_string();
-        let definition = of.split("#/$defs/").nth(1).and_then(|s| s.split('"').next()).unwrap();
-        for (name, what) in schema["$defs"][definition]["properties"].as_object().unwrap() {
-            assert!(page.contains(&format!("`{name}`")), "docs/model.md lacks {}.{name}", effect.name);
-            assert!(what["description"].is_string(), "{}.{name} has no description", effect.name);
+        let definition = of
+            .split("#/$defs/")
+            .nth(1)
+            .and_then(|s| s.split('"').next())
+            .unwrap();
+        for (name, what) in schema["$defs"][definition]["properties"]
+            .as_object()
+            .unwrap()
+        {
+            assert!(
+                page.contains(&format!("`{name}`")),
+                "docs/model.md lacks {}.{name}",
+                effect.name
+            );
+            assert!(
+                what["description"].is_string(),
+                "{}.{name} has no description",
+                effect.name
+            );
             parameters += 1;
         }
     }

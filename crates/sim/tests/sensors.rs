@@ -26,7 +26,11 @@ fn at_rest_the_axis_that_points_up_shows_plus_g() {
     let (shown, _) = readings(&scene);
     assert_eq!(shown.len(), 3 * 101);
     for r in shown {
-        let expected = if r.topic == "/imu/on_its_side" { [0.0, 9.81, 0.0] } else { [0.0, 0.0, 9.81] };
+        let expected = if r.topic == "/imu/on_its_side" {
+            [0.0, 9.81, 0.0]
+        } else {
+            [0.0, 0.0, 9.81]
+        };
         for axis in 0..3 {
             assert!((r.force[axis] - expected[axis]).abs() < 1e-9, "{r:?}");
             assert!(r.spin[axis].abs() < 1e-9);
@@ -62,7 +66,12 @@ fn val_off_centre_sensor_on_a_free_top() {
         let spin = Vector3::new(b * cos, b * sin, s);
         let change = Vector3::new(-b * turn * sin, b * turn * cos, 0.0);
         let expected = spin.cross(&spin.cross(&p)) + change.cross(&p);
-        assert!((Vector3::from(r.force) - expected).norm() < 1e-9, "t = {}: {:.1e}", r.t_s, (Vector3::from(r.force) - expected).norm());
+        assert!(
+            (Vector3::from(r.force) - expected).norm() < 1e-9,
+            "t = {}: {:.1e}",
+            r.t_s,
+            (Vector3::from(r.force) - expected).norm()
+        );
         assert!((Vector3::from(r.spin) - spin).norm() < 1e-9);
     }
 }
@@ -88,17 +97,31 @@ fn val_shoulder_sensor_of_a_steady_gait() {
     for r in readings(&scene).0 {
         let expected = 9.81 - 0.06 * w * w * (1.0 + w * r.t_s).sin();
         // The five-point difference: h⁴/30 · A ω⁶ = 1e-11, rounding 1e-9.
-        assert!((r.force[2] - expected).abs() < 5e-9, "{:.1e}", r.force[2] - expected);
+        assert!(
+            (r.force[2] - expected).abs() < 5e-9,
+            "{:.1e}",
+            r.force[2] - expected
+        );
     }
 }
 
 /// Instruments touch nothing: the samples are the same to the last bit.
 #[test]
 fn sensors_only_watch() {
-    let with = parse("field-imu", sim::scene::builtin("field-imu").unwrap(), &["duration_s=5.0".into()]).unwrap();
+    let with = parse(
+        "field-imu",
+        sim::scene::builtin("field-imu").unwrap(),
+        &["duration_s=5.0".into()],
+    )
+    .unwrap();
     let mut without = with.clone();
     without.effects.imu = None;
-    let motion = |s: &sim::scene::Scene| samples(s).iter().flat_map(|s| s.pose.position_m.map(f64::to_bits)).collect::<Vec<_>>();
+    let motion = |s: &sim::scene::Scene| {
+        samples(s)
+            .iter()
+            .flat_map(|s| s.pose.position_m.map(f64::to_bits))
+            .collect::<Vec<_>>()
+    };
     assert_eq!(motion(&with), motion(&without));
 }
 
@@ -116,9 +139,16 @@ fn clocks_drift_and_samples_get_lost() {
     "#;
     let (shown, _) = readings(&scene(text));
     // 2001 ticks of a clock that is 10 ms ahead after 20 s.
-    assert!((1740..=1860).contains(&shown.len()), "{} of 2001 arrived", shown.len());
+    assert!(
+        (1740..=1860).contains(&shown.len()),
+        "{} of 2001 arrived",
+        shown.len()
+    );
     for r in &shown {
-        assert!((r.stamp_s - (-2.5 + r.t_s * (1.0 + 500e-6))).abs() < 1e-9, "{r:?}");
+        assert!(
+            (r.stamp_s - (-2.5 + r.t_s * (1.0 + 500e-6))).abs() < 1e-9,
+            "{r:?}"
+        );
     }
     assert!(shown.windows(2).all(|w| w[0].t_s < w[1].t_s));
 }
@@ -141,8 +171,16 @@ fn ranges_clip_and_digits_round() {
     ));
     for r in shown {
         // The last digit within the range: 0.04 deg/s apart.
-        assert!((5.0 - 0.04_f64.to_radians()..=5.0).contains(&r.spin[2]), "{r:?}");
-        assert!(r.force.iter().all(|f| (f / 0.5 - (f / 0.5).round()).abs() < 1e-12), "{r:?}");
+        assert!(
+            (5.0 - 0.04_f64.to_radians()..=5.0).contains(&r.spin[2]),
+            "{r:?}"
+        );
+        assert!(
+            r.force
+                .iter()
+                .all(|f| (f / 0.5 - (f / 0.5).round()).abs() < 1e-12),
+            "{r:?}"
+        );
         assert!((r.force[0] + 0.1 * 7.03 * 7.03).abs() < 0.5, "{r:?}");
     }
 }
@@ -155,7 +193,9 @@ fn allan_variance(x: &[f64], rate_hz: f64, m: usize) -> f64 {
     }
     let tau = m as f64 / rate_hz;
     let terms = sums.len() - 2 * m;
-    let total: f64 = (0..terms).map(|k| (sums[k + 2 * m] - 2.0 * sums[k + m] + sums[k]).powi(2)).sum();
+    let total: f64 = (0..terms)
+        .map(|k| (sums[k + 2 * m] - 2.0 * sums[k + m] + sums[k]).powi(2))
+        .sum();
     total / (2.0 * tau * tau * terms as f64)
 }
 
@@ -182,15 +222,38 @@ fn val_allan_deviation_of_an_hour_at_rest() {
     };
     // σ²(τ) = D²/τ + W² τ/3: the mean over the axes at a short and at a long averaging time gives both.
     let fit = |signals: [Vec<f64>; 3], short: usize, long: usize| {
-        let mean = |m: usize| signals.iter().map(|x| allan_variance(x, 100.0, m)).sum::<f64>() / 3.0;
-        let (ts, tl, vs, vl) = (short as f64 / 100.0, long as f64 / 100.0, mean(short), mean(long));
+        let mean = |m: usize| {
+            signals
+                .iter()
+                .map(|x| allan_variance(x, 100.0, m))
+                .sum::<f64>()
+                / 3.0
+        };
+        let (ts, tl, vs, vl) = (
+            short as f64 / 100.0,
+            long as f64 / 100.0,
+            mean(short),
+            mean(long),
+        );
         let walk2 = (vl * tl - vs * ts) * 3.0 / (tl * tl - ts * ts);
         ((vs * ts - walk2 * ts * ts / 3.0).sqrt(), walk2.sqrt())
     };
     let (density, walk) = fit(axes(|r| r.force), 10, 400);
-    assert!((density / 2.0e-3 - 1.0).abs() < 0.05, "accelerometer density {density:.3e}");
-    assert!((walk / 3.0e-3 - 1.0).abs() < 0.05, "accelerometer walk {walk:.3e}");
+    assert!(
+        (density / 2.0e-3 - 1.0).abs() < 0.05,
+        "accelerometer density {density:.3e}"
+    );
+    assert!(
+        (walk / 3.0e-3 - 1.0).abs() < 0.05,
+        "accelerometer walk {walk:.3e}"
+    );
     let (density, walk) = fit(axes(|r| r.spin), 50, 4000);
-    assert!((density / 1.6968e-4 - 1.0).abs() < 0.05, "gyroscope density {density:.3e}");
-    assert!((walk / 1.9393e-5 - 1.0).abs() < 0.05, "gyroscope walk {walk:.3e}");
+    assert!(
+        (density / 1.6968e-4 - 1.0).abs() < 0.05,
+        "gyroscope density {density:.3e}"
+    );
+    assert!(
+        (walk / 1.9393e-5 - 1.0).abs() < 0.05,
+        "gyroscope walk {walk:.3e}"
+    );
 }

@@ -99,7 +99,11 @@ fn switching_one_effect_off_leaves_the_others_as_they_are() {
             let mut wa = evaluated(&a);
             let mut wb = evaluated(&b);
             let (extra, rates) = (wb.extra.clone(), wb.extra_rate.clone());
-            wb = Workspace { extra, extra_rate: rates, ..wa.clone() };
+            wb = Workspace {
+                extra,
+                extra_rate: rates,
+                ..wa.clone()
+            };
             let states = |m: &Model| m.state_names()[m.layout().extra_range()].to_vec();
             let (names_a, names_b) = (states(&a), states(&b));
             for (name, x) in names_a.iter().zip(&mut wa.extra) {
@@ -110,7 +114,13 @@ fn switching_one_effect_off_leaves_the_others_as_they_are() {
             }
             a.apply_only(kept.name, t_s, &mut wa);
             b.apply_only(kept.name, t_s, &mut wb);
-            assert_eq!(written(&a, &wa), written(&b, &wb), "`{}` with and without `{}`", kept.name, other.name);
+            assert_eq!(
+                written(&a, &wa),
+                written(&b, &wb),
+                "`{}` with and without `{}`",
+                kept.name,
+                other.name
+            );
             for (name, rate) in names_b.iter().zip(&wb.extra_rate) {
                 let i = names_a.iter().position(|n| n == name).unwrap();
                 // Rates that belong to neither keep what the evaluation left there.
@@ -122,7 +132,12 @@ fn switching_one_effect_off_leaves_the_others_as_they_are() {
                         let at = states(m).iter().position(|n| n == name).unwrap();
                         w.extra_rate[at].is_nan()
                     };
-                    assert!(own(&a) && own(&b), "rate of {name}: `{}` with and without `{}`", kept.name, other.name);
+                    assert!(
+                        own(&a) && own(&b),
+                        "rate of {name}: `{}` with and without `{}`",
+                        kept.name,
+                        other.name
+                    );
                 }
             }
         }

@@ -31,15 +31,29 @@ fn free_tumbling_keeps_energy_and_momentum() {
         let spin = Vector3::from(s.pose.spin_rad_per_s);
         let v = Vector3::from(s.pose.velocity_m_per_s);
         let fall = 60.0 * (0.5 * v.norm_squared() + 9.81 * s.pose.position_m[2]);
-        (turn * (inertia * spin), 0.5 * spin.dot(&(inertia * spin)), fall)
+        (
+            turn * (inertia * spin),
+            0.5 * spin.dot(&(inertia * spin)),
+            fall,
+        )
     };
     let (momentum, energy, fall) = of(&all[0]);
     for s in &all {
         let (m, e, f) = of(s);
         let off = (m - momentum).norm() / momentum.norm();
         assert!(off < 1e-9, "t = {}: momentum off by {off:.1e}", s.t_s);
-        assert!((e / energy - 1.0).abs() < 1e-9, "t = {}: energy off by {:.1e}", s.t_s, e / energy - 1.0);
-        assert!((f / fall - 1.0).abs() < 1e-9, "t = {}: {:.1e}", s.t_s, f / fall - 1.0);
+        assert!(
+            (e / energy - 1.0).abs() < 1e-9,
+            "t = {}: energy off by {:.1e}",
+            s.t_s,
+            e / energy - 1.0
+        );
+        assert!(
+            (f / fall - 1.0).abs() < 1e-9,
+            "t = {}: {:.1e}",
+            s.t_s,
+            f / fall - 1.0
+        );
         let q = s.pose.orientation.iter().map(|x| x * x).sum::<f64>().sqrt();
         assert!((q - 1.0).abs() < 1e-12);
         assert!(s.energy.unwrap().unexplained_j.abs() < 1e-9 * (energy + fall));
@@ -72,17 +86,27 @@ fn val_half_wave_series_of_a_slack_contact() {
     let period = 2000.0; // samples
     let whole = &all[..8000];
     let part = |n: f64, f: fn(f64) -> f64| {
-        let sum: f64 = whole.iter().enumerate().map(|(i, s)| s.normal_n[0] * f(TAU * n * i as f64 / period)).sum();
+        let sum: f64 = whole
+            .iter()
+            .enumerate()
+            .map(|(i, s)| s.normal_n[0] * f(TAU * n * i as f64 / period))
+            .sum();
         2.0 * sum / (whole.len() as f64 * 3000.0 * 0.05)
     };
     // Samples see the kink within one part in 2000 of a turn: the sums miss the integrals by (π/2000)²/6 of the kink.
-    let close = |found: f64, expected: f64| assert!((found - expected).abs() < 1e-6, "{found} for {expected}");
+    let close = |found: f64, expected: f64| {
+        assert!((found - expected).abs() < 1e-6, "{found} for {expected}")
+    };
     close(part(0.0, f64::cos) / 2.0, 1.0 / PI);
     close(part(1.0, f64::sin), 0.5);
     close(part(1.0, f64::cos), 0.0);
     for n in 2..9 {
         let n = f64::from(n);
-        let expected = if n % 2.0 == 0.0 { -2.0 / (PI * (n * n - 1.0)) } else { 0.0 };
+        let expected = if n % 2.0 == 0.0 {
+            -2.0 / (PI * (n * n - 1.0))
+        } else {
+            0.0
+        };
         close(part(n, f64::cos), expected);
         close(part(n, f64::sin), 0.0);
     }
@@ -131,7 +155,10 @@ fn val_forced_roll_amplitude() {
         let drive = 2.0 * l * amplitude * f64::hypot(k, c * w);
         let expected = drive / f64::hypot(stiffness - inertia * w * w, damping * w);
         let found = f64::hypot(s, co);
-        assert!((found / expected - 1.0).abs() < 1e-6, "{hz} Hz: {found:.6e}, expected {expected:.6e}");
+        assert!(
+            (found / expected - 1.0).abs() < 1e-6,
+            "{hz} Hz: {found:.6e}, expected {expected:.6e}"
+        );
     }
 }
 
@@ -188,7 +215,10 @@ impl Hanging {
             RUB.1,
             self.base_m
         ));
-        samples(&scene).iter().map(|s| s.roll_pitch_yaw_rad[0]).collect()
+        samples(&scene)
+            .iter()
+            .map(|s| s.roll_pitch_yaw_rad[0])
+            .collect()
     }
 
     /// Growth of roll over two periods once the strongest mode is alone.
@@ -206,7 +236,8 @@ impl Hanging {
         let w = TAU * HZ;
         let part = Complex::new(2.0 * K, 2.0 * C * w);
         let lift = part / (part - Complex::new(MASS * w * w, 0.0)) * self.base_m;
-        let load = |t: f64| MASS * (9.81 - w * w * (lift * Complex::new(0.0, w * t - 0.5 * PI).exp()).re);
+        let load =
+            |t: f64| MASS * (9.81 - w * w * (lift * Complex::new(0.0, w * t - 0.5 * PI).exp()).re);
         let rate = |t: f64, x: Vector4<f64>| {
             let n = load(t);
             let side = -2.0 * (HOLD.0 * (x[0] - ABOVE * x[1]) + HOLD.1 * (x[2] - ABOVE * x[3]));
@@ -228,7 +259,11 @@ impl Hanging {
             }
             column.copy_from(&x);
         }
-        columns.complex_eigenvalues().iter().map(|z| z.norm()).fold(0.0, f64::max)
+        columns
+            .complex_eigenvalues()
+            .iter()
+            .map(|z| z.norm())
+            .fold(0.0, f64::max)
     }
 }
 
@@ -239,15 +274,35 @@ fn val_mathieu_threshold_is_that_of_floquet() {
     assert!(Hanging { base_m: low }.floquet() < 1.0 && Hanging { base_m: high }.floquet() > 1.0);
     for _ in 0..40 {
         let middle = 0.5 * (low + high);
-        if (Hanging { base_m: middle }).floquet() < 1.0 { low = middle } else { high = middle }
+        if (Hanging { base_m: middle }).floquet() < 1.0 {
+            low = middle
+        } else {
+            high = middle
+        }
     }
     let threshold = 0.5 * (low + high);
-    let (below, above) = (Hanging { base_m: 0.98 * threshold }, Hanging { base_m: 1.02 * threshold });
+    let (below, above) = (
+        Hanging {
+            base_m: 0.98 * threshold,
+        },
+        Hanging {
+            base_m: 1.02 * threshold,
+        },
+    );
     let (down, up) = (below.simulated_growth(), above.simulated_growth());
-    assert!(down < 1.0 && up > 1.0, "threshold {threshold:.5} m: {down} below, {up} above");
+    assert!(
+        down < 1.0 && up > 1.0,
+        "threshold {threshold:.5} m: {down} below, {up} above"
+    );
     for (found, expected) in [(down, below.floquet()), (up, above.floquet())] {
-        assert!((found / expected - 1.0).abs() < 1e-5, "growth over two periods {found:.8}, Floquet {expected:.8}");
+        assert!(
+            (found / expected - 1.0).abs() < 1e-5,
+            "growth over two periods {found:.8}, Floquet {expected:.8}"
+        );
     }
     let crossing = 0.98 + 0.04 * (1.0 - down) / (up - down);
-    assert!((crossing - 1.0).abs() < 1e-3, "simulated threshold at {crossing:.5} of Floquet's {threshold:.5} m");
+    assert!(
+        (crossing - 1.0).abs() < 1e-3,
+        "simulated threshold at {crossing:.5} of Floquet's {threshold:.5} m"
+    );
 }

@@ -7,7 +7,12 @@ use sim::scene::PerCarrier;
 use std::f64::consts::{FRAC_PI_2, PI, TAU};
 
 /// One person, one drum, no load: only the phase is left to move.
-fn one_carrier_on_a_beat(strength: f64, detuning_rad_per_s: f64, log_rate_hz: f64, duration_s: f64) -> Vec<f64> {
+fn one_carrier_on_a_beat(
+    strength: f64,
+    detuning_rad_per_s: f64,
+    log_rate_hz: f64,
+    duration_s: f64,
+) -> Vec<f64> {
     let beat_hz = 2.0 + detuning_rad_per_s / TAU;
     let scene = scene(&format!(
         r#"
@@ -27,15 +32,24 @@ fn one_carrier_on_a_beat(strength: f64, detuning_rad_per_s: f64, log_rate_hz: f6
         build_up_s = 0.0
         "#
     ));
-    samples(&scene).iter().map(|s| s.beat_phase_rad.unwrap() - s.phase_rad[0]).collect()
+    samples(&scene)
+        .iter()
+        .map(|s| s.beat_phase_rad.unwrap() - s.phase_rad[0])
+        .collect()
 }
 
 /// sin Φ* = Δω/K with cos Φ* > 0: Adler (1946); paper, theorem 1.
 #[test]
 fn val_adler_lock() {
     for detuning in [-2.5, -0.7, 0.0, 1.3, 2.6] {
-        let phi = *one_carrier_on_a_beat(2.7, detuning, 1.0, 60.0).last().unwrap();
-        assert!((phi.sin() - detuning / 2.7).abs() < 1e-9, "{detuning}: {}", phi.sin() - detuning / 2.7);
+        let phi = *one_carrier_on_a_beat(2.7, detuning, 1.0, 60.0)
+            .last()
+            .unwrap();
+        assert!(
+            (phi.sin() - detuning / 2.7).abs() < 1e-9,
+            "{detuning}: {}",
+            phi.sin() - detuning / 2.7
+        );
         assert!(phi.cos() > 0.0);
     }
 }
@@ -49,7 +63,11 @@ fn val_adler_drift_frequency() {
         assert_eq!(phi.len(), 21);
         for (turns, p) in phi.iter().enumerate() {
             let expected = phi[0] + detuning.signum() * TAU * turns as f64;
-            assert!((p - expected).abs() < 1e-7, "K {strength}, detuning {detuning}, turn {turns}: {:.2e}", p - expected);
+            assert!(
+                (p - expected).abs() < 1e-7,
+                "K {strength}, detuning {detuning}, turn {turns}: {:.2e}",
+                p - expected
+            );
         }
     }
 }
@@ -75,7 +93,11 @@ fn val_two_kuramoto_oscillators_lock() {
     let all = samples(&scene);
     let last = all.last().unwrap();
     let lag = last.phase_rad[1] - last.phase_rad[0];
-    assert!((lag.sin() - difference / coupling).abs() < 1e-9, "{}", lag.sin() - difference / coupling);
+    assert!(
+        (lag.sin() - difference / coupling).abs() < 1e-9,
+        "{}",
+        lag.sin() - difference / coupling
+    );
     let turned = last.phase_rad.iter().sum::<f64>() - 2.0;
     assert!((turned - (2.0 * TAU * 2.0 + difference) * last.t_s).abs() < 1e-7);
 }
@@ -95,7 +117,11 @@ fn normal_quantile(p: f64) -> f64 {
     let (mut low, mut high) = (-6.0, 6.0);
     for _ in 0..60 {
         let middle = 0.5 * (low + high);
-        if below(middle) < p { low = middle } else { high = middle }
+        if below(middle) < p {
+            low = middle
+        } else {
+            high = middle
+        }
     }
     0.5 * (low + high)
 }
@@ -106,7 +132,10 @@ fn order_of_many(coupling: f64) -> f64 {
     let held = |r: f64| {
         let n = 2000;
         let h = PI / f64::from(n);
-        (0..n).map(|i| -FRAC_PI_2 + (f64::from(i) + 0.5) * h).map(|a| h * coupling * a.cos().powi(2) * g(coupling * r * a.sin())).sum::<f64>()
+        (0..n)
+            .map(|i| -FRAC_PI_2 + (f64::from(i) + 0.5) * h)
+            .map(|a| h * coupling * a.cos().powi(2) * g(coupling * r * a.sin()))
+            .sum::<f64>()
     };
     if held(0.0) < 1.0 {
         return 0.0;
@@ -114,7 +143,11 @@ fn order_of_many(coupling: f64) -> f64 {
     let (mut low, mut high) = (0.0, 1.0);
     for _ in 0..50 {
         let middle = 0.5 * (low + high);
-        if held(middle) > 1.0 { low = middle } else { high = middle }
+        if held(middle) > 1.0 {
+            low = middle
+        } else {
+            high = middle
+        }
     }
     0.5 * (low + high)
 }
@@ -134,10 +167,22 @@ fn order_of_a_thousand(coupling: f64) -> f64 {
         "#
     ));
     scene.carriers.handles_m = vec![[0.0; 3]; n];
-    scene.carriers.frequency_hz = PerCarrier::Each((0..n).map(|i| normal_quantile((i as f64 + 0.5) / n as f64) / TAU).collect());
+    scene.carriers.frequency_hz = PerCarrier::Each(
+        (0..n)
+            .map(|i| normal_quantile((i as f64 + 0.5) / n as f64) / TAU)
+            .collect(),
+    );
     // Phases that have nothing to do with the frequencies: multiples of the golden angle.
-    scene.carriers.initial_phase_rad = PerCarrier::Each((0..n).map(|i| (i as f64 * 2.399_963_229_728_653) % TAU).collect());
-    let late: Vec<f64> = samples(&scene).iter().filter(|s| s.t_s > 60.0).map(|s| s.order_parameter().unwrap()).collect();
+    scene.carriers.initial_phase_rad = PerCarrier::Each(
+        (0..n)
+            .map(|i| (i as f64 * 2.399_963_229_728_653) % TAU)
+            .collect(),
+    );
+    let late: Vec<f64> = samples(&scene)
+        .iter()
+        .filter(|s| s.t_s > 60.0)
+        .map(|s| s.order_parameter().unwrap())
+        .collect();
     late.iter().sum::<f64>() / late.len() as f64
 }
 
@@ -153,16 +198,27 @@ fn val_kuramoto_onset_of_a_large_population() {
     }
     // r² is straight in K just above the onset: two points give back K_c.
     let (a, b) = (1.15, 1.3);
-    let (ra, rb) = (order_of_a_thousand(a * critical), order_of_a_thousand(b * critical));
+    let (ra, rb) = (
+        order_of_a_thousand(a * critical),
+        order_of_a_thousand(b * critical),
+    );
     for (part, r) in [(a, ra), (b, rb), (2.0, order_of_a_thousand(2.0 * critical))] {
         let expected = order_of_many(part * critical);
-        assert!((r - expected).abs() < 0.03, "K = {part} K_c: r {r}, expected {expected}");
+        assert!(
+            (r - expected).abs() < 0.03,
+            "K = {part} K_c: r {r}, expected {expected}"
+        );
     }
     let (ea, eb) = (order_of_many(a * critical), order_of_many(b * critical));
     let crossing = |ra: f64, rb: f64| a - ra * ra * (b - a) / (rb * rb - ra * ra);
     // The same chord of the infinite population bends a little: it is what the thousand are held against.
     let off = crossing(ra, rb) - crossing(ea, eb);
-    assert!(off.abs() < 0.05, "onset at {:.3} K_c, infinite population's chord {:.3}", crossing(ra, rb), crossing(ea, eb));
+    assert!(
+        off.abs() < 0.05,
+        "onset at {:.3} K_c, infinite population's chord {:.3}",
+        crossing(ra, rb),
+        crossing(ea, eb)
+    );
 }
 
 /// Phase noise alone is a Brownian path: variance σ² t, whatever the grid.
@@ -181,9 +237,18 @@ fn phase_noise_spreads_like_a_brownian_path() {
     scene.carriers.handles_m = vec![[0.0; 3]; 4000];
     let all = samples(&scene);
     let (first, last) = (&all[0], all.last().unwrap());
-    let off: Vec<f64> = first.phase_rad.iter().zip(&last.phase_rad).map(|(a, b)| b - a - TAU * 2.0 * last.t_s).collect();
+    let off: Vec<f64> = first
+        .phase_rad
+        .iter()
+        .zip(&last.phase_rad)
+        .map(|(a, b)| b - a - TAU * 2.0 * last.t_s)
+        .collect();
     let variance = off.iter().map(|x| x * x).sum::<f64>() / off.len() as f64;
     let expected = 0.01_f64.powi(2) * last.t_s;
     // Four standard errors of a variance from 4000 draws.
-    assert!((variance / expected - 1.0).abs() < 4.0 * (2.0_f64 / 4000.0).sqrt(), "{}", variance / expected);
+    assert!(
+        (variance / expected - 1.0).abs() < 4.0 * (2.0_f64 / 4000.0).sqrt(),
+        "{}",
+        variance / expected
+    );
 }

@@ -7,21 +7,35 @@ use sim::run::{Sample, run_model};
 use sim::scene::{BUILTIN, parse};
 use sim::solve::{Settings, method};
 
-/// How far beyond 10 X a scene's own growth carries an error, for its name; measured 290, 2.5, 1.4, 210, 140 (at 1e-6) and, for
+/// How far beyond 10 X a scene's own growth carries an error, for its name; measured 290, 2.5, 90 (it is `music` with sensors), 210 (at 1e-6) and, for
 /// `tumble`, 2000 at 1e-4, where the turn has lost its count.
-const GROWTH: &[(&str, f64)] =
-    &[("music", 400.0), ("baseline", 4.0), ("field-imu", 2.0), ("strict-contact", 400.0), ("tumble", 3000.0)];
+const GROWTH: &[(&str, f64)] = &[
+    ("music", 400.0),
+    ("baseline", 4.0),
+    ("field-imu", 400.0),
+    ("strict-contact", 400.0),
+    ("tumble", 3000.0),
+];
 
 /// Below this a motion is rest, and errors are absolute: the units of `Freedoms::scales`, m and rad.
 const REST: f64 = 0.1;
 
 fn course(model: &Model, name: &str, tolerance: f64) -> Vec<[f64; 2]> {
     let mut all = Vec::new();
-    let settings = Settings { tolerance, step_s: 1e-3, most_evaluations: 1 << 40 };
-    let (_, outcome) = run_model(model, method(name).unwrap(), &settings, &mut |s: &Sample| {
-        all.push([s.roll_pitch_yaw_rad[0], s.pose.position_m[2]]);
-        true
-    });
+    let settings = Settings {
+        tolerance,
+        step_s: 1e-3,
+        most_evaluations: 1 << 40,
+    };
+    let (_, outcome) = run_model(
+        model,
+        method(name).unwrap(),
+        &settings,
+        &mut |s: &Sample| {
+            all.push([s.roll_pitch_yaw_rad[0], s.pose.position_m[2]]);
+            true
+        },
+    );
     outcome.unwrap();
     all
 }
@@ -37,17 +51,33 @@ fn the_tolerance_means_what_it_says_on_every_built_in_scene() {
         let truth = course(&model, "dop853", 1e-11);
         // Half its range. A motion that is hardly one is held absolutely.
         let size = [0, 1].map(|a| {
-            let (low, high) = truth.iter().fold((f64::MAX, f64::MIN), |(l, h), x| (l.min(x[a]), h.max(x[a])));
-            if high - low < 1e-3 { REST } else { 0.5 * (high - low) }
+            let (low, high) = truth
+                .iter()
+                .fold((f64::MAX, f64::MIN), |(l, h), x| (l.min(x[a]), h.max(x[a])));
+            if high - low < 1e-3 {
+                REST
+            } else {
+                0.5 * (high - low)
+            }
         });
-        let growth = GROWTH.iter().find(|(n, _)| n == name).map_or(1.0, |(_, g)| *g);
+        let growth = GROWTH
+            .iter()
+            .find(|(n, _)| n == name)
+            .map_or(1.0, |(_, g)| *g);
         for tolerance in [1e-4, 1e-6, 1e-8] {
             let seen = course(&model, "auto", tolerance);
             for (a, what) in ["roll", "height"].into_iter().enumerate() {
-                let worst = seen.iter().zip(&truth).map(|(x, y)| (x[a] - y[a]).abs()).fold(0.0, f64::max) / size[a];
+                let worst = seen
+                    .iter()
+                    .zip(&truth)
+                    .map(|(x, y)| (x[a] - y[a]).abs())
+                    .fold(0.0, f64::max)
+                    / size[a];
                 println!("{name} {tolerance:e}: {what} {worst:.1e}");
                 if worst > 10.0 * growth * tolerance {
-                    missed.push(format!("{name} at {tolerance:e}: {what} errs by {worst:.1e}"));
+                    missed.push(format!(
+                        "{name} at {tolerance:e}: {what} errs by {worst:.1e}"
+                    ));
                 }
             }
         }

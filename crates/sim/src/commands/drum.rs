@@ -7,7 +7,9 @@ use std::path::PathBuf;
 
 /// Arguments of `sim drum`.
 #[derive(clap::Args)]
-#[command(after_help = "Examples:\n  sim drum music --out drum.wav\n  sim drum tempo-change --set effects.drum.noise=0.05 --out drum.wav")]
+#[command(
+    after_help = "Examples:\n  sim drum music --out drum.wav\n  sim drum tempo-change --set effects.drum.noise=0.05 --out drum.wav"
+)]
 pub struct Args {
     /// A built-in scene or the path of a TOML file; where it has no `effects.drum`, the usual drum sounds.
     #[arg(default_value = "music")]
@@ -26,15 +28,24 @@ pub fn run(args: &Args) -> Result<()> {
     scene.effects.drum.get_or_insert_default();
     sim::scene::check(&scene).map_err(|p| anyhow!("{}: {}", p.key, p.message))?;
     let model = Model::new(&scene);
-    let track = model.track().ok_or_else(|| anyhow!("the scene `{}` has no music", scene.name))?;
+    let track = model
+        .track()
+        .ok_or_else(|| anyhow!("the scene `{}` has no music", scene.name))?;
     let wav = track.wav().map_err(|e| anyhow!(e))?;
     let unfinished = args.out.with_extension("wav.part");
-    let written = std::fs::write(&unfinished, wav).and_then(|()| std::fs::rename(&unfinished, &args.out));
+    let written =
+        std::fs::write(&unfinished, wav).and_then(|()| std::fs::rename(&unfinished, &args.out));
     if written.is_err() {
         // What is left of a failed write helps nobody; that it may not be there is fine.
         let _ = std::fs::remove_file(&unfinished);
     }
     written.with_context(|| format!("cannot write {}", args.out.display()))?;
-    eprintln!("{}: {} strokes in {} s at {} Hz", args.out.display(), track.strokes.len(), scene.duration_s, track.rate_hz);
+    eprintln!(
+        "{}: {} strokes in {} s at {} Hz",
+        args.out.display(),
+        track.strokes.len(),
+        scene.duration_s,
+        track.rate_hz
+    );
     Ok(())
 }

@@ -71,21 +71,35 @@ pub fn run(args: &Args) -> Result<()> {
                 // An effect that another one needs cannot be taken out alone.
                 if sim::scene::check(&without).is_ok() {
                     let smaller = Model::new(&without);
-                    adds_state = model.layout().size().saturating_sub(smaller.layout().size());
+                    adds_state = model
+                        .layout()
+                        .size()
+                        .saturating_sub(smaller.layout().size());
                     cost = Some(rhs_ns - cost_ns(&smaller));
                 }
             }
-            Effect { name: e.name, about: e.about, on, adds_state, cost_ns: cost }
+            Effect {
+                name: e.name,
+                about: e.about,
+                on,
+                adds_state,
+                cost_ns: cost,
+            }
         })
         .collect();
     let (trials, ms_per_s) = try_freedoms(&scene);
     let mut out = std::io::stdout().lock();
     match args.format {
         Format::Json => {
-            serde_json::to_writer_pretty(&mut out, &as_json(&scene, &model, &effects, &trials, rhs_ns, ms_per_s))?;
+            serde_json::to_writer_pretty(
+                &mut out,
+                &as_json(&scene, &model, &effects, &trials, rhs_ns, ms_per_s),
+            )?;
             writeln!(out)?;
         }
-        Format::Table => print(&mut out, &scene, &model, &effects, &trials, rhs_ns, ms_per_s)?,
+        Format::Table => print(
+            &mut out, &scene, &model, &effects, &trials, rhs_ns, ms_per_s,
+        )?,
     }
     Ok(())
 }
@@ -113,7 +127,14 @@ fn motion(scene: &Scene) -> Result<Vec<[f64; 6]>, String> {
     let mut all = Vec::new();
     sim::run::run(scene, &mut |s: &Sample| {
         let ([x, y, z], [roll, tilt, yaw]) = (s.pose.position_m, s.roll_pitch_yaw_rad);
-        all.push([x - scene.carriers.walk_m_per_s[0] * s.t_s, y - scene.carriers.walk_m_per_s[1] * s.t_s, z, roll, tilt, yaw]);
+        all.push([
+            x - scene.carriers.walk_m_per_s[0] * s.t_s,
+            y - scene.carriers.walk_m_per_s[1] * s.t_s,
+            z,
+            roll,
+            tilt,
+            yaw,
+        ]);
         true
     })
     .map_err(|e| e.to_string())?;
@@ -126,19 +147,39 @@ fn try_freedoms(scene: &Scene) -> (Vec<Trial>, f64) {
     scene.duration_s = scene.duration_s.min(TRIAL_S);
     scene.effects.imu = None;
     let began = Instant::now();
-    let Ok(full) = motion(&scene) else { return (Vec::new(), f64::NAN) };
+    let Ok(full) = motion(&scene) else {
+        return (Vec::new(), f64::NAN);
+    };
     let ms_per_s = began.elapsed().as_secs_f64() * 1e3 / scene.duration_s;
-    let trials = Freedom::ALL.iter().enumerate().filter(|(_, f)| scene.freedom.contains(f)).map(|(i, f)| {
-        let mean = full.iter().map(|s| s[i]).sum::<f64>() / full.len() as f64;
-        let excursion = (full.iter().map(|s| (s[i] - mean).powi(2)).sum::<f64>() / full.len() as f64).sqrt();
-        let mut fewer = scene.clone();
-        fewer.freedom.retain(|g| g != f);
-        let held = sim::scene::check(&fewer).map_err(|p| p.message).and_then(|()| motion(&fewer)).map(|held| {
-            let worst = |c: usize| full.iter().zip(&held).map(|(a, b)| (a[c] - b[c]).abs()).fold(0.0, f64::max);
-            (worst(3), worst(2))
+    let trials = Freedom::ALL
+        .iter()
+        .enumerate()
+        .filter(|(_, f)| scene.freedom.contains(f))
+        .map(|(i, f)| {
+            let mean = full.iter().map(|s| s[i]).sum::<f64>() / full.len() as f64;
+            let excursion = (full.iter().map(|s| (s[i] - mean).powi(2)).sum::<f64>()
+                / full.len() as f64)
+                .sqrt();
+            let mut fewer = scene.clone();
+            fewer.freedom.retain(|g| g != f);
+            let held = sim::scene::check(&fewer)
+                .map_err(|p| p.message)
+                .and_then(|()| motion(&fewer))
+                .map(|held| {
+                    let worst = |c: usize| {
+                        full.iter()
+                            .zip(&held)
+                            .map(|(a, b)| (a[c] - b[c]).abs())
+                            .fold(0.0, f64::max)
+                    };
+                    (worst(3), worst(2))
+                });
+            Trial {
+                name: format!("{f:?}").to_lowercase(),
+                excursion,
+                held,
+            }
         });
-        Trial { name: format!("{f:?}").to_lowercase(), excursion, held }
-    });
     (trials.collect(), ms_per_s)
 }
 
@@ -146,7 +187,14 @@ fn number(x: f64) -> Value {
     if x.is_finite() { json!(x) } else { Value::Null }
 }
 
-fn as_json(scene: &Scene, model: &Model, effects: &[Effect], trials: &[Trial], rhs_ns: f64, ms_per_s: f64) -> Value {
+fn as_json(
+    scene: &Scene,
+    model: &Model,
+    effects: &[Effect],
+    trials: &[Trial],
+    rhs_ns: f64,
+    ms_per_s: f64,
+) -> Value {
     json!({
         "scene": scene.name,
         "state": { "size": model.layout().size(), "names": model.state_names() },
@@ -178,19 +226,46 @@ fn print(
     ms_per_s: f64,
 ) -> std::io::Result<()> {
     writeln!(out, "{}: {}", scene.name, scene.about)?;
-    writeln!(out, "\n{:<18} {:<4} {:>6} {:>9}  what it is", "effect", "", "states", "cost, ns")?;
+    writeln!(
+        out,
+        "\n{:<18} {:<4} {:>6} {:>9}  what it is",
+        "effect", "", "states", "cost, ns"
+    )?;
     for e in effects {
         let cost = e.cost_ns.map_or(String::new(), |c| format!("{c:.0}"));
-        let states = if e.on { e.adds_state.to_string() } else { String::new() };
-        writeln!(out, "{:<18} {:<4} {states:>6} {cost:>9}  {}", e.name, if e.on { "on" } else { "-" }, e.about)?;
+        let states = if e.on {
+            e.adds_state.to_string()
+        } else {
+            String::new()
+        };
+        writeln!(
+            out,
+            "{:<18} {:<4} {states:>6} {cost:>9}  {}",
+            e.name,
+            if e.on { "on" } else { "-" },
+            e.about
+        )?;
     }
-    writeln!(out, "\none right-hand side: {rhs_ns:.0} ns; a simulated second: {ms_per_s:.3} ms (one core)")?;
+    writeln!(
+        out,
+        "\none right-hand side: {rhs_ns:.0} ns; a simulated second: {ms_per_s:.3} ms (one core)"
+    )?;
     let names = model.state_names();
     writeln!(out, "state, {}: {}", names.len(), shortened(&names))?;
-    writeln!(out, "\n{:<8} {:>12}  held instead: worst error within {:.0} s", "freedom", "RMS", scene.duration_s.min(TRIAL_S))?;
+    writeln!(
+        out,
+        "\n{:<8} {:>12}  held instead: worst error within {:.0} s",
+        "freedom",
+        "RMS",
+        scene.duration_s.min(TRIAL_S)
+    )?;
     for (i, t) in trials.iter().enumerate() {
         let linear = ["x", "y", "height"].contains(&t.name.as_str());
-        let excursion = if linear { format!("{:.4} m", t.excursion) } else { format!("{:.3} deg", t.excursion.to_degrees()) };
+        let excursion = if linear {
+            format!("{:.4} m", t.excursion)
+        } else {
+            format!("{:.3} deg", t.excursion.to_degrees())
+        };
         let held = match &t.held {
             Ok((roll, z)) => format!("roll {:.3} deg, height {:.5} m", roll.to_degrees(), z),
             Err(reason) => reason.clone(),
@@ -205,5 +280,9 @@ fn shortened(names: &[String]) -> String {
     if names.len() <= MOST {
         return names.join(", ");
     }
-    format!("{}, ... {} more", names[..MOST].join(", "), names.len() - MOST)
+    format!(
+        "{}, ... {} more",
+        names[..MOST].join(", "),
+        names.len() - MOST
+    )
 }

@@ -49,30 +49,63 @@ pub enum Law {
 
 impl Default for Contact {
     fn default() -> Self {
-        Self { stiffness_n_per_m: 3000.0.into(), damping_n_s_per_m: 450.0.into(), bilateral: false, law: Law::SpringDamper, exponent: 1.0 }
+        Self {
+            stiffness_n_per_m: 3000.0.into(),
+            damping_n_s_per_m: 450.0.into(),
+            bilateral: false,
+            law: Law::SpringDamper,
+            exponent: 1.0,
+        }
     }
 }
 
 impl Contact {
     pub(super) fn check(&self, scene: &Scene) -> Result<(), Problem> {
         let n = scene.carriers.count();
-        let (k, c) = ("effects.contact.stiffness_n_per_m", "effects.contact.damping_n_s_per_m");
+        let (k, c) = (
+            "effects.contact.stiffness_n_per_m",
+            "effects.contact.damping_n_s_per_m",
+        );
         Checker::per_carrier(k, &self.stiffness_n_per_m, n)?;
         Checker::per_carrier(c, &self.damping_n_s_per_m, n)?;
-        self.stiffness_n_per_m.values().iter().try_for_each(|&x| Checker::not_negative(k, x))?;
-        self.damping_n_s_per_m.values().iter().try_for_each(|&x| Checker::not_negative(c, x))?;
+        self.stiffness_n_per_m
+            .values()
+            .iter()
+            .try_for_each(|&x| Checker::not_negative(k, x))?;
+        self.damping_n_s_per_m
+            .values()
+            .iter()
+            .try_for_each(|&x| Checker::not_negative(c, x))?;
         Checker::positive("effects.contact.exponent", self.exponent)?;
         if self.law == Law::HuntCrossley {
             if self.bilateral {
-                return Err(problem("effects.contact.law", "hunt-crossley cannot pull; leave `bilateral` out"));
+                return Err(problem(
+                    "effects.contact.law",
+                    "hunt-crossley cannot pull; leave `bilateral` out",
+                ));
             }
             if !(1.0..=3.0).contains(&self.exponent) {
-                return Err(problem("effects.contact.exponent", format!("found {}, expected 1 to 3", self.exponent)));
+                return Err(problem(
+                    "effects.contact.exponent",
+                    format!("found {}, expected 1 to 3", self.exponent),
+                ));
             }
-            return self.stiffness_n_per_m.values().iter().try_for_each(|&x| Checker::positive(k, x));
+            return self
+                .stiffness_n_per_m
+                .values()
+                .iter()
+                .try_for_each(|&x| Checker::positive(k, x));
         }
-        let pushes = (0..n).all(|i| self.stiffness_n_per_m.get(i) > 0.0 || self.damping_n_s_per_m.get(i) > 0.0);
-        if pushes { Ok(()) } else { Err(problem(k, "stiffness and damping are both zero; leave the effect out instead")) }
+        let pushes = (0..n)
+            .all(|i| self.stiffness_n_per_m.get(i) > 0.0 || self.damping_n_s_per_m.get(i) > 0.0);
+        if pushes {
+            Ok(())
+        } else {
+            Err(problem(
+                k,
+                "stiffness and damping are both zero; leave the effect out instead",
+            ))
+        }
     }
 
     pub(super) fn build(&self, scene: &Scene, model: &mut Model) {
@@ -87,14 +120,23 @@ impl Contact {
                 1.0
             }
             Law::HuntCrossley => {
-                let per_rate = (0..n).map(|i| self.damping_n_s_per_m.get(i) / self.stiffness_n_per_m.get(i));
-                let law = HuntCrossley { stiffness, per_rate: pack(per_rate), exponent: self.exponent };
+                let per_rate =
+                    (0..n).map(|i| self.damping_n_s_per_m.get(i) / self.stiffness_n_per_m.get(i));
+                let law = HuntCrossley {
+                    stiffness,
+                    per_rate: pack(per_rate),
+                    exponent: self.exponent,
+                };
                 model.add(Stage::Handles, law.clone());
                 model.add_account("contact", law);
                 self.exponent
             }
         };
-        model.set_contact_springs(self.bilateral, (0..n).map(|i| self.stiffness_n_per_m.get(i)), exponent);
+        model.set_contact_springs(
+            self.bilateral,
+            (0..n).map(|i| self.stiffness_n_per_m.get(i)),
+            exponent,
+        );
     }
 }
 
@@ -113,7 +155,10 @@ impl HuntCrossley {
         let bent = if self.exponent == 1.0 {
             gap
         } else {
-            f64x2::new(gap.to_array().map(|d| d.abs().powf(self.exponent).copysign(d)))
+            f64x2::new(
+                gap.to_array()
+                    .map(|d| d.abs().powf(self.exponent).copysign(d)),
+            )
         };
         self.stiffness[p] * bent
     }
@@ -141,14 +186,20 @@ impl Account for HuntCrossley {
             work += w.pair[p].normal * w.pair[p].base_rate[2];
             absorbed += (w.pair[p].normal - spring) * w.pair[p].gap_rate[2];
         }
-        Power { work_w: crate::lanes::sum(work), dissipated_w: crate::lanes::sum(absorbed) }
+        Power {
+            work_w: crate::lanes::sum(work),
+            dissipated_w: crate::lanes::sum(absorbed),
+        }
     }
 
     fn stored_j(&self, w: &Workspace) -> f64 {
         let mut stored = f64x2::ZERO;
         for p in 0..w.pair.len() {
             let in_contact = in_contact(&w.pair[p]);
-            stored += in_contact & (self.spring(p, w.pair[p].gap[2]) * w.pair[p].gap[2] * (1.0 / (self.exponent + 1.0)));
+            stored += in_contact
+                & (self.spring(p, w.pair[p].gap[2])
+                    * w.pair[p].gap[2]
+                    * (1.0 / (self.exponent + 1.0)));
         }
         crate::lanes::sum(stored)
     }
@@ -182,7 +233,10 @@ impl Account for SpringDampers {
             work += p.normal * p.base_rate[2];
             absorbed += (p.normal - spring) * p.gap_rate[2];
         }
-        Power { work_w: crate::lanes::sum(work), dissipated_w: crate::lanes::sum(absorbed) }
+        Power {
+            work_w: crate::lanes::sum(work),
+            dissipated_w: crate::lanes::sum(absorbed),
+        }
     }
 
     fn stored_j(&self, w: &Workspace) -> f64 {

@@ -47,8 +47,19 @@ impl Graph {
             Self::Chain => {
                 let mut order: Vec<usize> = (0..handles.len()).collect();
                 let key = |i: usize| (handles[i][1], handles[i][0]);
-                order.sort_by(|&a, &b| key(a).0.total_cmp(&key(b).0).then(key(a).1.total_cmp(&key(b).1)));
-                Some(order.windows(2).filter(|w| key(w[0]).0 == key(w[1]).0).map(|w| [w[0], w[1]]).collect())
+                order.sort_by(|&a, &b| {
+                    key(a)
+                        .0
+                        .total_cmp(&key(b).0)
+                        .then(key(a).1.total_cmp(&key(b).1))
+                });
+                Some(
+                    order
+                        .windows(2)
+                        .filter(|w| key(w[0]).0 == key(w[1]).0)
+                        .map(|w| [w[0], w[1]])
+                        .collect(),
+                )
             }
         }
     }
@@ -56,24 +67,39 @@ impl Graph {
 
 impl Default for Coupling {
     fn default() -> Self {
-        Self { strength_rad_per_s: 0.5, graph: Graph::All }
+        Self {
+            strength_rad_per_s: 0.5,
+            graph: Graph::All,
+        }
     }
 }
 
 impl Coupling {
     pub(super) fn check(&self, scene: &Scene) -> Result<(), Problem> {
-        Checker::finite("effects.coupling.strength_rad_per_s", self.strength_rad_per_s)?;
+        Checker::finite(
+            "effects.coupling.strength_rad_per_s",
+            self.strength_rad_per_s,
+        )?;
         let (key, n) = ("effects.coupling.graph", scene.carriers.count());
         if let Graph::Edges(list) = &self.graph {
             for (k, [a, b]) in list.iter().enumerate() {
                 if a == b {
-                    return Err(problem(key, format!("found the pair [{a}, {b}], expected two different carriers")));
+                    return Err(problem(
+                        key,
+                        format!("found the pair [{a}, {b}], expected two different carriers"),
+                    ));
                 }
                 if let Some(i) = [a, b].into_iter().find(|&&i| i >= n) {
-                    return Err(problem(key, format!("found carrier {i}, but there are {n}, numbered from 0")));
+                    return Err(problem(
+                        key,
+                        format!("found carrier {i}, but there are {n}, numbered from 0"),
+                    ));
                 }
                 if list[..k].iter().any(|e| e == &[*a, *b] || e == &[*b, *a]) {
-                    return Err(problem(key, format!("the pair [{a}, {b}] stands there twice")));
+                    return Err(problem(
+                        key,
+                        format!("the pair [{a}, {b}] stands there twice"),
+                    ));
                 }
             }
         }
@@ -84,11 +110,17 @@ impl Coupling {
         model.need_phases();
         let n = scene.carriers.count();
         match self.graph.pairs(&scene.carriers.handles_m) {
-            None => model.add(Stage::Phases, MeanField { gain: self.strength_rad_per_s / n as f64 }),
+            None => model.add(
+                Stage::Phases,
+                MeanField {
+                    gain: self.strength_rad_per_s / n as f64,
+                },
+            ),
             Some(edges) => {
                 let mut gain = vec![1.0; n];
                 edges.iter().flatten().for_each(|&i| gain[i] += 1.0);
-                gain.iter_mut().for_each(|g| *g = self.strength_rad_per_s / *g);
+                gain.iter_mut()
+                    .for_each(|g| *g = self.strength_rad_per_s / *g);
                 model.add(Stage::Phases, Network { edges, gain });
             }
         }
@@ -106,8 +138,12 @@ impl Term for Network {
     fn apply(&self, _t_s: f64, w: &mut Workspace) {
         for &[a, b] in &self.edges {
             // sin(φ_b − φ_a) from the sines and cosines that are there already.
-            let pull = w.of(b, |p| p.sin) * w.of(a, |p| p.cos) - w.of(b, |p| p.cos) * w.of(a, |p| p.sin);
-            let (to_a, to_b) = (w.of(a, |p| p.rate) + self.gain[a] * pull, w.of(b, |p| p.rate) - self.gain[b] * pull);
+            let pull =
+                w.of(b, |p| p.sin) * w.of(a, |p| p.cos) - w.of(b, |p| p.cos) * w.of(a, |p| p.sin);
+            let (to_a, to_b) = (
+                w.of(a, |p| p.rate) + self.gain[a] * pull,
+                w.of(b, |p| p.rate) - self.gain[b] * pull,
+            );
             *w.of_mut(a, |p| &mut p.rate) = to_a;
             *w.of_mut(b, |p| &mut p.rate) = to_b;
         }

@@ -46,10 +46,16 @@ impl Drum {
     pub(super) fn check(&self, scene: &Scene) -> Result<(), Problem> {
         let key = |name: &str| format!("effects.drum.{name}");
         if scene.effects.music.is_none() {
-            return Err(problem("effects.drum", "there is no `effects.music` whose beat it could sound"));
+            return Err(problem(
+                "effects.drum",
+                "there is no `effects.music` whose beat it could sound",
+            ));
         }
         if !(1000..=192_000).contains(&self.sample_rate_hz) {
-            return Err(problem(&key("sample_rate_hz"), format!("found {}, expected 1000 to 192000", self.sample_rate_hz)));
+            return Err(problem(
+                &key("sample_rate_hz"),
+                format!("found {}, expected 1000 to 192000", self.sample_rate_hz),
+            ));
         }
         Checker::positive(&key("pitch_hz"), self.pitch_hz)?;
         Checker::positive(&key("decay_s"), self.decay_s)?;
@@ -59,11 +65,17 @@ impl Drum {
         if self.clock_offset_s.abs() > 1e9 || scene.epoch_s + self.clock_offset_s < 0.0 {
             return Err(problem(
                 &key("clock_offset_s"),
-                format!("found {}: its stamps would lie before 1970; give the scene an epoch_s", self.clock_offset_s),
+                format!(
+                    "found {}: its stamps would lie before 1970; give the scene an epoch_s",
+                    self.clock_offset_s
+                ),
             ));
         }
         if self.clock_drift_ppm.is_nan() || self.clock_drift_ppm.abs() > 1e5 {
-            return Err(problem(&key("clock_drift_ppm"), format!("found {}, expected -1e5 to 1e5", self.clock_drift_ppm)));
+            return Err(problem(
+                &key("clock_drift_ppm"),
+                format!("found {}, expected -1e5 to 1e5", self.clock_drift_ppm),
+            ));
         }
         Ok(())
     }
@@ -73,7 +85,9 @@ impl Drum {
         let clock_drift = self.clock_drift_ppm * 1e-6;
         let strokes = beat.strokes(scene.duration_s);
         // OK because a checked scene lasts less than 2^53 samples.
-        let samples = (scene.duration_s * f64::from(self.sample_rate_hz) * (1.0 + clock_drift)).floor() as u64 + 1;
+        let samples = (scene.duration_s * f64::from(self.sample_rate_hz) * (1.0 + clock_drift))
+            .floor() as u64
+            + 1;
         model.set_track(Track {
             rate_hz: self.sample_rate_hz,
             samples,

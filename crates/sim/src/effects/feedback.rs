@@ -11,7 +11,6 @@
 //! Source: Nessler et al. (2016), phase resetting in gait; Kuramoto, *Chemical Oscillations* (1984), ch. 3, for the form.
 //! The paper's scenes have none: there the phases never feel the load.
 
-
 use crate::model::{Model, Stage, Term, Workspace};
 use crate::scene::{Checker, Problem, Scene};
 use schemars::JsonSchema;
@@ -31,13 +30,20 @@ pub struct Feedback {
 
 impl Default for Feedback {
     fn default() -> Self {
-        Self { strength_rad_per_s: 0.3, phase_rad: 0.0, latency_s: 0.1 }
+        Self {
+            strength_rad_per_s: 0.3,
+            phase_rad: 0.0,
+            latency_s: 0.1,
+        }
     }
 }
 
 impl Feedback {
     pub(super) fn check(&self, _scene: &Scene) -> Result<(), Problem> {
-        Checker::finite("effects.feedback.strength_rad_per_s", self.strength_rad_per_s)?;
+        Checker::finite(
+            "effects.feedback.strength_rad_per_s",
+            self.strength_rad_per_s,
+        )?;
         Checker::finite("effects.feedback.phase_rad", self.phase_rad)?;
         Checker::positive("effects.feedback.latency_s", self.latency_s)
     }

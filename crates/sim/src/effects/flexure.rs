@@ -32,7 +32,11 @@ pub struct Flexure {
 impl Default for Flexure {
     /// A 5 m pole of deodar, 12 cm thick: some 25 kg of wood, of which a quarter moves with its ends.
     fn default() -> Self {
-        Self { frequency_hz: 6.0, damping_ratio: 0.02, modal_mass_kg: 6.0 }
+        Self {
+            frequency_hz: 6.0,
+            damping_ratio: 0.02,
+            modal_mass_kg: 6.0,
+        }
     }
 }
 
@@ -52,17 +56,26 @@ impl Flexure {
         let mut poles = Vec::new();
         for (k, y) in lines.into_iter().enumerate() {
             let on = |h: &[f64; 3]| h[1] == y;
-            let end = handles.iter().filter(|h| on(h)).fold(0.0_f64, |m, h| m.max(h[0].abs()));
+            let end = handles
+                .iter()
+                .filter(|h| on(h))
+                .fold(0.0_f64, |m, h| m.max(h[0].abs()));
             if end == 0.0 {
                 continue;
             }
-            let names = [format!("pole_{}_m", k + 1), format!("pole_{}_m_per_s", k + 1)];
+            let names = [
+                format!("pole_{}_m", k + 1),
+                format!("pole_{}_m_per_s", k + 1),
+            ];
             let first = model.add_states(names.map(|name| (name, 0.0)));
             let shape = |h: &[f64; 3]| {
                 let u = h[0].abs() / end;
                 if on(h) { 0.5 * u * u * (3.0 - u) } else { 0.0 }
             };
-            poles.push(Pole { first, shape: pack(handles.iter().map(shape)) });
+            poles.push(Pole {
+                first,
+                shape: pack(handles.iter().map(shape)),
+            });
         }
         let law = Bending {
             poles,
@@ -97,9 +110,13 @@ impl Bending {
     pub(crate) fn bend(&self, w: &mut Workspace) {
         let r = w.rotation;
         let [ux, uy, uz] = r.map(|row| row[2]);
-        let [wx, wy, wz] = r.map(|row| row[0] * w.spin[0] + row[1] * w.spin[1] + row[2] * w.spin[2]);
+        let [wx, wy, wz] =
+            r.map(|row| row[0] * w.spin[0] + row[1] * w.spin[1] + row[2] * w.spin[2]);
         // The deflection turns with the body: its rate is q̇ u + q ω × u.
-        let (up, swept) = ([ux, uy, uz], [wy * uz - wz * uy, wz * ux - wx * uz, wx * uy - wy * ux]);
+        let (up, swept) = (
+            [ux, uy, uz],
+            [wy * uz - wz * uy, wz * ux - wx * uz, wx * uy - wy * ux],
+        );
         for pole in &self.poles {
             let (q, rate) = (w.extra[pole.first], w.extra[pole.first + 1]);
             for (p, shape) in w.pair.iter_mut().zip(&pole.shape) {
@@ -123,19 +140,29 @@ impl Term for Bending {
             }
             let (q, rate) = (w.extra[pole.first], w.extra[pole.first + 1]);
             w.extra_rate[pole.first] = rate;
-            w.extra_rate[pole.first + 1] = (sum(load) - self.stiffness * q - self.damping * rate) / self.mass;
+            w.extra_rate[pole.first + 1] =
+                (sum(load) - self.stiffness * q - self.damping * rate) / self.mass;
         }
     }
 }
 
 impl Account for Bending {
     fn power(&self, w: &Workspace) -> Power {
-        let rate2: f64 = self.poles.iter().map(|p| w.extra[p.first + 1].powi(2)).sum();
-        Power { work_w: 0.0, dissipated_w: self.damping * rate2 }
+        let rate2: f64 = self
+            .poles
+            .iter()
+            .map(|p| w.extra[p.first + 1].powi(2))
+            .sum();
+        Power {
+            work_w: 0.0,
+            dissipated_w: self.damping * rate2,
+        }
     }
 
     fn stored_j(&self, w: &Workspace) -> f64 {
-        let of = |p: &Pole| self.stiffness * w.extra[p.first].powi(2) + self.mass * w.extra[p.first + 1].powi(2);
+        let of = |p: &Pole| {
+            self.stiffness * w.extra[p.first].powi(2) + self.mass * w.extra[p.first + 1].powi(2)
+        };
         0.5 * self.poles.iter().map(of).sum::<f64>()
     }
 }

@@ -28,6 +28,8 @@ impl FrequencySpread {
     }
 
     pub(super) fn build(&self, scene: &Scene, model: &mut Model) {
-        model.shift_frequencies(|i| std::f64::consts::TAU * self.sd_hz * normal(scene.seed, Stream::Frequency, i, 0));
+        model.shift_frequencies(|i| {
+            std::f64::consts::TAU * self.sd_hz * normal(scene.seed, Stream::Frequency, i, 0)
+        });
     }
 }

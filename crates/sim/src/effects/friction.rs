@@ -67,22 +67,35 @@ impl Default for Friction {
 
 impl Friction {
     pub(super) fn check(&self, scene: &Scene) -> Result<(), Problem> {
-        Checker::positive("effects.friction.bristle_stiffness_per_m", self.bristle_stiffness_per_m)?;
-        Checker::not_negative("effects.friction.bristle_damping_s_per_m", self.bristle_damping_s_per_m)?;
+        Checker::positive(
+            "effects.friction.bristle_stiffness_per_m",
+            self.bristle_stiffness_per_m,
+        )?;
+        Checker::not_negative(
+            "effects.friction.bristle_damping_s_per_m",
+            self.bristle_damping_s_per_m,
+        )?;
         if self.law == Law::Bristle {
             if scene.effects.hold.is_some() || scene.effects.sling.is_some() {
-                return Err(problem("effects.friction.law", "bristles are an elastic hold already; leave `effects.hold` and `effects.sling` out"));
+                return Err(problem(
+                    "effects.friction.law",
+                    "bristles are an elastic hold already; leave `effects.hold` and `effects.sling` out",
+                ));
             }
             Checker::positive("effects.friction.coefficient", self.coefficient)?;
         }
         Checker::not_negative("effects.friction.coefficient", self.coefficient)?;
-        Checker::positive("effects.friction.regularising_velocity_m_per_s", self.regularising_velocity_m_per_s)
+        Checker::positive(
+            "effects.friction.regularising_velocity_m_per_s",
+            self.regularising_velocity_m_per_s,
+        )
     }
 
     pub(super) fn build(&self, scene: &Scene, model: &mut Model) {
         if self.law == Law::Bristle {
             let n = scene.carriers.count();
-            let names = (1..=n).flat_map(|i| ["x", "y"].map(|axis| (format!("bristle_{i}_{axis}_m"), 0.0)));
+            let names =
+                (1..=n).flat_map(|i| ["x", "y"].map(|axis| (format!("bristle_{i}_{axis}_m"), 0.0)));
             let first = model.add_states(names);
             let law = Bristles {
                 first,
@@ -92,10 +105,19 @@ impl Friction {
                 per_length: self.bristle_stiffness_per_m / self.coefficient,
             };
             model.add(Stage::Handles, law.clone());
-            model.add_account("friction", Coulomb { mu: 0.0, per_velocity: 0.0 });
+            model.add_account(
+                "friction",
+                Coulomb {
+                    mu: 0.0,
+                    per_velocity: 0.0,
+                },
+            );
             return;
         }
-        let law = Coulomb { mu: self.coefficient, per_velocity: 1.0 / self.regularising_velocity_m_per_s };
+        let law = Coulomb {
+            mu: self.coefficient,
+            per_velocity: 1.0 / self.regularising_velocity_m_per_s,
+        };
         if scene.effects.hold.is_some() || scene.effects.sling.is_some() {
             // The hold's or the sling's account books the limited force.
             model.add(Stage::Handles, Limit(law));
@@ -119,7 +141,9 @@ impl Coulomb {
         let most = (normal * self.mu).fast_max(f64x2::ZERO);
         let wanted = [0, 1].map(|a| hold[a] + most * (rate[a] * self.per_velocity));
         let tiny = f64x2::splat(f64::MIN_POSITIVE);
-        let length = (most * most + wanted[0] * wanted[0] + wanted[1] * wanted[1]).fast_max(tiny).sqrt();
+        let length = (most * most + wanted[0] * wanted[0] + wanted[1] * wanted[1])
+            .fast_max(tiny)
+            .sqrt();
         wanted.map(|e| e * (most / length))
     }
 }
@@ -145,7 +169,8 @@ impl Term for Bristles {
                 let bent = w.extra[at];
                 let rate = slide[axis] - self.per_length * speed * bent;
                 w.extra_rate[at] = rate;
-                *w.of_mut(i, |p| &mut p.tangential[axis]) = load * (self.stiffness * bent + self.damping * rate);
+                *w.of_mut(i, |p| &mut p.tangential[axis]) =
+                    load * (self.stiffness * bent + self.damping * rate);
             }
         }
     }
@@ -157,7 +182,9 @@ struct Limit(Coulomb);
 impl Term for Limit {
     fn apply(&self, _t_s: f64, w: &mut Workspace) {
         for p in &mut w.pair {
-            p.tangential = self.0.limited(p.normal, p.tangential, [p.gap_rate[0], p.gap_rate[1]]);
+            p.tangential = self
+                .0
+                .limited(p.normal, p.tangential, [p.gap_rate[0], p.gap_rate[1]]);
         }
     }
 }
@@ -168,7 +195,9 @@ struct Alone(Coulomb);
 impl Term for Alone {
     fn apply(&self, _t_s: f64, w: &mut Workspace) {
         for p in &mut w.pair {
-            p.tangential = self.0.limited(p.normal, [f64x2::ZERO; 2], [p.gap_rate[0], p.gap_rate[1]]);
+            p.tangential =
+                self.0
+                    .limited(p.normal, [f64x2::ZERO; 2], [p.gap_rate[0], p.gap_rate[1]]);
         }
     }
 }
@@ -182,7 +211,10 @@ impl Account for Coulomb {
                 absorbed += p.tangential[axis] * p.gap_rate[axis];
             }
         }
-        Power { work_w: sum(work), dissipated_w: sum(absorbed) }
+        Power {
+            work_w: sum(work),
+            dissipated_w: sum(absorbed),
+        }
     }
 }
 
@@ -193,9 +225,17 @@ mod tests {
     #[test]
     fn the_limits_are_coulomb_and_the_hold() {
         let at = |mu: f64, vs: f64, n: f64, hold: f64, v: f64| {
-            let law = Coulomb { mu, per_velocity: 1.0 / vs };
+            let law = Coulomb {
+                mu,
+                per_velocity: 1.0 / vs,
+            };
             let zero = f64x2::ZERO;
-            law.limited(f64x2::splat(n), [f64x2::splat(hold), zero], [f64x2::splat(v), zero])[0].to_array()[0]
+            law.limited(
+                f64x2::splat(n),
+                [f64x2::splat(hold), zero],
+                [f64x2::splat(v), zero],
+            )[0]
+            .to_array()[0]
         };
         // Sliding fast: μN along the sliding. Against it: the same, other sign.
         assert!((at(0.5, 1e-6, 100.0, 0.0, 1.0) - 50.0).abs() < 1e-9);

@@ -48,7 +48,12 @@ const HIGHEST_ORDER: u32 = 64;
 
 impl Default for Gait {
     fn default() -> Self {
-        Self { amplitude_m: 0.06.into(), sway_m: 0.0.into(), sway_phase_rad: 0.0, harmonics: Vec::new() }
+        Self {
+            amplitude_m: 0.06.into(),
+            sway_m: 0.0.into(),
+            sway_phase_rad: 0.0,
+            harmonics: Vec::new(),
+        }
     }
 }
 
@@ -63,10 +68,16 @@ impl Gait {
             Checker::all_finite(key, &h.amplitude_m)?;
             Checker::all_finite(key, &h.phase_rad)?;
             if !(1..=HIGHEST_ORDER).contains(&h.order) {
-                return Err(problem(key, format!("found order {}, expected 1 to {HIGHEST_ORDER}", h.order)));
+                return Err(problem(
+                    key,
+                    format!("found order {}, expected 1 to {HIGHEST_ORDER}", h.order),
+                ));
             }
             if let Some(i) = h.carriers.iter().flatten().find(|&&i| i >= n) {
-                return Err(problem(key, format!("found carrier {i}, but there are {n}, numbered from 0")));
+                return Err(problem(
+                    key,
+                    format!("found carrier {i}, but there are {n}, numbered from 0"),
+                ));
             }
         }
         Ok(())
@@ -79,7 +90,14 @@ impl Gait {
         let mut add = |axis: usize, order: u32, amplitude: Vec<f64>, phase: f64| {
             if amplitude.iter().any(|a| *a != 0.0) {
                 let part = |f: f64| pack(amplitude.iter().map(|a| a * f));
-                waves.push(Wave { axis, order, parts: part(phase.cos()).into_iter().zip(part(phase.sin())).collect() });
+                waves.push(Wave {
+                    axis,
+                    order,
+                    parts: part(phase.cos())
+                        .into_iter()
+                        .zip(part(phase.sin()))
+                        .collect(),
+                });
             }
         };
         let each = |x: &PerCarrier| (0..n).map(|i| x.get(i)).collect::<Vec<f64>>();
@@ -88,7 +106,9 @@ impl Gait {
         for h in &self.harmonics {
             let who = |i: usize| h.carriers.as_ref().is_none_or(|list| list.contains(&i));
             for axis in 0..3 {
-                let amplitude = (0..n).map(|i| if who(i) { h.amplitude_m[axis] } else { 0.0 }).collect();
+                let amplitude = (0..n)
+                    .map(|i| if who(i) { h.amplitude_m[axis] } else { 0.0 })
+                    .collect();
                 add(axis, h.order, amplitude, h.phase_rad[axis]);
             }
         }

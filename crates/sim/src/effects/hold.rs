@@ -25,7 +25,10 @@ pub struct Hold {
 
 impl Default for Hold {
     fn default() -> Self {
-        Self { stiffness_n_per_m: 3000.0.into(), damping_n_s_per_m: 150.0.into() }
+        Self {
+            stiffness_n_per_m: 3000.0.into(),
+            damping_n_s_per_m: 150.0.into(),
+        }
     }
 }
 
@@ -36,7 +39,9 @@ impl Hold {
             ("effects.hold.damping_n_s_per_m", &self.damping_n_s_per_m),
         ] {
             Checker::per_carrier(key, x, scene.carriers.count())?;
-            x.values().iter().try_for_each(|&v| Checker::not_negative(key, v))?;
+            x.values()
+                .iter()
+                .try_for_each(|&v| Checker::not_negative(key, v))?;
         }
         Ok(())
     }
@@ -74,7 +79,10 @@ impl Account for SpringDampers {
                 absorbed += (p.tangential[axis] - spring) * p.gap_rate[axis];
             }
         }
-        Power { work_w: crate::lanes::sum(work), dissipated_w: crate::lanes::sum(absorbed) }
+        Power {
+            work_w: crate::lanes::sum(work),
+            dissipated_w: crate::lanes::sum(absorbed),
+        }
     }
 
     fn stored_j(&self, w: &Workspace) -> f64 {

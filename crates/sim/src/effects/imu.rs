@@ -113,18 +113,39 @@ impl Imu {
         let key = |name: &str| format!("effects.imu.{name}");
         Checker::positive(&key("rate_hz"), self.rate_hz)?;
         if self.rate_hz * scene.duration_s * self.sensors.len().max(1) as f64 > MOST_SAMPLES {
-            return Err(problem(&key("rate_hz"), format!("{} Hz for {} s are more than {MOST_SAMPLES:e} samples", self.rate_hz, scene.duration_s)));
+            return Err(problem(
+                &key("rate_hz"),
+                format!(
+                    "{} Hz for {} s are more than {MOST_SAMPLES:e} samples",
+                    self.rate_hz, scene.duration_s
+                ),
+            ));
         }
         if !(0.0..=1.0).contains(&self.dropout) {
-            return Err(problem(&key("dropout"), format!("found {}, expected a probability from 0 to 1", self.dropout)));
+            return Err(problem(
+                &key("dropout"),
+                format!("found {}, expected a probability from 0 to 1", self.dropout),
+            ));
         }
         for (name, x) in [
-            ("gyro_noise_rad_per_s_per_sqrt_hz", self.gyro_noise_rad_per_s_per_sqrt_hz),
-            ("gyro_bias_walk_rad_per_s2_per_sqrt_hz", self.gyro_bias_walk_rad_per_s2_per_sqrt_hz),
+            (
+                "gyro_noise_rad_per_s_per_sqrt_hz",
+                self.gyro_noise_rad_per_s_per_sqrt_hz,
+            ),
+            (
+                "gyro_bias_walk_rad_per_s2_per_sqrt_hz",
+                self.gyro_bias_walk_rad_per_s2_per_sqrt_hz,
+            ),
             ("gyro_bias_sd_rad_per_s", self.gyro_bias_sd_rad_per_s),
             ("gyro_resolution_rad_per_s", self.gyro_resolution_rad_per_s),
-            ("accel_noise_m_per_s2_per_sqrt_hz", self.accel_noise_m_per_s2_per_sqrt_hz),
-            ("accel_bias_walk_m_per_s3_per_sqrt_hz", self.accel_bias_walk_m_per_s3_per_sqrt_hz),
+            (
+                "accel_noise_m_per_s2_per_sqrt_hz",
+                self.accel_noise_m_per_s2_per_sqrt_hz,
+            ),
+            (
+                "accel_bias_walk_m_per_s3_per_sqrt_hz",
+                self.accel_bias_walk_m_per_s3_per_sqrt_hz,
+            ),
             ("accel_bias_sd_m_per_s2", self.accel_bias_sd_m_per_s2),
             ("accel_resolution_m_per_s2", self.accel_resolution_m_per_s2),
             ("scale_error_sd", self.scale_error_sd),
@@ -135,35 +156,56 @@ impl Imu {
         Checker::positive(&key("gyro_range_rad_per_s"), self.gyro_range_rad_per_s)?;
         Checker::positive(&key("accel_range_m_per_s2"), self.accel_range_m_per_s2)?;
         if self.sensors.is_empty() {
-            return Err(problem(&key("sensors"), "the list is empty; leave the effect out instead"));
+            return Err(problem(
+                &key("sensors"),
+                "the list is empty; leave the effect out instead",
+            ));
         }
         let names = self.names();
         for (i, sensor) in self.sensors.iter().enumerate() {
             let key = |name: &str| format!("effects.imu.sensors.{i}.{name}");
             seat(sensor, scene.carriers.count()).map_err(|m| problem(&key("on"), m))?;
             Checker::all_finite(&key("place_m"), &sensor.place_m)?;
-            Checker::all_finite(&key("mounting_roll_pitch_yaw_deg"), &sensor.mounting_roll_pitch_yaw_deg)?;
+            Checker::all_finite(
+                &key("mounting_roll_pitch_yaw_deg"),
+                &sensor.mounting_roll_pitch_yaw_deg,
+            )?;
             Checker::finite(&key("clock_offset_s"), sensor.clock_offset_s)?;
             if scene.epoch_s + sensor.clock_offset_s < 0.0 {
                 return Err(problem(
                     &key("clock_offset_s"),
-                    format!("found {}: its stamps would lie before 1970; give the scene an epoch_s", sensor.clock_offset_s),
+                    format!(
+                        "found {}: its stamps would lie before 1970; give the scene an epoch_s",
+                        sensor.clock_offset_s
+                    ),
                 ));
             }
             if sensor.clock_offset_s.abs() > 1e9 {
-                return Err(problem(&key("clock_offset_s"), format!("found {}, expected at most 1e9", sensor.clock_offset_s)));
+                return Err(problem(
+                    &key("clock_offset_s"),
+                    format!("found {}, expected at most 1e9", sensor.clock_offset_s),
+                ));
             }
             if sensor.clock_drift_ppm.is_nan() || sensor.clock_drift_ppm.abs() > 1e5 {
-                return Err(problem(&key("clock_drift_ppm"), format!("found {}, expected -1e5 to 1e5", sensor.clock_drift_ppm)));
+                return Err(problem(
+                    &key("clock_drift_ppm"),
+                    format!("found {}, expected -1e5 to 1e5", sensor.clock_drift_ppm),
+                ));
             }
             if let Some(name) = &sensor.name {
                 let fits = |c: char| c.is_ascii_alphanumeric() || c == '_';
                 if name.is_empty() || !name.chars().all(fits) {
-                    return Err(problem(&key("name"), format!("found {name:?}, expected letters, digits and underscores")));
+                    return Err(problem(
+                        &key("name"),
+                        format!("found {name:?}, expected letters, digits and underscores"),
+                    ));
                 }
             }
             if names[..i].contains(&names[i]) {
-                return Err(problem(&key("name"), format!("two sensors are called `{}`", names[i])));
+                return Err(problem(
+                    &key("name"),
+                    format!("two sensors are called `{}`", names[i]),
+                ));
             }
         }
         Ok(())
@@ -173,7 +215,10 @@ impl Imu {
     fn names(&self) -> Vec<String> {
         let mut names: Vec<String> = Vec::new();
         for (i, sensor) in self.sensors.iter().enumerate() {
-            let before = self.sensors[..i].iter().filter(|s| s.on == sensor.on && s.name.is_none()).count();
+            let before = self.sensors[..i]
+                .iter()
+                .filter(|s| s.on == sensor.on && s.name.is_none())
+                .count();
             names.push(match (&sensor.name, before) {
                 (Some(name), _) => name.clone(),
                 (None, 0) => sensor.on.clone(),
@@ -220,7 +265,8 @@ impl Imu {
             model.add_imu(crate::sensors::Imu {
                 topic: format!("/imu/{name}"),
                 frame: format!("imu_{name}"),
-                seat: seat(sensor, scene.carriers.count()).expect("a checked scene names places that exist"),
+                seat: seat(sensor, scene.carriers.count())
+                    .expect("a checked scene names places that exist"),
                 mounting: UnitQuaternion::from_euler_angles(roll, pitch, yaw),
                 rate_hz: self.rate_hz,
                 clock_offset_s: sensor.clock_offset_s,
@@ -229,7 +275,10 @@ impl Imu {
                 gyroscope,
                 accelerometer,
                 // OK because the number of sensors is far below 2^27.
-                draws: Draws { seed: scene.seed, instrument: i as u32 },
+                draws: Draws {
+                    seed: scene.seed,
+                    instrument: i as u32,
+                },
             });
         }
     }
@@ -239,15 +288,24 @@ fn seat(sensor: &Sensor, carriers: usize) -> Result<Seat, String> {
     if sensor.on == "rath" {
         return Ok(Seat::Body(sensor.place_m));
     }
-    let number: Option<usize> = sensor.on.strip_prefix("carrier_").and_then(|n| n.parse().ok());
+    let number: Option<usize> = sensor
+        .on
+        .strip_prefix("carrier_")
+        .and_then(|n| n.parse().ok());
     match number {
         Some(i) if (1..=carriers).contains(&i) => {
             if sensor.place_m == [0.0; 3] {
                 Ok(Seat::Carrier(i - 1))
             } else {
-                Err(format!("a sensor on `{}` sits at the shoulder; leave its place_m out", sensor.on))
+                Err(format!(
+                    "a sensor on `{}` sits at the shoulder; leave its place_m out",
+                    sensor.on
+                ))
             }
         }
-        _ => Err(format!("found `{}`, expected `rath` or `carrier_1` to `carrier_{carriers}`", sensor.on)),
+        _ => Err(format!(
+            "found `{}`, expected `rath` or `carrier_1` to `carrier_{carriers}`",
+            sensor.on
+        )),
     }
 }

@@ -25,7 +25,11 @@ pub struct Lift {
 
 impl Default for Lift {
     fn default() -> Self {
-        Self { gain: 1.2, onset_s: 0.0, build_up_s: 0.0 }
+        Self {
+            gain: 1.2,
+            onset_s: 0.0,
+            build_up_s: 0.0,
+        }
     }
 }
 
@@ -35,10 +39,16 @@ impl Lift {
         Checker::not_negative("effects.lift.onset_s", self.onset_s)?;
         Checker::not_negative("effects.lift.build_up_s", self.build_up_s)?;
         if scene.effects.gait.is_none() {
-            return Err(problem("effects.lift", "there is no `effects.gait` whose motion it could amplify"));
+            return Err(problem(
+                "effects.lift",
+                "there is no `effects.gait` whose motion it could amplify",
+            ));
         }
         if self.onset_s > 0.0 && self.build_up_s == 0.0 {
-            return Err(problem("effects.lift.build_up_s", "found 0 with an onset after the start: the shoulders would jump"));
+            return Err(problem(
+                "effects.lift.build_up_s",
+                "found 0 with an onset after the start: the shoulders would jump",
+            ));
         }
         Ok(())
     }
@@ -48,7 +58,14 @@ impl Lift {
         if self.build_up_s == 0.0 {
             model.add(Stage::Shoulders, Constant(self.gain));
         } else {
-            model.add(Stage::Shoulders, Growing { excess, onset_s, per_s: 1.0 / self.build_up_s });
+            model.add(
+                Stage::Shoulders,
+                Growing {
+                    excess,
+                    onset_s,
+                    per_s: 1.0 / self.build_up_s,
+                },
+            );
             if onset_s > 0.0 {
                 model.add_switch(Onset(onset_s));
             }
@@ -85,7 +102,11 @@ impl Term for Growing {
     fn apply(&self, t_s: f64, w: &mut Workspace) {
         // Stages of a step that ends at the onset see t ≤ t₀; a step never straddles it.
         let decay = (-(t_s - self.onset_s).max(0.0) * self.per_s).exp();
-        let growing = if t_s >= self.onset_s { self.excess * decay * self.per_s } else { 0.0 };
+        let growing = if t_s >= self.onset_s {
+            self.excess * decay * self.per_s
+        } else {
+            0.0
+        };
         amplify(w, 1.0 + self.excess * (1.0 - decay), growing);
     }
 }
@@ -96,6 +117,10 @@ struct Onset(f64);
 
 impl Switch for Onset {
     fn next_s(&self, after_s: f64) -> f64 {
-        if after_s < self.0 { self.0 } else { f64::INFINITY }
+        if after_s < self.0 {
+            self.0
+        } else {
+            f64::INFINITY
+        }
     }
 }

@@ -84,7 +84,10 @@ macro_rules! entry {
 
 /// Every effect, in the order in which terms of the same kind are applied.
 pub const TABLE: &[Entry] = &[
-    entry!(frequency_spread, "natural gait frequencies differ from carrier to carrier"),
+    entry!(
+        frequency_spread,
+        "natural gait frequencies differ from carrier to carrier"
+    ),
     entry!(coupling, "carriers adjust to each other (Kuramoto)"),
     entry!(music, "carriers are entrained by a beat (Adler)"),
     entry!(noise, "gait phases wander (white phase noise)"),
@@ -92,13 +95,22 @@ pub const TABLE: &[Entry] = &[
     entry!(lift, "shoulders lift harder or softer than the gait alone"),
     entry!(contact, "handles rest on shoulders: spring and damper"),
     entry!(hold, "hands hold the handles sideways: spring and damper"),
-    entry!(friction, "sideways force at a handle is limited by Coulomb friction"),
+    entry!(
+        friction,
+        "sideways force at a handle is limited by Coulomb friction"
+    ),
     entry!(
         sling,
         "straps pull a handle back sideways, in proportion to the load"
     ),
-    entry!(pole_friction, "turning about the pole rubs on the shoulders, saturating"),
-    entry!(feedback, "the load that a carrier feels shifts the gait's phase"),
+    entry!(
+        pole_friction,
+        "turning about the pole rubs on the shoulders, saturating"
+    ),
+    entry!(
+        feedback,
+        "the load that a carrier feels shifts the gait's phase"
+    ),
     entry!(path, "the way slopes and turns"),
     entry!(flexure, "poles bend: their first mode"),
     entry!(imu, "virtual inertial sensors on body and carriers"),

@@ -78,12 +78,19 @@ impl Default for Music {
 impl Music {
     pub(super) fn check(&self, scene: &Scene) -> Result<(), Problem> {
         Checker::not_negative("effects.music.beat_hz", self.beat_hz)?;
-        Checker::per_carrier("effects.music.strength_rad_per_s", &self.strength_rad_per_s, scene.carriers.count())?;
+        Checker::per_carrier(
+            "effects.music.strength_rad_per_s",
+            &self.strength_rad_per_s,
+            scene.carriers.count(),
+        )?;
         Checker::not_negative("effects.music.onset_s", self.onset_s)?;
         Checker::not_negative("effects.music.build_up_s", self.build_up_s)?;
         Checker::finite("effects.music.beat_phase_rad", self.beat_phase_rad)?;
         if self.beat_hz > FASTEST_HZ {
-            return Err(problem("effects.music.beat_hz", format!("found {}, expected at most {FASTEST_HZ}", self.beat_hz)));
+            return Err(problem(
+                "effects.music.beat_hz",
+                format!("found {}, expected at most {FASTEST_HZ}", self.beat_hz),
+            ));
         }
         let mut free_s = 0.0;
         for (k, change) in self.tempo_changes.iter().enumerate() {
@@ -91,10 +98,16 @@ impl Music {
             Checker::not_negative(&key("over_s"), change.over_s)?;
             Checker::not_negative(&key("beat_hz"), change.beat_hz)?;
             if change.beat_hz > FASTEST_HZ {
-                return Err(problem(&key("beat_hz"), format!("found {}, expected at most {FASTEST_HZ}", change.beat_hz)));
+                return Err(problem(
+                    &key("beat_hz"),
+                    format!("found {}, expected at most {FASTEST_HZ}", change.beat_hz),
+                ));
             }
             if !change.at_s.is_finite() || change.at_s < free_s || change.at_s <= 0.0 {
-                return Err(problem(&key("at_s"), format!("found {}, expected a time after {free_s} s", change.at_s)));
+                return Err(problem(
+                    &key("at_s"),
+                    format!("found {}, expected a time after {free_s} s", change.at_s),
+                ));
             }
             free_s = change.at_s + change.over_s;
         }
@@ -102,10 +115,19 @@ impl Music {
         for (k, pause) in self.pauses.iter().enumerate() {
             let key = |name: &str| format!("effects.music.pauses.{k}.{name}");
             if !pause.from_s.is_finite() || pause.from_s < free_s {
-                return Err(problem(&key("from_s"), format!("found {}, expected {free_s} or later", pause.from_s)));
+                return Err(problem(
+                    &key("from_s"),
+                    format!("found {}, expected {free_s} or later", pause.from_s),
+                ));
             }
             if !pause.to_s.is_finite() || pause.to_s <= pause.from_s {
-                return Err(problem(&key("to_s"), format!("found {}, expected a time after from_s = {}", pause.to_s, pause.from_s)));
+                return Err(problem(
+                    &key("to_s"),
+                    format!(
+                        "found {}, expected a time after from_s = {}",
+                        pause.to_s, pause.from_s
+                    ),
+                ));
             }
             free_s = pause.to_s;
         }
@@ -118,16 +140,40 @@ impl Music {
         let strength = pack((0..scene.carriers.count()).map(|i| self.strength_rad_per_s.get(i)));
         let mut moments = vec![self.onset_s];
         moments.extend(self.pauses.iter().flat_map(|p| [p.from_s, p.to_s]));
-        moments.extend(self.tempo_changes.iter().flat_map(|c| [c.at_s, c.at_s + c.over_s]));
+        moments.extend(
+            self.tempo_changes
+                .iter()
+                .flat_map(|c| [c.at_s, c.at_s + c.over_s]),
+        );
         moments.retain(|t| *t > 0.0);
         moments.sort_by(f64::total_cmp);
         moments.dedup();
-        let per_s = if self.build_up_s == 0.0 { None } else { Some(1.0 / self.build_up_s) };
+        let per_s = if self.build_up_s == 0.0 {
+            None
+        } else {
+            Some(1.0 / self.build_up_s)
+        };
         if beat.pieces.len() == 1 && self.pauses.is_empty() {
             let (rate, phase) = (beat.pieces[0].rate, beat.pieces[0].phase);
-            model.add(Stage::Phases, Steady { onset_s: self.onset_s, rate, phase, strength, per_s });
+            model.add(
+                Stage::Phases,
+                Steady {
+                    onset_s: self.onset_s,
+                    rate,
+                    phase,
+                    strength,
+                    per_s,
+                },
+            );
         } else {
-            model.add(Stage::Phases, Varied { beat: beat.clone(), strength, per_s });
+            model.add(
+                Stage::Phases,
+                Varied {
+                    beat: beat.clone(),
+                    strength,
+                    per_s,
+                },
+            );
         }
         if !moments.is_empty() {
             model.add_switch(Moments(moments));
@@ -168,7 +214,12 @@ pub struct Stroke {
 
 impl Beat {
     fn new(music: &Music) -> Self {
-        let mut last = Piece { begin_s: 0.0, phase: music.beat_phase_rad, rate: TAU * music.beat_hz, bend: 0.0 };
+        let mut last = Piece {
+            begin_s: 0.0,
+            phase: music.beat_phase_rad,
+            rate: TAU * music.beat_hz,
+            bend: 0.0,
+        };
         let mut pieces = vec![last];
         for change in &music.tempo_changes {
             let rate = TAU * change.beat_hz;
@@ -191,7 +242,11 @@ impl Beat {
             let end = pieces.len() - 1;
             pieces[end] = last;
         }
-        Self { onset_s: music.onset_s, pieces, pauses: music.pauses.clone() }
+        Self {
+            onset_s: music.onset_s,
+            pieces,
+            pauses: music.pauses.clone(),
+        }
     }
 
     /// The piece in force at `t_s`; at a seam the later one.
@@ -215,14 +270,22 @@ impl Beat {
 
     /// Whether the drum sounds at `t_s`.
     pub fn sounds(&self, t_s: f64) -> bool {
-        t_s >= self.onset_s && !self.pauses.iter().any(|p| (p.from_s..p.to_s).contains(&t_s))
+        t_s >= self.onset_s
+            && !self
+                .pauses
+                .iter()
+                .any(|p| (p.from_s..p.to_s).contains(&t_s))
     }
 
     /// Every stroke up to and including `until_s`: where ψ passes a whole number of turns while the drum sounds.
     pub fn strokes(&self, until_s: f64) -> Vec<Stroke> {
         let mut strokes = Vec::new();
         for (k, p) in self.pieces.iter().enumerate() {
-            let end_s = self.pieces.get(k + 1).map_or(f64::INFINITY, |next| next.begin_s).min(until_s);
+            let end_s = self
+                .pieces
+                .get(k + 1)
+                .map_or(f64::INFINITY, |next| next.begin_s)
+                .min(until_s);
             if end_s < p.begin_s {
                 break;
             }
@@ -235,13 +298,20 @@ impl Beat {
                 let rest = (turn * TAU - p.phase).max(0.0);
                 // rate·s + ½ bend·s² = rest, by the form that stays exact for bend → 0.
                 let root = (p.rate * p.rate + 2.0 * p.bend * rest).max(0.0).sqrt();
-                let s = if rest == 0.0 { 0.0 } else { 2.0 * rest / (p.rate + root) };
+                let s = if rest == 0.0 {
+                    0.0
+                } else {
+                    2.0 * rest / (p.rate + root)
+                };
                 let t_s = p.begin_s + s;
                 if !s.is_finite() {
                     break;
                 }
                 if self.sounds(t_s) && t_s <= until_s {
-                    strokes.push(Stroke { t_s, tempo_hz: self.tempo_hz(t_s) });
+                    strokes.push(Stroke {
+                        t_s,
+                        tempo_hz: self.tempo_hz(t_s),
+                    });
                 }
                 turn += 1.0;
                 if p.rate == 0.0 && p.bend == 0.0 {
@@ -285,7 +355,12 @@ impl Term for Steady {
     fn apply(&self, t_s: f64, w: &mut Workspace) {
         // `segment_s` decides, not t: the last stage of the step that ends at the onset still hears nothing.
         if w.segment_s >= self.onset_s {
-            pull(w, self.phase + self.rate * t_s, &self.strength, grown(self.per_s, t_s - self.onset_s));
+            pull(
+                w,
+                self.phase + self.rate * t_s,
+                &self.strength,
+                grown(self.per_s, t_s - self.onset_s),
+            );
         }
     }
 }
@@ -303,7 +378,12 @@ impl Term for Varied {
             let piece = self.beat.piece(w.segment_s);
             let s = t_s - piece.begin_s;
             let phase = piece.phase + s * (piece.rate + 0.5 * piece.bend * s);
-            pull(w, phase, &self.strength, grown(self.per_s, t_s - self.beat.onset_s));
+            pull(
+                w,
+                phase,
+                &self.strength,
+                grown(self.per_s, t_s - self.beat.onset_s),
+            );
         }
     }
 }
@@ -314,7 +394,10 @@ struct Moments(Vec<f64>);
 
 impl Switch for Moments {
     fn next_s(&self, after_s: f64) -> f64 {
-        self.0.get(self.0.partition_point(|t| *t <= after_s)).copied().unwrap_or(f64::INFINITY)
+        self.0
+            .get(self.0.partition_point(|t| *t <= after_s))
+            .copied()
+            .unwrap_or(f64::INFINITY)
     }
 }
 
@@ -327,10 +410,21 @@ mod tests {
             beat_hz: 2.0,
             onset_s: 1.0,
             tempo_changes: vec![
-                TempoChange { at_s: 4.0, over_s: 2.0, beat_hz: 3.0 },
-                TempoChange { at_s: 8.0, over_s: 0.0, beat_hz: 1.0 },
+                TempoChange {
+                    at_s: 4.0,
+                    over_s: 2.0,
+                    beat_hz: 3.0,
+                },
+                TempoChange {
+                    at_s: 8.0,
+                    over_s: 0.0,
+                    beat_hz: 1.0,
+                },
             ],
-            pauses: vec![Pause { from_s: 2.0, to_s: 3.0 }],
+            pauses: vec![Pause {
+                from_s: 2.0,
+                to_s: 3.0,
+            }],
             ..Music::default()
         })
     }

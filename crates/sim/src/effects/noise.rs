@@ -26,13 +26,19 @@ pub struct Noise {
 
 impl Default for Noise {
     fn default() -> Self {
-        Self { phase_rad_per_sqrt_s: 0.01, grid_hz: 30.0 }
+        Self {
+            phase_rad_per_sqrt_s: 0.01,
+            grid_hz: 30.0,
+        }
     }
 }
 
 impl Noise {
     pub(super) fn check(&self, _scene: &Scene) -> Result<(), Problem> {
-        Checker::not_negative("effects.noise.phase_rad_per_sqrt_s", self.phase_rad_per_sqrt_s)?;
+        Checker::not_negative(
+            "effects.noise.phase_rad_per_sqrt_s",
+            self.phase_rad_per_sqrt_s,
+        )?;
         Checker::positive("effects.noise.grid_hz", self.grid_hz)
     }
 
@@ -59,7 +65,11 @@ impl Grid {
     /// The cell that begins at or before `t_s`; a time that is a grid point but for rounding belongs to the cell it begins.
     fn cell(&self, t_s: f64) -> u64 {
         let nearest = (t_s * self.grid_hz).round();
-        let cell = if nearest / self.grid_hz <= t_s { nearest } else { nearest - 1.0 };
+        let cell = if nearest / self.grid_hz <= t_s {
+            nearest
+        } else {
+            nearest - 1.0
+        };
         // OK because times are never negative and the number of cells is far below 2^53.
         cell.max(0.0) as u64
     }

@@ -38,15 +38,27 @@ pub struct Path {
 
 impl Default for Path {
     fn default() -> Self {
-        Self { slope_deg: 0.0, bank_deg: 0.0, turn_deg: 0.0, turn_start_s: 10.0, turn_time_s: 10.0 }
+        Self {
+            slope_deg: 0.0,
+            bank_deg: 0.0,
+            turn_deg: 0.0,
+            turn_start_s: 10.0,
+            turn_time_s: 10.0,
+        }
     }
 }
 
 impl Path {
     pub(super) fn check(&self, _scene: &Scene) -> Result<(), Problem> {
-        for (key, x) in [("effects.path.slope_deg", self.slope_deg), ("effects.path.bank_deg", self.bank_deg)] {
+        for (key, x) in [
+            ("effects.path.slope_deg", self.slope_deg),
+            ("effects.path.bank_deg", self.bank_deg),
+        ] {
             if x.is_nan() || x.abs() >= 60.0 {
-                return Err(problem(key, format!("found {x}, expected above -60 and below 60: nobody walks there")));
+                return Err(problem(
+                    key,
+                    format!("found {x}, expected above -60 and below 60: nobody walks there"),
+                ));
             }
         }
         Checker::finite("effects.path.turn_deg", self.turn_deg)?;
@@ -61,7 +73,11 @@ impl Path {
         }
         let size = gravity.iter().map(|g| g * g).sum::<f64>().sqrt();
         let (s, b) = (self.slope_deg.to_radians(), self.bank_deg.to_radians());
-        [-size * s.sin(), -size * b.sin() * s.cos(), -size * b.cos() * s.cos()]
+        [
+            -size * s.sin(),
+            -size * b.sin() * s.cos(),
+            -size * b.cos() * s.cos(),
+        ]
     }
 
     pub(super) fn build(&self, scene: &Scene, model: &mut Model) {
@@ -79,7 +95,10 @@ impl Path {
                 per_s: 1.0 / self.turn_time_s,
             },
         );
-        model.add_switch(Ends([self.turn_start_s, self.turn_start_s + self.turn_time_s]));
+        model.add_switch(Ends([
+            self.turn_start_s,
+            self.turn_start_s + self.turn_time_s,
+        ]));
     }
 }
 
@@ -127,6 +146,9 @@ struct Ends([f64; 2]);
 
 impl Switch for Ends {
     fn next_s(&self, after_s: f64) -> f64 {
-        self.0.into_iter().find(|t| *t > after_s).unwrap_or(f64::INFINITY)
+        self.0
+            .into_iter()
+            .find(|t| *t > after_s)
+            .unwrap_or(f64::INFINITY)
     }
 }

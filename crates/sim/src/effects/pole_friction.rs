@@ -27,18 +27,27 @@ pub struct PoleFriction {
 
 impl Default for PoleFriction {
     fn default() -> Self {
-        Self { arm_m: 0.0021, regularising_rate_rad_per_s: 0.6 }
+        Self {
+            arm_m: 0.0021,
+            regularising_rate_rad_per_s: 0.6,
+        }
     }
 }
 
 impl PoleFriction {
     pub(super) fn check(&self, _scene: &Scene) -> Result<(), Problem> {
         Checker::not_negative("effects.pole_friction.arm_m", self.arm_m)?;
-        Checker::positive("effects.pole_friction.regularising_rate_rad_per_s", self.regularising_rate_rad_per_s)
+        Checker::positive(
+            "effects.pole_friction.regularising_rate_rad_per_s",
+            self.regularising_rate_rad_per_s,
+        )
     }
 
     pub(super) fn build(&self, _scene: &Scene, model: &mut Model) {
-        let law = Rub { arm_m: self.arm_m, rate2: self.regularising_rate_rad_per_s.powi(2) };
+        let law = Rub {
+            arm_m: self.arm_m,
+            rate2: self.regularising_rate_rad_per_s.powi(2),
+        };
         model.add(Stage::Body, law.clone());
         model.add_account("pole_friction", law);
     }
@@ -70,6 +79,9 @@ impl Term for Rub {
 
 impl Account for Rub {
     fn power(&self, w: &Workspace) -> Power {
-        Power { work_w: 0.0, dissipated_w: -self.torque_n_m(w) * w.spin[0] }
+        Power {
+            work_w: 0.0,
+            dissipated_w: -self.torque_n_m(w) * w.spin[0],
+        }
     }
 }

@@ -30,7 +30,10 @@ pub struct Sling {
 
 impl Default for Sling {
     fn default() -> Self {
-        Self { length_m: 0.7, damping_s: 0.0 }
+        Self {
+            length_m: 0.7,
+            damping_s: 0.0,
+        }
     }
 }
 

@@ -19,12 +19,21 @@ use crate::scene::{Freedom, Start};
 use nalgebra::{DMatrix, DVector, Matrix3, UnitQuaternion, Vector3};
 
 /// The coordinates for a choice of freedoms.
-pub fn choose(body: &Body, handles_m: &[[f64; 3]], free: &[Freedom], start: &Start, height_m: f64) -> Box<dyn Freedoms> {
+pub fn choose(
+    body: &Body,
+    handles_m: &[[f64; 3]],
+    free: &[Freedom],
+    start: &Start,
+    height_m: f64,
+) -> Box<dyn Freedoms> {
     let is_free = Freedom::ALL.map(|f| free.contains(&f));
     let six = || Six::new(body, handles_m);
     match is_free {
         [true, true, true, true, true, true] => Box::new(six()),
-        [x, y, z, true, true, true] => Box::new(Pinned { six: six(), free: [x, y, z] }),
+        [x, y, z, true, true, true] => Box::new(Pinned {
+            six: six(),
+            free: [x, y, z],
+        }),
         _ => Box::new(Reduced::new(body, handles_m, is_free, start, height_m)),
     }
 }
@@ -143,7 +152,8 @@ impl Attitude {
     #[inline(always)]
     fn spin(&self) -> [f64; 3] {
         let j = self.columns();
-        [0, 1, 2].map(|a| j[0][a] * self.rates[0] + j[1][a] * self.rates[1] + j[2][a] * self.rates[2])
+        [0, 1, 2]
+            .map(|a| j[0][a] * self.rates[0] + j[1][a] * self.rates[1] + j[2][a] * self.rates[2])
     }
 
     /// J̇ (φ̇, θ̇, ψ̇)
@@ -159,7 +169,13 @@ impl Attitude {
 }
 
 impl Reduced {
-    fn new(body: &Body, handles_m: &[[f64; 3]], free: [bool; 6], start: &Start, height_m: f64) -> Self {
+    fn new(
+        body: &Body,
+        handles_m: &[[f64; 3]],
+        free: [bool; 6],
+        start: &Start,
+        height_m: f64,
+    ) -> Self {
         let [x, y, z] = [0, 1, 2].map(|a| pack(handles_m.iter().map(|h| h[a])));
         let [roll, tilt, yaw] = start.roll_pitch_yaw_deg.map(f64::to_radians);
         let mut place = [None; 6];
@@ -176,12 +192,21 @@ impl Reduced {
             mass: body.mass_kg,
             gravity: body.gravity_m_per_s2.into(),
             inertia: body.inertia_kg_m2,
-            held: [start.position_m[0], start.position_m[1], height_m, roll, tilt, yaw],
+            held: [
+                start.position_m[0],
+                start.position_m[1],
+                height_m,
+                roll,
+                tilt,
+                yaw,
+            ],
             turned: [roll, tilt, yaw].map(f64::sin_cos),
             place,
             free: count,
             names: listed(0).chain(listed(1)).collect(),
-            scales: std::iter::repeat_n(0.1, count).chain(std::iter::repeat_n(1.0, count)).collect(),
+            scales: std::iter::repeat_n(0.1, count)
+                .chain(std::iter::repeat_n(1.0, count))
+                .collect(),
         }
     }
 
@@ -198,7 +223,12 @@ impl Reduced {
     #[inline(always)]
     fn attitude(&self, y: &[f64]) -> Attitude {
         let angle = |a: usize| self.place[3 + a].map_or(self.turned[a], |p| sin_cos(y[p]));
-        Attitude { roll: angle(0), tilt: angle(1), yaw: angle(2), rates: [3, 4, 5].map(|c| self.rate(c, y)) }
+        Attitude {
+            roll: angle(0),
+            tilt: angle(1),
+            yaw: angle(2),
+            rates: [3, 4, 5].map(|c| self.rate(c, y)),
+        }
     }
 }
 
@@ -216,7 +246,11 @@ fn dot(a: [f64; 3], b: [f64; 3]) -> f64 {
 
 #[inline(always)]
 fn cross(a: [f64; 3], b: [f64; 3]) -> [f64; 3] {
-    [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]]
+    [
+        a[1] * b[2] - a[2] * b[1],
+        a[2] * b[0] - a[0] * b[2],
+        a[0] * b[1] - a[1] * b[0],
+    ]
 }
 
 impl Freedoms for Reduced {
@@ -338,7 +372,8 @@ impl Freedoms for Reduced {
         let at = self.attitude(y);
         let (j, drag) = (at.columns(), at.drag());
         let second = |c: usize| self.place[c].map_or(0.0, |p| dy[self.free + p]);
-        let angular = [0, 1, 2].map(|a| j[0][a] * second(3) + j[1][a] * second(4) + j[2][a] * second(5) + drag[a]);
+        let angular = [0, 1, 2]
+            .map(|a| j[0][a] * second(3) + j[1][a] * second(4) + j[2][a] * second(5) + drag[a]);
         [[0, 1, 2].map(second), angular]
     }
 
@@ -363,7 +398,10 @@ impl Freedoms for Reduced {
 
     fn energy_j(&self, y: &[f64]) -> [f64; 2] {
         let pose = self.pose(y);
-        let (v, spin) = (Vector3::from(pose.velocity_m_per_s), Vector3::from(pose.spin_rad_per_s));
+        let (v, spin) = (
+            Vector3::from(pose.velocity_m_per_s),
+            Vector3::from(pose.spin_rad_per_s),
+        );
         let kinetic = 0.5 * (self.mass * v.norm_squared() + spin.dot(&(self.inertia * spin)));
         [kinetic, -self.mass * dot(self.gravity, pose.position_m)]
     }

@@ -17,15 +17,30 @@ pub(crate) struct Checker;
 
 impl Checker {
     pub fn finite(key: &str, x: f64) -> Result<(), Problem> {
-        if x.is_finite() { Ok(()) } else { Err(problem(key, format!("found {x}, expected a finite number"))) }
+        if x.is_finite() {
+            Ok(())
+        } else {
+            Err(problem(key, format!("found {x}, expected a finite number")))
+        }
     }
 
     pub fn positive(key: &str, x: f64) -> Result<(), Problem> {
-        if x > 0.0 && x.is_finite() { Ok(()) } else { Err(problem(key, format!("found {x}, expected a number above zero"))) }
+        if x > 0.0 && x.is_finite() {
+            Ok(())
+        } else {
+            Err(problem(
+                key,
+                format!("found {x}, expected a number above zero"),
+            ))
+        }
     }
 
     pub fn not_negative(key: &str, x: f64) -> Result<(), Problem> {
-        if x >= 0.0 && x.is_finite() { Ok(()) } else { Err(problem(key, format!("found {x}, expected zero or more"))) }
+        if x >= 0.0 && x.is_finite() {
+            Ok(())
+        } else {
+            Err(problem(key, format!("found {x}, expected zero or more")))
+        }
     }
 
     pub fn all_finite(key: &str, xs: &[f64]) -> Result<(), Problem> {
@@ -35,16 +50,23 @@ impl Checker {
     pub fn per_carrier(key: &str, x: &PerCarrier, n: usize) -> Result<(), Problem> {
         Self::all_finite(key, x.values())?;
         match x {
-            PerCarrier::Each(list) if list.len() != n => {
-                Err(problem(key, format!("found {} values for {n} carriers; give one number, or one for each", list.len())))
-            }
+            PerCarrier::Each(list) if list.len() != n => Err(problem(
+                key,
+                format!(
+                    "found {} values for {n} carriers; give one number, or one for each",
+                    list.len()
+                ),
+            )),
             _ => Ok(()),
         }
     }
 }
 
 pub(crate) fn problem(key: &str, message: impl Into<String>) -> Problem {
-    Problem { key: key.into(), message: message.into() }
+    Problem {
+        key: key.into(),
+        message: message.into(),
+    }
 }
 
 /// Most samples that a run may log; beyond it a slip of the keyboard is likelier than a wish.
@@ -60,30 +82,57 @@ pub fn check(scene: &Scene) -> Result<(), Problem> {
     if scene.duration_s * scene.log_rate_hz > MOST_SAMPLES {
         return Err(problem(
             "log_rate_hz",
-            format!("{} s at {} Hz are more than {MOST_SAMPLES:e} samples; log less often", scene.duration_s, scene.log_rate_hz),
+            format!(
+                "{} s at {} Hz are more than {MOST_SAMPLES:e} samples; log less often",
+                scene.duration_s, scene.log_rate_hz
+            ),
         ));
     }
     Checker::not_negative("analysis_start_s", scene.analysis_start_s)?;
     Checker::not_negative("epoch_s", scene.epoch_s)?;
     if scene.epoch_s + scene.duration_s > 9.2e9 {
-        return Err(problem("epoch_s", "the stamps would pass the year 2262, the last that nanoseconds in 64 bits can name"));
+        return Err(problem(
+            "epoch_s",
+            "the stamps would pass the year 2262, the last that nanoseconds in 64 bits can name",
+        ));
     }
     if scene.seed >> 56 != 0 {
-        return Err(problem("seed", format!("found {}, expected a number below 2^56", scene.seed)));
+        return Err(problem(
+            "seed",
+            format!("found {}, expected a number below 2^56", scene.seed),
+        ));
     }
 
     if scene.freedom.is_empty() {
-        return Err(problem("freedom", "the list is empty; name at least one of x, y, height, roll, tilt, yaw"));
+        return Err(problem(
+            "freedom",
+            "the list is empty; name at least one of x, y, height, roll, tilt, yaw",
+        ));
     }
-    if let Some((i, f)) = scene.freedom.iter().enumerate().find(|(i, f)| scene.freedom[..*i].contains(f)) {
-        return Err(problem("freedom", format!("entry {} names {} twice", i + 1, format!("{f:?}").to_lowercase())));
+    if let Some((i, f)) = scene
+        .freedom
+        .iter()
+        .enumerate()
+        .find(|(i, f)| scene.freedom[..*i].contains(f))
+    {
+        return Err(problem(
+            "freedom",
+            format!(
+                "entry {} names {} twice",
+                i + 1,
+                format!("{f:?}").to_lowercase()
+            ),
+        ));
     }
     {
         use super::Freedom::{Roll, Tilt, Yaw};
         let has = |f| scene.freedom.contains(&f);
         let level = scene.start.roll_pitch_yaw_deg[1].to_radians().cos().abs();
         if has(Roll) && has(Yaw) && !has(Tilt) && level < 0.01 {
-            return Err(problem("freedom", "roll and yaw are the same turn while the pole is held upright; free the tilt too"));
+            return Err(problem(
+                "freedom",
+                "roll and yaw are the same turn while the pole is held upright; free the tilt too",
+            ));
         }
     }
     Checker::positive("body.mass_kg", scene.body.mass_kg)?;
@@ -92,15 +141,29 @@ pub fn check(scene: &Scene) -> Result<(), Problem> {
 
     let n = scene.carriers.count();
     if n == 0 {
-        return Err(problem("carriers.handles_m", "the list is empty; a carried body needs at least one handle"));
+        return Err(problem(
+            "carriers.handles_m",
+            "the list is empty; a carried body needs at least one handle",
+        ));
     }
     for handle in &scene.carriers.handles_m {
         Checker::all_finite("carriers.handles_m", handle)?;
     }
-    Checker::per_carrier("carriers.shoulder_height_m", &scene.carriers.shoulder_height_m, n)?;
+    Checker::per_carrier(
+        "carriers.shoulder_height_m",
+        &scene.carriers.shoulder_height_m,
+        n,
+    )?;
     Checker::per_carrier("carriers.frequency_hz", &scene.carriers.frequency_hz, n)?;
-    Checker::per_carrier("carriers.initial_phase_rad", &scene.carriers.initial_phase_rad, n)?;
-    Checker::not_negative("carriers.initial_phase_sd_rad", scene.carriers.initial_phase_sd_rad)?;
+    Checker::per_carrier(
+        "carriers.initial_phase_rad",
+        &scene.carriers.initial_phase_rad,
+        n,
+    )?;
+    Checker::not_negative(
+        "carriers.initial_phase_sd_rad",
+        scene.carriers.initial_phase_sd_rad,
+    )?;
     Checker::all_finite("carriers.walk_m_per_s", &scene.carriers.walk_m_per_s)?;
 
     let start = &scene.start;
@@ -110,17 +173,24 @@ pub fn check(scene: &Scene) -> Result<(), Problem> {
     Checker::all_finite("start.position_m", &start.position_m)?;
     Checker::all_finite("start.roll_pitch_yaw_deg", &start.roll_pitch_yaw_deg)?;
     Checker::all_finite("start.velocity_m_per_s", &start.velocity_m_per_s)?;
-    Checker::all_finite("start.angular_velocity_rad_per_s", &start.angular_velocity_rad_per_s)?;
+    Checker::all_finite(
+        "start.angular_velocity_rad_per_s",
+        &start.angular_velocity_rad_per_s,
+    )?;
 
     Checker::positive("solver.tolerance", scene.solver.tolerance)?;
     if !(1e-13..=1e-1).contains(&scene.solver.tolerance) {
         return Err(problem(
             "solver.tolerance",
-            format!("found {:e}, expected 1e-13 to 1e-1: double precision ends below, sense above", scene.solver.tolerance),
+            format!(
+                "found {:e}, expected 1e-13 to 1e-1: double precision ends below, sense above",
+                scene.solver.tolerance
+            ),
         ));
     }
     Checker::positive("solver.step_s", scene.solver.step_s)?;
-    crate::solve::method(&scene.solver.method).map_err(|message| problem("solver.method", message))?;
+    crate::solve::method(&scene.solver.method)
+        .map_err(|message| problem("solver.method", message))?;
 
     crate::effects::check(scene)
 }

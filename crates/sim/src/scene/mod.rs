@@ -8,8 +8,8 @@ mod check;
 mod parse;
 
 pub use builtin::{BUILTIN, builtin};
-pub use check::{Problem, check};
 pub(crate) use check::{Checker, problem};
+pub use check::{Problem, check};
 pub use parse::{SceneError, json_schema, load, nearest, parse, to_toml};
 
 use crate::effects::Effects;
@@ -80,7 +80,14 @@ pub enum Freedom {
 
 impl Freedom {
     /// All six, in the order of the state.
-    pub const ALL: [Self; 6] = [Self::X, Self::Y, Self::Height, Self::Roll, Self::Tilt, Self::Yaw];
+    pub const ALL: [Self; 6] = [
+        Self::X,
+        Self::Y,
+        Self::Height,
+        Self::Roll,
+        Self::Tilt,
+        Self::Yaw,
+    ];
 }
 
 /// The rigid body: a rath with its pole.
@@ -98,7 +105,11 @@ pub struct BodySpec {
 impl Default for BodySpec {
     /// The paper's rath as its logs reveal it: 60 kg, I_xx from a = h/(I_xx + M h²) = 0.04795, h = 0.1 m.
     fn default() -> Self {
-        Self { mass_kg: 60.0, inertia_kg_m2: Inertia::default(), gravity_m_per_s2: [0.0, 0.0, -9.81] }
+        Self {
+            mass_kg: 60.0,
+            inertia_kg_m2: Inertia::default(),
+            gravity_m_per_s2: [0.0, 0.0, -9.81],
+        }
     }
 }
 
@@ -120,7 +131,14 @@ pub struct Inertia {
 
 impl Default for Inertia {
     fn default() -> Self {
-        Self { xx: 1.4855, yy: 11.0, zz: 11.0, xy: 0.0, xz: 0.0, yz: 0.0 }
+        Self {
+            xx: 1.4855,
+            yy: 11.0,
+            zz: 11.0,
+            xy: 0.0,
+            xz: 0.0,
+            yz: 0.0,
+        }
     }
 }
 
@@ -212,7 +230,13 @@ pub struct AlongPoles {
 
 impl Default for AlongPoles {
     fn default() -> Self {
-        Self { count: 8, poles: 2, length_m: 4.9, spacing_m: 0.7, height_m: 0.1 }
+        Self {
+            count: 8,
+            poles: 2,
+            length_m: 4.9,
+            spacing_m: 0.7,
+            height_m: 0.1,
+        }
     }
 }
 
@@ -224,7 +248,11 @@ impl AlongPoles {
             let here = self.count / self.poles + usize::from(pole < self.count % self.poles);
             let y = (pole as f64 - (self.poles - 1) as f64 / 2.0) * self.spacing_m;
             for i in 0..here {
-                let from_front = if here > 1 { i as f64 / (here - 1) as f64 } else { 0.5 };
+                let from_front = if here > 1 {
+                    i as f64 / (here - 1) as f64
+                } else {
+                    0.5
+                };
                 handles.push([self.length_m * (0.5 - from_front), y, self.height_m]);
             }
         }
@@ -234,10 +262,22 @@ impl AlongPoles {
     fn check(&self) -> Result<(), Problem> {
         let key = |name: &str| format!("carriers.along_poles.{name}");
         if !(1..=MOST_CARRIERS).contains(&self.count) {
-            return Err(problem(&key("count"), format!("found {}, expected 1 to {MOST_CARRIERS} carriers", self.count)));
+            return Err(problem(
+                &key("count"),
+                format!(
+                    "found {}, expected 1 to {MOST_CARRIERS} carriers",
+                    self.count
+                ),
+            ));
         }
         if !(1..=self.count).contains(&self.poles) {
-            return Err(problem(&key("poles"), format!("found {}, expected 1 to {}, one carrier each", self.poles, self.count)));
+            return Err(problem(
+                &key("poles"),
+                format!(
+                    "found {}, expected 1 to {}, one carrier each",
+                    self.poles, self.count
+                ),
+            ));
         }
         Checker::not_negative(&key("length_m"), self.length_m)?;
         Checker::not_negative(&key("spacing_m"), self.spacing_m)?;
@@ -310,7 +350,12 @@ pub struct Solver {
 
 impl Default for Solver {
     fn default() -> Self {
-        Self { method: "auto".into(), tolerance: 1e-8, step_s: 1e-3, energy: true }
+        Self {
+            method: "auto".into(),
+            tolerance: 1e-8,
+            step_s: 1e-3,
+            energy: true,
+        }
     }
 }
 

@@ -40,13 +40,18 @@ pub fn load(name_or_path: &str, settings: &[String]) -> Result<Scene, SceneError
         return parse(name_or_path, text, settings);
     }
     let path = Path::new(name_or_path);
-    let looks_like_a_path = path.extension().is_some() || name_or_path.contains(std::path::MAIN_SEPARATOR);
+    let looks_like_a_path =
+        path.extension().is_some() || name_or_path.contains(std::path::MAIN_SEPARATOR);
     match std::fs::read_to_string(path) {
         Ok(text) => parse(name_or_path, &text, settings),
-        Err(e) if looks_like_a_path => Err(SceneError::NotFound(format!("cannot read the scene {name_or_path}: {e}"))),
+        Err(e) if looks_like_a_path => Err(SceneError::NotFound(format!(
+            "cannot read the scene {name_or_path}: {e}"
+        ))),
         Err(_) => {
             let names: Vec<&str> = BUILTIN.iter().map(|(n, _)| *n).collect();
-            let hint = nearest(name_or_path, names.iter().copied()).map(|n| format!(" Did you mean `{n}`?")).unwrap_or_default();
+            let hint = nearest(name_or_path, names.iter().copied())
+                .map(|n| format!(" Did you mean `{n}`?"))
+                .unwrap_or_default();
             Err(SceneError::NotFound(format!(
                 "there is no scene `{name_or_path}`.{hint} Built in: {}; or give the path of a .toml file",
                 names.join(", ")
@@ -60,16 +65,35 @@ pub fn load(name_or_path: &str, settings: &[String]) -> Result<Scene, SceneError
 /// # Errors
 /// As [`load`].
 pub fn parse(origin: &str, text: &str, settings: &[String]) -> Result<Scene, SceneError> {
-    let scene: Scene = toml::from_str(text).map_err(|e| located(origin, text, e.span(), &readable(e.message())))?;
-    let mut scene = if settings.is_empty() { scene } else { apply(scene, settings)? };
-    scene.expand().and_then(|()| check(&scene)).map_err(|problem| {
-        let was_set = settings.iter().any(|s| s.split('=').next().is_some_and(|k| problem.key.starts_with(k.trim())));
-        let message = format!("{}: {}", problem.key, problem.message);
-        match find(text, &problem.key) {
-            Some(span) if !was_set => located(origin, text, Some(span), &message),
-            _ => SceneError::Value { origin: if was_set { "--set".into() } else { origin.into() }, message },
-        }
-    })?;
+    let scene: Scene = toml::from_str(text)
+        .map_err(|e| located(origin, text, e.span(), &readable(e.message())))?;
+    let mut scene = if settings.is_empty() {
+        scene
+    } else {
+        apply(scene, settings)?
+    };
+    scene
+        .expand()
+        .and_then(|()| check(&scene))
+        .map_err(|problem| {
+            let was_set = settings.iter().any(|s| {
+                s.split('=')
+                    .next()
+                    .is_some_and(|k| problem.key.starts_with(k.trim()))
+            });
+            let message = format!("{}: {}", problem.key, problem.message);
+            match find(text, &problem.key) {
+                Some(span) if !was_set => located(origin, text, Some(span), &message),
+                _ => SceneError::Value {
+                    origin: if was_set {
+                        "--set".into()
+                    } else {
+                        origin.into()
+                    },
+                    message,
+                },
+            }
+        })?;
     Ok(scene)
 }
 
@@ -95,11 +119,17 @@ pub fn nearest<'a>(word: &str, names: impl Iterator<Item = &'a str>) -> Option<&
 
 /// Applies `a.b.c=value` settings; the value is TOML, or a string where it is not.
 fn apply(scene: Scene, settings: &[String]) -> Result<Scene, SceneError> {
-    let fail = |message: String| SceneError::Value { origin: "--set".into(), message };
-    let mut table: toml::Table = toml::from_str(&to_toml(&scene)).map_err(|e| fail(e.message().into()))?;
+    let fail = |message: String| SceneError::Value {
+        origin: "--set".into(),
+        message,
+    };
+    let mut table: toml::Table =
+        toml::from_str(&to_toml(&scene)).map_err(|e| fail(e.message().into()))?;
     for setting in settings {
         let Some((key, value)) = setting.split_once('=') else {
-            return Err(fail(format!("`{setting}` is not KEY=VALUE, for example effects.gait.amplitude_m=0.07")));
+            return Err(fail(format!(
+                "`{setting}` is not KEY=VALUE, for example effects.gait.amplitude_m=0.07"
+            )));
         };
         let (key, value) = (key.trim(), value.trim());
         let parsed = toml::from_str::<toml::Table>(&format!("x = {value}"))
@@ -109,9 +139,12 @@ fn apply(scene: Scene, settings: &[String]) -> Result<Scene, SceneError> {
         let path: Vec<&str> = key.split('.').collect();
         set_key(&mut table, &path, parsed).map_err(|m| fail(format!("{key}: {m}")))?;
         // One setting at a time, so that the message names the setting at fault.
-        let _: Scene = toml::Table::try_into(table.clone()).map_err(|e: toml::de::Error| fail(format!("{setting}: {}", readable(e.message()))))?;
+        let _: Scene = toml::Table::try_into(table.clone())
+            .map_err(|e: toml::de::Error| fail(format!("{setting}: {}", readable(e.message()))))?;
     }
-    table.try_into().map_err(|e: toml::de::Error| fail(readable(e.message())))
+    table
+        .try_into()
+        .map_err(|e: toml::de::Error| fail(readable(e.message())))
 }
 
 fn set_key(table: &mut toml::Table, path: &[&str], value: toml::Value) -> Result<(), String> {
@@ -121,7 +154,9 @@ fn set_key(table: &mut toml::Table, path: &[&str], value: toml::Value) -> Result
     }
     if rest.is_empty() {
         // `effects.music=false` takes an effect away; whole numbers stand for reals where a real was.
-        if value == toml::Value::Boolean(false) && !matches!(table.get(first), Some(toml::Value::Boolean(_)) | None) {
+        if value == toml::Value::Boolean(false)
+            && !matches!(table.get(first), Some(toml::Value::Boolean(_)) | None)
+        {
             table.remove(first);
             return Ok(());
         }
@@ -132,24 +167,37 @@ fn set_key(table: &mut toml::Table, path: &[&str], value: toml::Value) -> Result
         table.insert(first.into(), value);
         return Ok(());
     }
-    match table.entry(first).or_insert_with(|| toml::Value::Table(toml::Table::new())) {
+    match table
+        .entry(first)
+        .or_insert_with(|| toml::Value::Table(toml::Table::new()))
+    {
         toml::Value::Table(inner) => set_key(inner, rest, value),
         toml::Value::Array(items) => {
-            let index: usize = rest[0].parse().map_err(|_| format!("`{first}` is a list; name an item by its number"))?;
+            let index: usize = rest[0]
+                .parse()
+                .map_err(|_| format!("`{first}` is a list; name an item by its number"))?;
             let length = items.len();
-            let item = items.get_mut(index).ok_or_else(|| format!("`{first}` has {length} items, there is no item {index}"))?;
+            let item = items
+                .get_mut(index)
+                .ok_or_else(|| format!("`{first}` has {length} items, there is no item {index}"))?;
             match (item, &rest[1..]) {
                 (slot, []) => *slot = value,
                 (toml::Value::Table(inner), deeper) => set_key(inner, deeper, value)?,
                 (toml::Value::Array(inner), [last]) => {
-                    let i: usize = last.parse().map_err(|_| format!("`{last}` is not the number of an item"))?;
-                    *inner.get_mut(i).ok_or_else(|| format!("there is no item {i}"))? = value;
+                    let i: usize = last
+                        .parse()
+                        .map_err(|_| format!("`{last}` is not the number of an item"))?;
+                    *inner
+                        .get_mut(i)
+                        .ok_or_else(|| format!("there is no item {i}"))? = value;
                 }
                 _ => return Err(format!("`{}` holds no further keys", rest[0])),
             }
             Ok(())
         }
-        _ => Err(format!("`{first}` is a single value and holds no further keys")),
+        _ => Err(format!(
+            "`{first}` is a single value and holds no further keys"
+        )),
     }
 }
 
@@ -164,7 +212,10 @@ fn readable(message: &str) -> String {
         ("expected u32", "expected a whole number, zero or more"),
         ("expected usize", "expected a whole number, zero or more"),
         ("expected a sequence", "expected a list"),
-        ("data did not match any variant of untagged enum PerCarrier", "expected a number, or a list with one for each carrier"),
+        (
+            "data did not match any variant of untagged enum PerCarrier",
+            "expected a number, or a list with one for each carrier",
+        ),
     ] {
         message = message.replace(theirs, ours);
     }
@@ -179,12 +230,27 @@ fn readable(message: &str) -> String {
     message
 }
 
-fn located(origin: &str, text: &str, span: Option<std::ops::Range<usize>>, message: &str) -> SceneError {
-    let Some(span) = span else { return SceneError::Value { origin: origin.into(), message: message.into() } };
+fn located(
+    origin: &str,
+    text: &str,
+    span: Option<std::ops::Range<usize>>,
+    message: &str,
+) -> SceneError {
+    let Some(span) = span else {
+        return SceneError::Value {
+            origin: origin.into(),
+            message: message.into(),
+        };
+    };
     let before = &text[..span.start.min(text.len())];
     let line = before.matches('\n').count() + 1;
     let column = before.chars().rev().take_while(|&c| c != '\n').count() + 1;
-    SceneError::At { origin: origin.into(), line, column, message: message.into() }
+    SceneError::At {
+        origin: origin.into(),
+        line,
+        column,
+        message: message.into(),
+    }
 }
 
 /// Where in `text` the value of a dotted key stands; the deepest part of the key that the text has.
@@ -193,10 +259,16 @@ fn find(text: &str, key: &str) -> Option<std::ops::Range<usize>> {
     let document = toml::de::DeTable::parse(text).ok()?;
     let mut parts = key.split('.');
     let first = parts.next()?;
-    let (_, mut value) = document.get_ref().iter().find(|(k, _)| k.get_ref() == first)?;
+    let (_, mut value) = document
+        .get_ref()
+        .iter()
+        .find(|(k, _)| k.get_ref() == first)?;
     for part in parts {
         let next = match value.get_ref() {
-            DeValue::Table(inner) => inner.iter().find(|(k, _)| k.get_ref() == part).map(|(_, v)| v),
+            DeValue::Table(inner) => inner
+                .iter()
+                .find(|(k, _)| k.get_ref() == part)
+                .map(|(_, v)| v),
             DeValue::Array(items) => part.parse().ok().and_then(|i: usize| items.get(i)),
             _ => None,
         };

@@ -100,7 +100,9 @@ impl Track {
     pub fn wav(&self) -> Result<Vec<u8>, String> {
         let bytes = self.samples * 2;
         let Ok(length) = u32::try_from(bytes + 36) else {
-            return Err(format!("{bytes} bytes of sound are more than a WAV file can hold; shorten the scene or lower its rate"));
+            return Err(format!(
+                "{bytes} bytes of sound are more than a WAV file can hold; shorten the scene or lower its rate"
+            ));
         };
         let mut out = Vec::with_capacity(bytes as usize + 44);
         out.extend_from_slice(b"RIFF");
@@ -118,7 +120,10 @@ impl Track {
         out.extend_from_slice(b"data");
         out.extend_from_slice(&(length - 36).to_le_bytes());
         for block in (0..).map_while(|i| self.block(i)) {
-            block.sound.iter().for_each(|s| out.extend_from_slice(&s.to_le_bytes()));
+            block
+                .sound
+                .iter()
+                .for_each(|s| out.extend_from_slice(&s.to_le_bytes()));
         }
         Ok(out)
     }
@@ -139,21 +144,37 @@ mod tests {
             level: 0.7,
             noise: 0.0,
             seed: 1,
-            strokes: [0.25, 0.75, 1.25, 1.75].map(|t_s| Stroke { t_s, tempo_hz: 2.0 }).to_vec(),
+            strokes: [0.25, 0.75, 1.25, 1.75]
+                .map(|t_s| Stroke { t_s, tempo_hz: 2.0 })
+                .to_vec(),
         }
     }
 
     #[test]
     fn strokes_are_where_the_sound_begins() {
         let track = track();
-        let sound: Vec<i16> = (0..).map_while(|i| track.block(i)).flat_map(|b| b.sound).collect();
+        let sound: Vec<i16> = (0..)
+            .map_while(|i| track.block(i))
+            .flat_map(|b| b.sound)
+            .collect();
         assert_eq!(sound.len(), 16001);
         for stroke in &track.strokes {
             let at = (stroke.t_s * 8000.0 * 1.001).ceil() as usize;
-            let power = |a: usize, b: usize| sound[a..b].iter().map(|&x| f64::from(x).powi(2)).sum::<f64>();
-            assert!(power(at, at + 160) > 30.0 * power(at - 160, at), "{stroke:?}");
+            let power = |a: usize, b: usize| {
+                sound[a..b]
+                    .iter()
+                    .map(|&x| f64::from(x).powi(2))
+                    .sum::<f64>()
+            };
+            assert!(
+                power(at, at + 160) > 30.0 * power(at - 160, at),
+                "{stroke:?}"
+            );
         }
-        assert!(sound[..1900].iter().all(|&x| x == 0), "silence before the first stroke");
+        assert!(
+            sound[..1900].iter().all(|&x| x == 0),
+            "silence before the first stroke"
+        );
         assert_eq!(track.block(3).unwrap().stamp_s, -0.5 + 0.3);
     }
 
@@ -161,7 +182,13 @@ mod tests {
     fn a_wav_file_says_how_long_it_is() {
         let wav = track().wav().unwrap();
         assert_eq!(wav.len(), 44 + 2 * 16001);
-        assert_eq!(u32::from_le_bytes(wav[4..8].try_into().unwrap()) as usize, wav.len() - 8);
-        assert_eq!(u32::from_le_bytes(wav[40..44].try_into().unwrap()), 2 * 16001);
+        assert_eq!(
+            u32::from_le_bytes(wav[4..8].try_into().unwrap()) as usize,
+            wav.len() - 8
+        );
+        assert_eq!(
+            u32::from_le_bytes(wav[40..44].try_into().unwrap()),
+            2 * 16001
+        );
     }
 }

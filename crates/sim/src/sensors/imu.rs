@@ -124,7 +124,12 @@ impl Draws {
     }
 
     fn uniform(self, what: Use, index: u64) -> f64 {
-        uniform_pair(self.seed, Stream::Sensor, self.instrument * USES + what as u32, index)[0]
+        uniform_pair(
+            self.seed,
+            Stream::Sensor,
+            self.instrument * USES + what as u32,
+            index,
+        )[0]
     }
 }
 
@@ -192,7 +197,8 @@ impl Imu {
             let triad = triads[which];
             let scale = self.draws.six(Use::Gains, which as u64);
             let cross = self.draws.six(Use::Gains, 2 + which as u64);
-            let mut m = Matrix3::from_diagonal(&Vector3::from_fn(|i, _| 1.0 + triad.scale_sd * scale[i]));
+            let mut m =
+                Matrix3::from_diagonal(&Vector3::from_fn(|i, _| 1.0 + triad.scale_sd * scale[i]));
             let places = [(0, 1), (0, 2), (1, 0), (1, 2), (2, 0), (2, 1)];
             for (place, z) in places.into_iter().zip(cross) {
                 m[place] = triad.misalignment_sd * z;
@@ -203,13 +209,21 @@ impl Imu {
     }
 
     /// Specific force and angular velocity at its seat. `shoulders` holds b̈ of every carrier where one is asked for.
-    pub fn truth(&self, body: &BodyMotion, shoulders: Option<&[[f64; 3]]>, gravity: [f64; 3]) -> Truth {
+    pub fn truth(
+        &self,
+        body: &BodyMotion,
+        shoulders: Option<&[[f64; 3]]>,
+        gravity: [f64; 3],
+    ) -> Truth {
         let gravity = Vector3::from(gravity);
         let (angular_velocity, specific_force) = match self.seat {
             Seat::Body(place) => {
                 let [x, y, z, w] = body.pose.orientation;
                 let to_world = UnitQuaternion::new_unchecked(nalgebra::Quaternion::new(w, x, y, z));
-                let (spin, p) = (Vector3::from(body.pose.spin_rad_per_s), Vector3::from(place));
+                let (spin, p) = (
+                    Vector3::from(body.pose.spin_rad_per_s),
+                    Vector3::from(place),
+                );
                 let felt = to_world.inverse() * (Vector3::from(body.linear_m_per_s2) - gravity);
                 let euler = Vector3::from(body.angular_rad_per_s2).cross(&p);
                 (spin, felt + euler + spin.cross(&spin.cross(&p)))
@@ -220,11 +234,20 @@ impl Imu {
             }
         };
         let back = self.mounting.inverse();
-        Truth { angular_velocity: back * angular_velocity, specific_force: back * specific_force }
+        Truth {
+            angular_velocity: back * angular_velocity,
+            specific_force: back * specific_force,
+        }
     }
 
     /// The sample of tick `tick`, or nothing when it is lost. To be called for every tick in order: biases walk on.
-    pub fn measure(&self, tick: u64, t_s: f64, truth: Truth, memory: &mut Memory) -> Option<Reading<'_>> {
+    pub fn measure(
+        &self,
+        tick: u64,
+        t_s: f64,
+        truth: Truth,
+        memory: &mut Memory,
+    ) -> Option<Reading<'_>> {
         let triads = [&self.gyroscope, &self.accelerometer];
         let root_rate = self.rate_hz.sqrt();
         if tick > 0 && triads.iter().any(|t| t.bias_walk > 0.0) {
@@ -235,7 +258,11 @@ impl Imu {
         if self.dropout > 0.0 && self.draws.uniform(Use::Dropout, tick) <= self.dropout {
             return None;
         }
-        let noise = if triads.iter().any(|t| t.noise_density > 0.0) { self.draws.six(Use::Noise, tick) } else { [0.0; 6] };
+        let noise = if triads.iter().any(|t| t.noise_density > 0.0) {
+            self.draws.six(Use::Noise, tick)
+        } else {
+            [0.0; 6]
+        };
         let shown = |which: usize, u: Vector3<f64>| -> [f64; 3] {
             let (triad, felt) = (triads[which], memory.gain[which] * u);
             std::array::from_fn(|axis| {

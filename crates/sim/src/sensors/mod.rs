@@ -28,7 +28,11 @@ pub struct Sensors<'m> {
 impl<'m> Sensors<'m> {
     /// Switches every instrument of `model` on.
     pub fn new(model: &'m Model) -> Self {
-        let size = if model.imus().is_empty() { 0 } else { model.layout().size() };
+        let size = if model.imus().is_empty() {
+            0
+        } else {
+            model.layout().size()
+        };
         Self {
             model,
             memories: model.imus().iter().map(Imu::switch_on).collect(),
@@ -51,14 +55,27 @@ impl<'m> Sensors<'m> {
         model.rhs(t_s, y, &mut self.dy, w);
         let pose = model.freedoms().pose(y);
         let [linear, angular] = model.freedoms().acceleration(y, &self.dy);
-        let on_body = imu::BodyMotion { pose, linear_m_per_s2: linear, angular_rad_per_s2: angular };
+        let on_body = imu::BodyMotion {
+            pose,
+            linear_m_per_s2: linear,
+            angular_rad_per_s2: angular,
+        };
         let shoulders = model
             .imus()
             .iter()
             .any(|imu| imu.clock == clock && imu.is_on_a_carrier())
             .then(|| imu::shoulder_accelerations(model, t_s, y, &self.dy, w, &mut self.near));
-        for (imu, memory) in model.imus().iter().zip(&mut self.memories).filter(|(imu, _)| imu.clock == clock) {
-            let truth = imu.truth(&on_body, shoulders.as_deref(), model.body.gravity_m_per_s2.into());
+        for (imu, memory) in model
+            .imus()
+            .iter()
+            .zip(&mut self.memories)
+            .filter(|(imu, _)| imu.clock == clock)
+        {
+            let truth = imu.truth(
+                &on_body,
+                shoulders.as_deref(),
+                model.body.gravity_m_per_s2.into(),
+            );
             if let Some(reading) = imu.measure(tick, t_s, truth, memory) {
                 sink(&reading);
             }

@@ -50,14 +50,23 @@ struct Ticker {
 impl Ticker {
     fn new(rate_hz: f64, duration_s: f64) -> Self {
         // A last tick that the duration misses by rounding alone is still taken.
-        Self { rate_hz, next: 0, last: (duration_s * rate_hz * (1.0 + 1e-12)).floor() as u64, due_s: 0.0 }
+        Self {
+            rate_hz,
+            next: 0,
+            last: (duration_s * rate_hz * (1.0 + 1e-12)).floor() as u64,
+            due_s: 0.0,
+        }
     }
 
     /// Takes the tick that is due; returns its number.
     fn advance(&mut self) -> u64 {
         let tick = self.next;
         self.next += 1;
-        self.due_s = if self.next <= self.last { self.next as f64 / self.rate_hz } else { f64::INFINITY };
+        self.due_s = if self.next <= self.last {
+            self.next as f64 / self.rate_hz
+        } else {
+            f64::INFINITY
+        };
         tick
     }
 }
@@ -92,7 +101,11 @@ const CHATTER: u32 = 6;
 impl<'m> Course<'m> {
     pub fn new(model: &'m Model, method: &'static str, settings: &Settings, locate: bool) -> Self {
         let scene = &model.scene;
-        let n = if model.watches_contact() { model.carriers() } else { 0 };
+        let n = if model.watches_contact() {
+            model.carriers()
+        } else {
+            0
+        };
         let mut course = Self {
             model,
             w: model.workspace(),
@@ -164,7 +177,11 @@ impl<'m> Course<'m> {
                 p.normal = p.normal.fast_max(f64x2::ZERO);
             }
         }
-        if observer.sample(t_s, y, &self.w) { Ok(()) } else { Err(Stopped::ByObserver { t_s }) }
+        if observer.sample(t_s, y, &self.w) {
+            Ok(())
+        } else {
+            Err(Stopped::ByObserver { t_s })
+        }
     }
 
     /// The right-hand side at (t, y).
@@ -204,10 +221,18 @@ impl<'m> Course<'m> {
         self.stats.steps += 1;
         self.model.freedoms().project(&mut self.y);
         if let Some(bad) = self.y.iter().position(|x| !x.is_finite()) {
-            return Err(Stopped::NotFinite { method: self.method, t_s, state: self.model.state_names().swap_remove(bad) });
+            return Err(Stopped::NotFinite {
+                method: self.method,
+                t_s,
+                state: self.model.state_names().swap_remove(bad),
+            });
         }
         if self.stats.evaluations > self.most_evaluations {
-            return Err(Stopped::TooMuchWork { method: self.method, t_s, evaluations: self.stats.evaluations });
+            return Err(Stopped::TooMuchWork {
+                method: self.method,
+                t_s,
+                evaluations: self.stats.evaluations,
+            });
         }
         if !self.locate {
             self.note_unlocated(observer);
@@ -220,8 +245,12 @@ impl<'m> Course<'m> {
             self.begin_segment();
             for (i, old) in before.into_iter().enumerate() {
                 match (old, self.contacts[i]) {
-                    (Contact::Closed, Contact::Open) => self.changed(i, EventKind::ContactOpened, observer),
-                    (Contact::Open, Contact::Closed) => self.changed(i, EventKind::ContactClosed, observer),
+                    (Contact::Closed, Contact::Open) => {
+                        self.changed(i, EventKind::ContactOpened, observer)
+                    }
+                    (Contact::Open, Contact::Closed) => {
+                        self.changed(i, EventKind::ContactClosed, observer)
+                    }
                     _ => {}
                 }
             }
@@ -246,9 +275,20 @@ impl<'m> Course<'m> {
                 _ => continue,
             };
             let (last_s, count) = self.recent[i];
-            let count = if self.t_s - last_s < 1e-9 { count + 1 } else { 0 };
+            let count = if self.t_s - last_s < 1e-9 {
+                count + 1
+            } else {
+                0
+            };
             self.recent[i] = (self.t_s, count);
-            self.set_contact(i, if count >= CHATTER { Contact::Clamped } else { next });
+            self.set_contact(
+                i,
+                if count >= CHATTER {
+                    Contact::Clamped
+                } else {
+                    next
+                },
+            );
             // What rounding leaves on the wrong side of the zero is the zero of the new segment.
             let (sense, zero) = &mut self.watch[i / LANES];
             let short = (sense.as_array()[i % LANES] * free).min(0.0);
@@ -260,8 +300,13 @@ impl<'m> Course<'m> {
     fn changed(&mut self, handle: usize, kind: EventKind, observer: &mut dyn Observer) {
         self.stats.events += 1;
         let gap_m = self.w.of(handle, |p| p.gap[2]);
-        self.model.book_contact(handle, kind == EventKind::ContactOpened, gap_m, &mut self.y);
-        observer.event(&Event { t_s: self.t_s, handle, kind });
+        self.model
+            .book_contact(handle, kind == EventKind::ContactOpened, gap_m, &mut self.y);
+        observer.event(&Event {
+            t_s: self.t_s,
+            handle,
+            kind,
+        });
     }
 
     fn begin_segment(&mut self) {
@@ -327,7 +372,15 @@ impl<'m> Course<'m> {
             let now = self.w.of(i, |p| p.normal) > 0.0;
             if now != self.touching[i] {
                 self.touching[i] = now;
-                self.changed(i, if now { EventKind::ContactClosed } else { EventKind::ContactOpened }, observer);
+                self.changed(
+                    i,
+                    if now {
+                        EventKind::ContactClosed
+                    } else {
+                        EventKind::ContactOpened
+                    },
+                    observer,
+                );
             }
         }
     }

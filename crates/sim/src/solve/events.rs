@@ -19,7 +19,13 @@ const NEAR: f64 = 0.05;
 
 impl Looks {
     pub fn new() -> Self {
-        Self { seen: [(0.0, 0.0); MOST], count: 0, least: f64::INFINITY, most: 0.0, spoilt: false }
+        Self {
+            seen: [(0.0, 0.0); MOST],
+            count: 0,
+            least: f64::INFINITY,
+            most: 0.0,
+            spoilt: false,
+        }
     }
 
     #[inline(always)]
@@ -45,7 +51,9 @@ impl Looks {
     /// Whether a low margin lies between two higher ones.
     fn dips(&self) -> bool {
         let (seen, n) = self.sorted();
-        seen[..n].windows(3).any(|w| w[1].1 < NEAR * self.most && w[1].1 <= w[0].1 && w[1].1 < w[2].1)
+        seen[..n]
+            .windows(3)
+            .any(|w| w[1].1 < NEAR * self.most && w[1].1 <= w[0].1 && w[1].1 < w[2].1)
     }
 
     /// Says that the stages of the step have been overwritten.
@@ -80,8 +88,14 @@ pub fn first(looks: &Looks, resolution: f64, mut margin: impl FnMut(f64) -> f64)
             a = b;
         } else {
             // A dip between stages shows as the lowest of three neighbours.
-            if let (Some(before), Some(after)) = (i.checked_sub(1).map(|j| seen[j]), seen.get(i + 1)) {
-                if value < NEAR * looks.most && value <= before.1 && value <= after.1 && after.1 >= 0.0 {
+            if let (Some(before), Some(after)) =
+                (i.checked_sub(1).map(|j| seen[j]), seen.get(i + 1))
+            {
+                if value < NEAR * looks.most
+                    && value <= before.1
+                    && value <= after.1
+                    && after.1 >= 0.0
+                {
                     let at = lowest(before, (theta, value), *after);
                     let b = (at, margin(at));
                     if b.1 < 0.0 {
@@ -99,12 +113,21 @@ pub fn first(looks: &Looks, resolution: f64, mut margin: impl FnMut(f64) -> f64)
 fn lowest(l: (f64, f64), m: (f64, f64), r: (f64, f64)) -> f64 {
     let (left, right) = ((m.1 - l.1) / (m.0 - l.0), (r.1 - m.1) / (r.0 - m.0));
     let bend = right - left;
-    if bend > 0.0 { (0.5 * (l.0 + m.0) - left * 0.5 * (r.0 - l.0) / bend).clamp(l.0, r.0) } else { m.0 }
+    if bend > 0.0 {
+        (0.5 * (l.0 + m.0) - left * 0.5 * (r.0 - l.0) / bend).clamp(l.0, r.0)
+    } else {
+        m.0
+    }
 }
 
 /// The zero between `a` (margin > 0) and `b` (margin ≤ 0). Chandrupatla's method (1997): inverse quadratic where the margin is
 /// straight enough for it to be safe, bisection elsewhere; never slower than bisection by more than a factor of two.
-fn between(mut a: (f64, f64), mut b: (f64, f64), resolution: f64, mut margin: impl FnMut(f64) -> f64) -> f64 {
+fn between(
+    mut a: (f64, f64),
+    mut b: (f64, f64),
+    resolution: f64,
+    mut margin: impl FnMut(f64) -> f64,
+) -> f64 {
     if b.1 == 0.0 {
         return b.0;
     }
@@ -132,7 +155,8 @@ fn between(mut a: (f64, f64), mut b: (f64, f64), resolution: f64, mut margin: im
         let xi = (a.0 - b.0) / (c.0 - b.0);
         let phi = (a.1 - b.1) / (c.1 - b.1);
         guess = if phi * phi < xi && (1.0 - phi) * (1.0 - phi) < 1.0 - xi {
-            a.1 / (b.1 - a.1) * c.1 / (b.1 - c.1) + (c.0 - a.0) / (b.0 - a.0) * a.1 / (c.1 - a.1) * b.1 / (c.1 - b.1)
+            a.1 / (b.1 - a.1) * c.1 / (b.1 - c.1)
+                + (c.0 - a.0) / (b.0 - a.0) * a.1 / (c.1 - a.1) * b.1 / (c.1 - b.1)
         } else {
             0.5
         };
@@ -152,15 +176,19 @@ mod tests {
         looks
     }
 
-    const STAGES: [f64; 12] = [0.05, 0.08, 0.12, 0.28, 0.33, 0.25, 0.31, 0.65, 0.6, 0.86, 1.0, 1.0];
+    const STAGES: [f64; 12] = [
+        0.05, 0.08, 0.12, 0.28, 0.33, 0.25, 0.31, 0.65, 0.6, 0.86, 1.0, 1.0,
+    ];
 
     fn find(f: impl Fn(f64) -> f64) -> (Option<f64>, u32) {
         let mut calls = 0;
         let seen = looks(&f, &STAGES);
-        let found = seen.suspicious().then(|| first(&seen, 1e-15, |t| {
-            calls += 1;
-            f(t)
-        }));
+        let found = seen.suspicious().then(|| {
+            first(&seen, 1e-15, |t| {
+                calls += 1;
+                f(t)
+            })
+        });
         (found.flatten(), calls)
     }
 
@@ -177,7 +205,10 @@ mod tests {
     fn a_short_dip_between_stages_is_an_event_and_a_touch_is_not() {
         let dip = |depth: f64| move |t: f64| (t - 0.45) * (t - 0.45) - depth;
         let (found, _) = find(dip(1e-4));
-        assert!((found.unwrap() - 0.44).abs() < 1e-9, "the first of its two zeros: {found:?}");
+        assert!(
+            (found.unwrap() - 0.44).abs() < 1e-9,
+            "the first of its two zeros: {found:?}"
+        );
         assert_eq!(find(dip(-1e-6)).0, None);
         assert_eq!(find(dip(0.0)).0, None);
     }

@@ -18,16 +18,29 @@ pub trait Step {
 }
 
 /// Integrates a model with method `S`.
-pub fn run<S: Step>(model: &Model, settings: &Settings, observer: &mut dyn Observer) -> (Stats, Result<(), Stopped>) {
+pub fn run<S: Step>(
+    model: &Model,
+    settings: &Settings,
+    observer: &mut dyn Observer,
+) -> (Stats, Result<(), Stopped>) {
     let mut course = Course::new(model, S::NAME, settings, false);
     let outcome = integrate::<S>(&mut course, settings.step_s, observer);
     (course.stats, outcome)
 }
 
-fn integrate<S: Step>(course: &mut Course, step_s: f64, observer: &mut dyn Observer) -> Result<(), Stopped> {
+fn integrate<S: Step>(
+    course: &mut Course,
+    step_s: f64,
+    observer: &mut dyn Observer,
+) -> Result<(), Stopped> {
     let size = course.y.len();
     let mut method = S::new(size);
-    let (mut f0, mut f1, mut y1, mut at) = (vec![0.0; size], vec![0.0; size], vec![0.0; size], vec![0.0; size]);
+    let (mut f0, mut f1, mut y1, mut at) = (
+        vec![0.0; size],
+        vec![0.0; size],
+        vec![0.0; size],
+        vec![0.0; size],
+    );
     let y0 = course.y.clone();
     while course.sample_due(0.0).is_some() {
         course.sample(&y0, observer)?;
@@ -42,7 +55,11 @@ fn integrate<S: Step>(course: &mut Course, step_s: f64, observer: &mut dyn Obser
             let t0 = course.t_s;
             course.slope(&mut f0);
             method.step(course, h, &f0, &mut y1);
-            let t1 = if i + 1 == steps as u64 { stop } else { begin + (i + 1) as f64 * h };
+            let t1 = if i + 1 == steps as u64 {
+                stop
+            } else {
+                begin + (i + 1) as f64 * h
+            };
             if course.sample_due(t1 - 2.0 * SAME_MOMENT_S).is_some() {
                 course.rhs(t1, &y1, &mut f1);
                 while let Some(t) = course.sample_due(t1 - 2.0 * SAME_MOMENT_S) {
@@ -68,11 +85,17 @@ const BLOWN_UP: f64 = 1e12;
 
 fn finite(course: &Course, t_s: f64, y: &[f64]) -> Result<(), Stopped> {
     let body = course.model.layout().body;
-    match y.iter().enumerate().position(|(d, x)| !x.is_finite() || (d < body && x.abs() > BLOWN_UP)) {
+    match y
+        .iter()
+        .enumerate()
+        .position(|(d, x)| !x.is_finite() || (d < body && x.abs() > BLOWN_UP))
+    {
         None => Ok(()),
-        Some(bad) => {
-            Err(Stopped::NotFinite { method: course.method(), t_s, state: course.model.state_names().swap_remove(bad) })
-        }
+        Some(bad) => Err(Stopped::NotFinite {
+            method: course.method(),
+            t_s,
+            state: course.model.state_names().swap_remove(bad),
+        }),
     }
 }
 

@@ -51,7 +51,9 @@ pub struct Stats {
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum Stopped {
     /// The error cannot be kept within the tolerance.
-    #[error("{method} gave up at t = {t_s} s: the step fell to {step_s:.1e} s without reaching the tolerance {tolerance:e}; loosen --tolerance or soften the scene")]
+    #[error(
+        "{method} gave up at t = {t_s} s: the step fell to {step_s:.1e} s without reaching the tolerance {tolerance:e}; loosen --tolerance or soften the scene"
+    )]
     StepTooSmall {
         /// Method name.
         method: &'static str,
@@ -63,7 +65,9 @@ pub enum Stopped {
         tolerance: f64,
     },
     /// A state left the range of numbers.
-    #[error("{method} gave up at t = {t_s} s: {state} is no longer a finite number; a smaller --set solver.step_s or an adaptive --method may help")]
+    #[error(
+        "{method} gave up at t = {t_s} s: {state} is no longer a finite number; a smaller --set solver.step_s or an adaptive --method may help"
+    )]
     NotFinite {
         /// Method name.
         method: &'static str,
@@ -73,7 +77,9 @@ pub enum Stopped {
         state: String,
     },
     /// More work than allowed.
-    #[error("{method} gave up at t = {t_s} s: {evaluations} evaluations were not enough for the whole run")]
+    #[error(
+        "{method} gave up at t = {t_s} s: {evaluations} evaluations were not enough for the whole run"
+    )]
     TooMuchWork {
         /// Method name.
         method: &'static str,
@@ -120,7 +126,11 @@ pub fn resolve(method: &'static Method, settings: &Settings) -> &'static Method 
     }
 }
 
-fn auto(model: &Model, settings: &Settings, observer: &mut dyn Observer) -> (Stats, Result<(), Stopped>) {
+fn auto(
+    model: &Model,
+    settings: &Settings,
+    observer: &mut dyn Observer,
+) -> (Stats, Result<(), Stopped>) {
     (resolve(&METHODS[0], settings).run)(model, settings, observer)
 }
 
@@ -184,7 +194,12 @@ pub const METHODS: &[Method] = &[
 pub fn method(name: &str) -> Result<&'static Method, String> {
     METHODS.iter().find(|m| m.name == name).ok_or_else(|| {
         let names = || METHODS.iter().map(|m| m.name);
-        let hint = crate::scene::nearest(name, names()).map(|n| format!(" Did you mean `{n}`?")).unwrap_or_default();
-        format!("there is no method `{name}`.{hint} There are: {}", names().collect::<Vec<_>>().join(", "))
+        let hint = crate::scene::nearest(name, names())
+            .map(|n| format!(" Did you mean `{n}`?"))
+            .unwrap_or_default();
+        format!(
+            "there is no method `{name}`.{hint} There are: {}",
+            names().collect::<Vec<_>>().join(", ")
+        )
     })
 }

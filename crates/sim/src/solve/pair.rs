@@ -212,8 +212,16 @@ impl<'m, P: Pair, const EVENTS: bool> Run<'m, P, EVENTS> {
         let (body, watched) = (model.layout().body, model.layout().ledger_range().start);
         for d in 0..watched {
             // Phases grow without bound and mean nothing modulo a turn: they are held absolutely, the body relatively too.
-            weight.as_flattened_mut()[d] = if d < body { 1.0 / model.freedoms().scales()[d] } else { 1.0 };
-            relative.as_flattened_mut()[d] = if d < body { weight.as_flattened()[d] } else { 0.0 };
+            weight.as_flattened_mut()[d] = if d < body {
+                1.0 / model.freedoms().scales()[d]
+            } else {
+                1.0
+            };
+            relative.as_flattened_mut()[d] = if d < body {
+                weight.as_flattened()[d]
+            } else {
+                0.0
+            };
         }
         let mut run = Self {
             course,
@@ -258,7 +266,12 @@ impl<'m, P: Pair, const EVENTS: bool> Run<'m, P, EVENTS> {
             let error = loop {
                 if h < SMALLEST_STEP_S && h < left {
                     let (t_s, step_s) = (t0, h);
-                    return Err(Stopped::StepTooSmall { method: P::NAME, t_s, step_s, tolerance: self.tolerance / P::SHARE });
+                    return Err(Stopped::StepTooSmall {
+                        method: P::NAME,
+                        t_s,
+                        step_s,
+                        tolerance: self.tolerance / P::SHARE,
+                    });
                 }
                 let error = self.step::<F>(h);
                 if error <= 1.0 {
@@ -266,10 +279,18 @@ impl<'m, P: Pair, const EVENTS: bool> Run<'m, P, EVENTS> {
                 }
                 self.course.stats.rejected += 1;
                 rejected_before = true;
-                h *= if error.is_finite() { (SAFETY * error.powf(-P::EXPONENT)).clamp(SHRINK, 1.0) } else { SHRINK };
+                h *= if error.is_finite() {
+                    (SAFETY * error.powf(-P::EXPONENT)).clamp(SHRINK, 1.0)
+                } else {
+                    SHRINK
+                };
                 h_next = h;
             };
-            let mut t1 = if h == left { self.course.stop_s() } else { t0 + h };
+            let mut t1 = if h == left {
+                self.course.stop_s()
+            } else {
+                t0 + h
+            };
             let moved = loop {
                 match self.close::<F>(h, t1, observer)? {
                     // The polynomial is too rough to hold an event there: step to just beyond it, where it is exact.
@@ -283,9 +304,20 @@ impl<'m, P: Pair, const EVENTS: bool> Run<'m, P, EVENTS> {
             };
             let e = error.max(1e-10);
             let factor = SAFETY * e.powf(-P::EXPONENT * 0.8) * error_before.powf(P::EXPONENT * 0.2);
-            let factor = factor.clamp(SHRINK, if rejected_before || moved == Moved::Event { 1.0 } else { GROW });
+            let factor = factor.clamp(
+                SHRINK,
+                if rejected_before || moved == Moved::Event {
+                    1.0
+                } else {
+                    GROW
+                },
+            );
             // A step that was cut to meet a moment says nothing against a longer one.
-            h_next = if h < h_next { h_next.max(h * factor) } else { h * factor };
+            h_next = if h < h_next {
+                h_next.max(h * factor)
+            } else {
+                h * factor
+            };
             error_before = e.max(1e-4);
             rejected_before = false;
             if moved != Moved::On && !self.course.finished() {
@@ -316,7 +348,8 @@ impl<'m, P: Pair, const EVENTS: bool> Run<'m, P, EVENTS> {
         let mut total = 0.0;
         for (tile, y) in tiles(&self.course.y).iter().enumerate() {
             for l in 0..TILE {
-                let x = of(tile, l) * self.weight[tile][l] / (1.0 + self.relative[tile][l] * y[l].abs());
+                let x = of(tile, l) * self.weight[tile][l]
+                    / (1.0 + self.relative[tile][l] * y[l].abs());
                 total += x * x;
             }
         }
@@ -326,8 +359,17 @@ impl<'m, P: Pair, const EVENTS: bool> Run<'m, P, EVENTS> {
     /// Stage `I` of a step of size h: its state from the earlier stages, its slope from the model.
     #[inline(always)]
     fn stage<F: Arithmetic, const I: usize>(&mut self, h: f64) {
-        let into = if I == P::STAGES { &mut self.y1 } else { &mut self.trial };
-        for ((k, y), out) in self.k.iter().zip(tiles(&self.course.y)).zip(tiles_mut(into)) {
+        let into = if I == P::STAGES {
+            &mut self.y1
+        } else {
+            &mut self.trial
+        };
+        for ((k, y), out) in self
+            .k
+            .iter()
+            .zip(tiles(&self.course.y))
+            .zip(tiles_mut(into))
+        {
             let sum = sum::<F>(const { row::<P>(I) }, k);
             for l in 0..TILE {
                 out[l] = F::madd(h, sum[l], y[l]);
@@ -339,7 +381,8 @@ impl<'m, P: Pair, const EVENTS: bool> Run<'m, P, EVENTS> {
             k[I] = *slope;
         }
         if EVENTS && I <= P::STAGES {
-            self.looks.note(const { time::<P>(I) }, self.course.margin_n());
+            self.looks
+                .note(const { time::<P>(I) }, self.course.margin_n());
         }
     }
 
@@ -352,7 +395,12 @@ impl<'m, P: Pair, const EVENTS: bool> Run<'m, P, EVENTS> {
         stages!(self, h, 1, P::STAGES + 1, [1 2 3 4 5 6 7 8 9 10 11 12 13 14 15]);
         let mut squares = [0.0; 2];
         let states = tiles(&self.course.y).iter().zip(tiles(&self.y1));
-        for ((k, (y0, y1)), (weight, relative)) in self.k.iter().zip(states).zip(self.weight.iter().zip(&self.relative)) {
+        for ((k, (y0, y1)), (weight, relative)) in self
+            .k
+            .iter()
+            .zip(states)
+            .zip(self.weight.iter().zip(&self.relative))
+        {
             let [a, b] = P::errors::<F>(k);
             let mut tile = [[0.0; TILE]; 2];
             for l in 0..TILE {
@@ -369,7 +417,12 @@ impl<'m, P: Pair, const EVENTS: bool> Run<'m, P, EVENTS> {
 
     /// Hands over what lies within an accepted step and moves to its end, or to the first event.
     #[inline(always)]
-    fn close<F: Arithmetic>(&mut self, h: f64, t1: f64, observer: &mut dyn Observer) -> Result<Moved, Stopped> {
+    fn close<F: Arithmetic>(
+        &mut self,
+        h: f64,
+        t1: f64,
+        observer: &mut dyn Observer,
+    ) -> Result<Moved, Stopped> {
         let inner = t1 - 2.0 * SAME_MOMENT_S;
         let suspicious = EVENTS && self.looks.suspicious();
         if suspicious || self.course.sample_due(inner).is_some() {
@@ -406,12 +459,18 @@ impl<'m, P: Pair, const EVENTS: bool> Run<'m, P, EVENTS> {
     ) -> Result<Moved, Stopped> {
         let t0 = self.course.t_s;
         stages!(self, h, P::STAGES + 1, P::STAGES + 1 + P::DENSE_STAGES, [7 8 9 10 11 12 13 14 15]);
-        for ((out, k), (y0, y1)) in
-            self.dense.iter_mut().zip(&self.k).zip(tiles(&self.course.y).iter().zip(tiles(&self.y1)))
+        for ((out, k), (y0, y1)) in self
+            .dense
+            .iter_mut()
+            .zip(&self.k)
+            .zip(tiles(&self.course.y).iter().zip(tiles(&self.y1)))
         {
             P::dense::<F>(h, y0, y1, k, out);
         }
-        let last = self.norm(|tile, l| self.dense[tile][P::DENSE_ROWS - 1][l], self.tolerance);
+        let last = self.norm(
+            |tile, l| self.dense[tile][P::DENSE_ROWS - 1][l],
+            self.tolerance,
+        );
         let mut event = None;
         if suspicious {
             let (course, dense, at) = (&mut self.course, &self.dense, &mut self.at);
@@ -461,7 +520,12 @@ impl<'m, P: Pair, const EVENTS: bool> Run<'m, P, EVENTS> {
 
 /// The dense state of all tiles.
 #[inline(always)]
-fn interpolate<P: Pair, F: Arithmetic>(theta: f64, y0: &[f64], dense: &[Polynomial], out: &mut [f64]) {
+fn interpolate<P: Pair, F: Arithmetic>(
+    theta: f64,
+    y0: &[f64],
+    dense: &[Polynomial],
+    out: &mut [f64],
+) {
     for ((o, y), rows) in tiles_mut(out).iter_mut().zip(tiles(y0)).zip(dense) {
         *o = P::interpolate::<F>(theta, y, rows);
     }

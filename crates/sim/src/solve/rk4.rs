@@ -12,7 +12,10 @@ impl Step for Rk4 {
     const NAME: &'static str = "rk4";
 
     fn new(size: usize) -> Self {
-        Self { k: std::array::from_fn(|_| vec![0.0; size]), at: vec![0.0; size] }
+        Self {
+            k: std::array::from_fn(|_| vec![0.0; size]),
+            at: vec![0.0; size],
+        }
     }
 
     fn step(&mut self, course: &mut Course, h: f64, f0: &[f64], out: &mut [f64]) {
@@ -25,7 +28,8 @@ impl Step for Rk4 {
             course.rhs(t + part * h, &self.at, &mut self.k[i]);
         }
         for (d, o) in out.iter_mut().enumerate() {
-            *o = course.y[d] + h / 6.0 * (f0[d] + 2.0 * (self.k[0][d] + self.k[1][d]) + self.k[2][d]);
+            *o = course.y[d]
+                + h / 6.0 * (f0[d] + 2.0 * (self.k[0][d] + self.k[1][d]) + self.k[2][d]);
         }
     }
 }
