@@ -1,4 +1,4 @@
-//! How cost grows with the number of carriers: `cargo run --release -p sim --example scaling -- [N] [SECONDS]`.
+//! How cost grows with the number of carriers: `cargo run --release -p sim --example scaling -- (N) [SECONDS]`.
 //!
 //! Without arguments: a table of the right-hand side's time from 1 to 10,000 carriers, and a run of 60 s at each N from 10 on. With N and
 //! SECONDS: one run, for an instruction count.

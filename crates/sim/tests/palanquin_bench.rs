@@ -75,7 +75,7 @@ fn errors(case: &str, name: &str, tolerance: f64) -> Errors {
 
 #[test]
 fn val_case_a_and_its_507_events() {
-    // What a tolerance promises: ten times itself (tests/tolerance.rs). Measured 4e-4, 1.3e-6, 5e-11.
+    // Ten times the tolerance, as tests/tolerance.rs asks of every scene.
     for (tolerance, roll_rad) in [(1e-3, 1e-2), (1e-6, 1e-5), (1e-9, 1e-8)] {
         let e = errors("A", "auto", tolerance);
         assert!(

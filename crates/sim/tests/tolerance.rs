@@ -1,6 +1,6 @@
 //! `--tolerance X` means what it says: over 60 s, roll and height of the built-in scenes stay within 10 X of a far tighter run,
-//! relative to the motion's own size. Scenes that amplify every error themselves (parametric growth of roll, tumbling near a
-//! separatrix) are allowed their measured growth and no more; no tolerance of a step can take that back.
+//! relative to the motion's own size. Five scenes miss that today and are held to what was measured, so that they get no worse: their
+//! own growth of any difference (parametric roll, tumbling near a separatrix) is the likely cause, but the solver is not yet cleared.
 
 use sim::model::Model;
 use sim::run::{Sample, run_model};

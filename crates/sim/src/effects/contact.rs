@@ -3,13 +3,13 @@
 //! ```text
 //! N* = k δ + c δ̇        N = max(0, N*)  (unilateral)        N = N*  (bilateral)        [N]
 //! ```
-//! δ compression along the normal z, shoulder minus handle [m]; k stiffness [N/m]; c damping [N·s/m].
+//! δ compression along the normal z, shoulder minus handle (m); k stiffness [N/m]; c damping [N·s/m].
 //! Holds for a massless shoulder. The unilateral force is continuous and kinks where N* = 0: that zero is the event,
 //! both ways. With c > 0 it opens before δ = 0, and a fast approach pushes before the surfaces meet: the law's known
 //! price. Energy: the spring stores ½kδ² while in contact; what is left in it at lift-off is lost in the damper, what
 //! it is given at a touch-down with δ ≠ 0 is taken back from it (both are booked, see [`crate::energy`]).
 //!
-//! Alternative law, `hunt-crossley`: N* = k δ^p (1 + d δ̇), d = c/k, p exponent [1]; k then in N/m^p. Its damping vanishes with δ, so
+//! Alternative law, `hunt-crossley`: N* = k δ^p (1 + d δ̇), d = c/k, p exponent (1); k then in N/m^p. Its damping vanishes with δ, so
 //! the force starts from zero at touch-down and never jumps; it is unilateral. For δ < 0 N* = −k|δ|^p max(1 + d δ̇, 0.01) only marks
 //! the sign. With p = 1 it is smooth through the zero. Source: Hunt & Crossley, J. Appl. Mech. 42 (1975), 440–445.
 //! Source: paper, eq. (unilateral); Brogliato, Nonsmooth Mechanics (1999), ch. 2.

@@ -3,10 +3,10 @@
 //! ```text
 //! φ̇_i += (K_c/N) Σ_j sin(φ_j − φ_i) = K_c (S cos φ_i − C sin φ_i),   S = (1/N) Σ sin φ_j,  C = (1/N) Σ cos φ_j
 //! ```
-//! On a graph: φ̇_i += K_c/(d_i + 1) Σ_{j next to i} sin(φ_j − φ_i), d_i the number of neighbours [1]; where everybody is next to
+//! On a graph: φ̇_i += K_c/(d_i + 1) Σ_{j next to i} sin(φ_j − φ_i), d_i the number of neighbours (1); where everybody is next to
 //! everybody that is the sum above. `chain` joins neighbours along each pole (handles with the same y, in the order of x).
 //!
-//! K_c strength [rad/s]; φ phases [rad]. The mean-field form is the same sum in O(N); a graph costs O(edges). For N = 2, δ = φ₂ − φ₁ locks where
+//! K_c strength [rad/s]; φ phases (rad). The mean-field form is the same sum in O(N); a graph costs O(edges). For N = 2, δ = φ₂ − φ₁ locks where
 //! |Δω| < K_c, at sin δ* = Δω/K_c. Source: paper, eq. (kuramoto); Kuramoto (1975), Strogatz (2000).
 
 use crate::lanes::{f64x2, sum};

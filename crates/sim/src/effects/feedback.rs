@@ -3,8 +3,8 @@
 //! ```text
 //! φ̇_i += κ (ℓ_i − 1) sin(α − φ_i)        ℓ̇_i = (N_i/N₀ − ℓ_i)/τ        N₀ = M|g|/N
 //! ```
-//! κ strength [rad/s]; α phase at which the load leaves the gait alone, and towards which an excess of it pulls [rad];
-//! ℓ_i felt load, in fair shares [1]; τ latency of the nerves [s]; N_i normal force [N]; N₀ fair share of the weight [N]. A
+//! κ strength [rad/s]; α phase at which the load leaves the gait alone, and towards which an excess of it pulls (rad);
+//! ℓ_i felt load, in fair shares (1); τ latency of the nerves (s); N_i normal force (N); N₀ fair share of the weight (N). A
 //! first-harmonic phase response (type 1). The latency is a state of its own, one for each carrier: without it the force would
 //! need the phase rate that it sets. A slack handle is felt as ℓ → 0, which pushes the phase away from α. ℓ starts at 1.
 //! Under a steady load ℓ it is Adler's equation with a beat at rest: φ drifts at √(ω² − κ²(ℓ−1)²).

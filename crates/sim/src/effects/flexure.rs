@@ -3,9 +3,9 @@
 //! ```text
 //! s_i = R (p_i + s(x_i) q ẑ)        m q̈ = Σ_i s(x_i) F_i · R ẑ − m ω² q − 2 ζ m ω q̇        s(x) = (3u² − u³)/2,  u = |x|/x_max
 //! ```
-//! q deflection of the pole's ends against the body's z axis [m]: one mode, two states (q, q̇) for each pole; m modal mass [kg];
-//! ω = 2πf natural frequency [rad/s]; ζ damping ratio [1]; s(x) mode shape, 1 at the farthest handle x_max of the pole and
-//! 0 at its middle, where the body is lashed on [1]; F_i handle force [N]. Handles with the same y belong to one pole.
+//! q deflection of the pole's ends against the body's z axis (m): one mode, two states (q, q̇) for each pole; m modal mass (kg);
+//! ω = 2πf natural frequency [rad/s]; ζ damping ratio (1); s(x) mode shape, 1 at the farthest handle x_max of the pole and
+//! 0 at its middle, where the body is lashed on (1); F_i handle force (N). Handles with the same y belong to one pole.
 //! Holds for small q and m ≪ M: the mode's own weight and its inertial pull on the body are left out. What is kept comes from the
 //! virtual work of the handle forces, so energy balances exactly. q > 0 where the ends are pressed up. A pole whose handles are
 //! all at x = 0 does not bend. Source: cantilever deflection under an end load, Timoshenko, *Strength of

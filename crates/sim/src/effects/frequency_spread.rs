@@ -1,6 +1,6 @@
 //! Natural frequencies differ from carrier to carrier: ω_i = 2π (f_i + s·z_i), z_i standard normal from the seed.
 //!
-//! s standard deviation [Hz]. Source: the archive's logs, 1.999 Hz mean and 0.0553 Hz SD across carriers.
+//! s standard deviation (Hz). Source: the archive's logs, 1.999 Hz mean and 0.0553 Hz SD across carriers.
 
 use crate::model::Model;
 use crate::random::{Stream, normal};

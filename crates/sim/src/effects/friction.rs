@@ -3,7 +3,7 @@
 //! ```text
 //! e = T*/(μN) + ḋ/v_s        T = μN · e/√(1 + |e|²)        |T| < μN        [N]
 //! ```
-//! T* the hold's force (zero without `hold`) [N]; μ coefficient [1]; N normal force [N], ≥ 0; ḋ sliding velocity,
+//! T* the hold's force (zero without `hold`) (N); μ coefficient (1); N normal force (N), ≥ 0; ḋ sliding velocity,
 //! shoulder minus handle, in the plane [m/s]; v_s regularising velocity [m/s]. As v_s → 0 with no hold it is Coulomb's
 //! law; |T*| ≪ μN and v_s → ∞ leave the hold as it is. With N → 0 the force vanishes like μN. Smooth everywhere, so
 //! sticking and sliding are no events; it creeps at |T|/(μN)·v_s where true dry friction would stick.
@@ -13,7 +13,7 @@
 //! ```text
 //! ż = ḋ − (σ₀/μ) |ḋ| z        T = N (σ₀ z + σ₁ ż)
 //! ```
-//! z bristle deflection [m]; σ₀ stiffness per load [1/m]; σ₁ damping per load [s/m]. In steady sliding T = μN along ḋ; under
+//! z bristle deflection (m); σ₀ stiffness per load [1/m]; σ₁ damping per load [s/m]. In steady sliding T = μN along ḋ; under
 //! μN it sticks: a spring of N σ₀ with no creep. |z| ≤ μ/σ₀ for ever if it is so once. On a slack handle T = 0 and z keeps
 //! following ḋ. |ḋ| has a kink at ḋ = 0, which costs the solver a few short steps. What the bristles hold counts as dissipated
 //! until they give it back. Source: Dahl (1968); load-scaled LuGre: Canudas de Wit & Tsiotras, CDC 1999, without its Stribeck curve.

@@ -3,8 +3,8 @@
 //! ```text
 //! b_i = b_i0 + Σ_k A_k sin(k φ_i + α_k)        ḃ_i = Σ_k k φ̇_i A_k cos(k φ_i + α_k)
 //! ```
-//! b_i0 resting shoulder [m]; A_k vector amplitude [m] and α_k phase per axis [rad] of harmonic k = 1 … K; φ_i gait
-//! phase [rad]. Prescribed motion: the load does not push the shoulder back, whatever the force.
+//! b_i0 resting shoulder (m); A_k vector amplitude (m) and α_k phase per axis (rad) of harmonic k = 1 … K; φ_i gait
+//! phase (rad). Prescribed motion: the load does not push the shoulder back, whatever the force.
 //! Source: paper, eq. (base).
 
 use crate::lanes::{f64x2, pack};

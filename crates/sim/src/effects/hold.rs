@@ -3,7 +3,7 @@
 //! ```text
 //! T* = k_t d + c_t ḋ        [N], in x and y
 //! ```
-//! d shoulder minus handle in the plane normal to z [m]; k_t stiffness [N/m]; c_t damping [N·s/m]. Alone it is never
+//! d shoulder minus handle in the plane normal to z (m); k_t stiffness [N/m]; c_t damping [N·s/m]. Alone it is never
 //! capped and acts on a slack handle too (a grip); with the effect `friction` it cannot exceed μN.
 //! Source: paper, section 3.3 ("tangential forces can be added"); palanquin-bench, law of T.
 

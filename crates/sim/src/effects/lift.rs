@@ -3,7 +3,7 @@
 //! ```text
 //! z_i = z_i0 + G(t) (z_i,gait − z_i0)        G(t) = 1 + (g − 1)(1 − e^{−(t − t₀)/τ})  for t ≥ t₀,  1 before
 //! ```
-//! g gain [1]; t₀ onset [s]; τ build-up [s], where 0 means g from t₀ on (then the shoulders jump at t₀ > 0, so a build-up
+//! g gain (1); t₀ onset (s); τ build-up (s), where 0 means g from t₀ on (then the shoulders jump at t₀ > 0, so a build-up
 //! is asked for there). Source: the archive's music logs, whose summed force is large before the phases lock.
 
 use crate::model::{Model, Stage, Switch, Term, Workspace};

@@ -3,7 +3,7 @@
 //! ```text
 //! dφ_i = … + σ dW_i,   W_i(t) piecewise linear on the grid t_j = j·h, with independent increments √h z_ij,  z standard normal
 //! ```
-//! σ strength [rad/√s]; h = 1/grid_hz [s]. On multiples of h the path is an exact Brownian path; between them it is straight, so
+//! σ strength [rad/√s]; h = 1/grid_hz (s). On multiples of h the path is an exact Brownian path; between them it is straight, so
 //! the phases have a constant extra rate σ z_ij/√h and the equations stay smooth: every grid point is an event that the
 //! solver meets exactly. The path is a function of (seed, carrier, time): a smaller step converges to the same motion.
 //! Source: the archive's logs (white, 0.0100 rad/√s at every lag from 0.033 s to 10 s).

@@ -5,9 +5,9 @@
 //! χ(t) = Δχ S((t − t₀)/T),  S(u) = u³(10 − 15u + 6u²) on 0 … 1        ċ = v (cos χ − 1, sin χ)         (turn)
 //! b_i ← c + R_z(χ) b_i        ḃ_i ← ċ + R_z(χ) ḃ_i + χ̇ ẑ × R_z(χ) b_i
 //! ```
-//! s slope, positive uphill along the walk [rad]; b bank, positive where the left side is the higher one [rad]; z stays the normal
-//! of the ground. χ heading [rad], Δχ turn (left is positive), t₀ beginning, T time it takes [s]; v walking speed, the
-//! x part of `carriers.walk_m_per_s` [m/s]; c where the party's centre is, against the straight walk [m]: two states. Heading, its
+//! s slope, positive uphill along the walk (rad); b bank, positive where the left side is the higher one (rad); z stays the normal
+//! of the ground. χ heading (rad), Δχ turn (left is positive), t₀ beginning, T time it takes (s); v walking speed, the
+//! x part of `carriers.walk_m_per_s` [m/s]; c where the party's centre is, against the straight walk (m): two states. Heading, its
 //! rate and its curvature are continuous, so nothing jerks; t₀ and t₀ + T are moments the solver meets. Shoulders keep their
 //! places in the party, which turns as a whole: the outer carriers walk faster. Frames are not turned: everything
 //! stays in axes at rest, and centrifugal forces come out by themselves.

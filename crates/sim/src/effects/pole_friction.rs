@@ -3,7 +3,7 @@
 //! ```text
 //! τ_x = −ρ Σ N_i · ω_x/√(ω_x² + ω_s²)        [N·m], about the body's x axis, the pole
 //! ```
-//! ρ friction arm: coefficient times radius of the pole [m]; N_i normal forces [N]; ω_x roll rate in the body [rad/s];
+//! ρ friction arm: coefficient times radius of the pole (m); N_i normal forces (N); ω_x roll rate in the body [rad/s];
 //! ω_s regularising rate [rad/s]. Small turns meet a viscous torque ρ N ω_x/ω_s, large ones a constant ρN: so small
 //! swings die fast and large ones live. A slack handle does not rub; a bilateral one rubs with |N|.
 //! Source: the archive's logs (damping 1.0 … 1.2 1/s for small swings, 0.39 1/s for large ones); the law is the

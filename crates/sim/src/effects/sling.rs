@@ -3,8 +3,8 @@
 //! ```text
 //! T = (N/L) (d + τ ḋ)        [N], in x and y
 //! ```
-//! N normal force [N], taken as 0 where it would pull; d shoulder minus handle in the plane normal to z [m]; L length of
-//! the strap [m]: the force keeps pointing along a strap of that length, small angles; τ damping time [s]. A slack handle is
+//! N normal force (N), taken as 0 where it would pull; d shoulder minus handle in the plane normal to z (m); L length of
+//! the strap (m): the force keeps pointing along a strap of that length, small angles; τ damping time (s). A slack handle is
 //! free sideways. The force is conservative at constant N only: where N changes with d held, the load does the work, so
 //! the account books no stored energy and everything absorbed as dissipated (it may be given back).
 //!

@@ -220,12 +220,11 @@ fn readable(message: &str) -> String {
         message = message.replace(theirs, ours);
     }
     let mut ticks = message.split('`').skip(1).step_by(2);
-    if message.starts_with("unknown field") || message.starts_with("unknown variant") {
-        if let Some(word) = ticks.next() {
-            if let Some(name) = nearest(word, ticks) {
-                return format!("{message}. Did you mean `{name}`?");
-            }
-        }
+    if (message.starts_with("unknown field") || message.starts_with("unknown variant"))
+        && let Some(word) = ticks.next()
+        && let Some(name) = nearest(word, ticks)
+    {
+        return format!("{message}. Did you mean `{name}`?");
     }
     message
 }

@@ -3,8 +3,8 @@
 //! ```text
 //! x(t) = a Σ_k e^{−(t − t_k)/d} [ sin(2π p (t − t_k + g d (1 − e^{−(t − t_k)/d}))) + c e^{−(t − t_k)/0.004} n(t) ] + σ n(t),   t ≥ t_k
 //! ```
-//! t_k strokes of the beat [s]; a level, d decay [s], p pitch [Hz], g = 0.6 glide of the skin from 1.6 p down to p [1], c = 0.3 click of the
-//! stick [1]; n white noise of unit variance, σ noise of the place [1]. Full scale is 1: sums beyond it clip, as they do in a microphone.
+//! t_k strokes of the beat (s); a level, d decay (s), p pitch (Hz), g = 0.6 glide of the skin from 1.6 p down to p (1), c = 0.3 click of the
+//! stick (1); n white noise of unit variance, σ noise of the place (1). Full scale is 1: sums beyond it clip, as they do in a microphone.
 //! The recorder's own clock: sample k is taken at k/(rate (1 + drift)) true time and stamped offset + k/rate. Source: the usual model of a
 //! membrane struck once, Fletcher & Rossing, *The Physics of Musical Instruments* (1998), ch. 18.
 

@@ -6,9 +6,9 @@
 //! ```
 //! f specific force in the sensor's axes [m/s²] (+g on the axis that points up at rest, REP-145); a acceleration of the
 //! centre of mass in the world, g gravity [m/s²]; R body → world, C sensor → body; ω, α angular velocity and acceleration
-//! in the body [rad/s, rad/s²]; p place of the sensor from the centre of mass, body axes [m]. u the truth (f or ω_s),
-//! S diagonal scale errors [1], X misalignment (small angles between the axes) [rad], b bias, n white noise of density D
-//! [unit/√Hz] at sample rate r [Hz], W bias walk [unit/s/√Hz], Q rounding to the resolution.
+//! in the body [rad/s, rad/s²]; p place of the sensor from the centre of mass, body axes (m). u the truth (f or ω_s),
+//! S diagonal scale errors (1), X misalignment (small angles between the axes) (rad), b bias, n white noise of density D
+//! [unit/√Hz] at sample rate r (Hz), W bias walk [unit/s/√Hz], Q rounding to the resolution.
 //! On a carrier the sensor rides on the shoulder, which does not turn but with the party's path: f = b̈ − g.
 //!
 //! Holds for a sensor rigid on its body whose own bandwidth is above r/2: each sample is the instantaneous value, so

@@ -90,17 +90,15 @@ pub fn first(looks: &Looks, resolution: f64, mut margin: impl FnMut(f64) -> f64)
             // A dip between stages shows as the lowest of three neighbours.
             if let (Some(before), Some(after)) =
                 (i.checked_sub(1).map(|j| seen[j]), seen.get(i + 1))
+                && value < NEAR * looks.most
+                && value <= before.1
+                && value <= after.1
+                && after.1 >= 0.0
             {
-                if value < NEAR * looks.most
-                    && value <= before.1
-                    && value <= after.1
-                    && after.1 >= 0.0
-                {
-                    let at = lowest(before, (theta, value), *after);
-                    let b = (at, margin(at));
-                    if b.1 < 0.0 {
-                        return Some(between(a, b, resolution, margin));
-                    }
+                let at = lowest(before, (theta, value), *after);
+                let b = (at, margin(at));
+                if b.1 < 0.0 {
+                    return Some(between(a, b, resolution, margin));
                 }
             }
             a = (theta, value);

@@ -10,6 +10,7 @@
 //!
 //! States are held in tiles of [`TILE`] numbers, and the sums over stages are unrolled for each row of the tableau: no
 //! allocation, no index check and no loop over coefficients is left inside a step.
+#![allow(clippy::int_plus_one)] // an unrolled stage may read `7 >= n + 1`
 
 use super::course::{Course, SAME_MOMENT_S};
 use super::events::{self, Looks};
