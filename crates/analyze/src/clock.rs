@@ -3,7 +3,7 @@
 //! ```text
 //! t_reference = t_device + o + d · (t_device − t₀)
 //! ```
-//! o offset at t₀ [s], d drift [1; 1e-6 is 1 ppm], t₀ the middle of what they share [s]. Two ways to find them:
+//! o offset at t₀ (s), d drift [1; 1e-6 is 1 ppm], t₀ the middle of what they share (s). Two ways to find them:
 //! [`from_signals`] when both felt the same motion (the norm of the angular velocity on one rigid body does not depend on how
 //! a device is mounted), and [`from_events`] when both noticed the same taps, claps or beats.
 //!

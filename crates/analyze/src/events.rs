@@ -7,7 +7,7 @@ use crate::phase;
 /// One event.
 #[derive(Clone, Debug, PartialEq, serde::Serialize)]
 pub struct Event {
-    /// When [s] after the recording's first message.
+    /// When (s) after the recording's first message.
     pub t_s: f64,
     /// `onset`, `contact_lost`, `contact_regained`, `jump`, `beat_start`, `locked`, `gap`, ...
     pub kind: &'static str,
@@ -17,7 +17,7 @@ pub struct Event {
 
 /// Mean order parameter from which a stretch of [`LOCK_STRETCH_S`] counts as locked.
 const LOCKED: f64 = 0.95;
-/// Length of a stretch judged for locking [s].
+/// Length of a stretch judged for locking (s).
 const LOCK_STRETCH_S: f64 = 5.0;
 /// The support below this share of the weight is a jump's flight.
 const FLIGHT: f64 = crate::metrics::FLOAT_SHARE;

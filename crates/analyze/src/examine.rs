@@ -17,7 +17,7 @@ use crate::summary::{Stream, Summary, Times, segment};
 /// What is asked of a recording.
 #[derive(Clone, Debug, Default)]
 pub struct Request {
-    /// First and last moment of the window [s]; what is `None` is decided by the recording.
+    /// First and last moment of the window (s); what is `None` is decided by the recording.
     pub window: (Option<f64>, Option<f64>),
     /// Signals to list, with wildcards; empty means all.
     pub signals: Vec<String>,
@@ -48,7 +48,7 @@ pub struct Quality {
     pub kind: &'static str,
     /// How often.
     pub count: u64,
-    /// When first [s].
+    /// When first (s).
     pub t_s: Option<f64>,
     /// One line for people.
     pub text: String,
@@ -68,7 +68,7 @@ pub struct Topic {
     pub encoding: String,
     /// Messages.
     pub messages: u64,
-    /// Mean rate [Hz].
+    /// Mean rate (Hz).
     pub hz: Option<f64>,
 }
 
@@ -77,11 +77,11 @@ pub struct Topic {
 pub struct Analysis {
     /// Name of the file.
     pub file: String,
-    /// Last minus first log time [s].
+    /// Last minus first log time (s).
     pub duration_s: f64,
     /// Samples of the motion, or messages of the busiest topic where there is none.
     pub samples: u64,
-    /// The window [s].
+    /// The window (s).
     pub window: Window,
     /// Profile of the file.
     pub profile: String,
@@ -117,7 +117,7 @@ pub struct Analysis {
     pub traces: Vec<Trace>,
 }
 
-/// Signals of one topic and unit, drawn together: name, times [s] and values of each.
+/// Signals of one topic and unit, drawn together: name, times (s) and values of each.
 #[derive(Clone, Debug, Default)]
 pub struct Trace {
     /// Topic and the part of the path that the signals share.
@@ -349,7 +349,7 @@ struct Pass<'a> {
     request: &'a Request,
     roles: &'a Roles,
     times: Vec<Times>,
-    /// Rough rate of each channel, for the length of the segments [Hz].
+    /// Rough rate of each channel, for the length of the segments (Hz).
     rough_hz: Vec<f64>,
     entries: Vec<Entry>,
     /// Entry of a column of the stream.

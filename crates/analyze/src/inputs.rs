@@ -2,7 +2,7 @@
 
 use std::borrow::Cow;
 
-/// A stretch of time [s], both ends included.
+/// A stretch of time (s), both ends included.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Window {
     /// First moment.
@@ -64,30 +64,30 @@ impl Default for Sources {
 /// What a run gives. Every column may be empty, which means "not known"; columns of one time axis are equally long.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Inputs {
-    /// Time of the height and the angles, ascending [s].
+    /// Time of the height and the angles, ascending (s).
     pub t_s: Vec<f64>,
-    /// Height of the centre of mass [m].
+    /// Height of the centre of mass (m).
     pub height_m: Vec<f64>,
-    /// Rotation about the pole [rad].
+    /// Rotation about the pole (rad).
     pub roll_rad: Vec<f64>,
-    /// Tilt of the pole [rad].
+    /// Tilt of the pole (rad).
     pub pitch_rad: Vec<f64>,
-    /// Heading [rad].
+    /// Heading (rad).
     pub yaw_rad: Vec<f64>,
-    /// Time of the forces [s]; empty means `t_s`.
+    /// Time of the forces (s); empty means `t_s`.
     pub force_t_s: Vec<f64>,
-    /// Normal force of each handle [N].
+    /// Normal force of each handle (N).
     pub normal_n: Vec<Vec<f64>>,
     /// N_tot / (M g) where it is measured as such (the vertical specific force of the centre of mass over g), on `t_s`.
     /// Used where `normal_n` is empty.
     pub support_ratio: Vec<f64>,
-    /// Time of the phases [s]; empty means `t_s`.
+    /// Time of the phases (s); empty means `t_s`.
     pub phase_t_s: Vec<f64>,
-    /// Gait phase of each carrier [rad], wrapped or not.
+    /// Gait phase of each carrier (rad), wrapped or not.
     pub phase_rad: Vec<Vec<f64>>,
-    /// Phase of the beat on the phases' time [rad]; NaN where no beat sounds.
+    /// Phase of the beat on the phases' time (rad); NaN where no beat sounds.
     pub beat_phase_rad: Vec<f64>,
-    /// Mass of what is carried [kg].
+    /// Mass of what is carried (kg).
     pub mass_kg: Option<f64>,
     /// Gravity [m/s²].
     pub gravity_m_per_s2: f64,
@@ -139,7 +139,7 @@ impl Inputs {
         }
     }
 
-    /// Sum of the handles' normal forces at each force sample [N]; empty without forces.
+    /// Sum of the handles' normal forces at each force sample (N); empty without forces.
     pub fn total_force_n(&self) -> Vec<f64> {
         let Some(first) = self.normal_n.first() else {
             return Vec::new();
@@ -152,7 +152,7 @@ impl Inputs {
     }
 }
 
-/// Mean step of an ascending time axis [s]; `None` below two samples or for a step that is not positive.
+/// Mean step of an ascending time axis (s); `None` below two samples or for a step that is not positive.
 pub fn mean_step_s(t_s: &[f64]) -> Option<f64> {
     let (first, last) = (t_s.first()?, t_s.last()?);
     let step = (last - first) / (t_s.len().checked_sub(1)? as f64);

@@ -2,7 +2,7 @@
 
 use std::fmt;
 
-/// RMS roll below which there is nothing to explain [deg].
+/// RMS roll below which there is nothing to explain (deg).
 pub const QUIET_DEG: f64 = 1.0;
 /// The share of roll power that a line has to hold to be called the roll's line.
 pub const LINE_SHARE: f64 = 0.5;
@@ -39,7 +39,7 @@ impl Verdict {
 /// ```text
 /// θ̈ = −a·N_tot·sin θ − b·θ̇  (+ Σ c_i (N_i − N̄))
 /// ```
-/// θ roll [rad], N_tot summed normal force [N], a [1/(kg·m)], b [1/s], N̄ the handles' mean force, c_i [1/(kg·m²)·m]. R² is that of the
+/// θ roll (rad), N_tot summed normal force (N), a [1/(kg·m)], b [1/s], N̄ the handles' mean force, c_i [1/(kg·m²)·m]. R² is that of the
 /// part without brackets; `delta_n_gain` is by how much the bracket raises it: the strength of a drive by force differences (ΔN).
 /// θ̇ and θ̈ are those of the natural cubic interpolant with not-a-knot ends, four samples left out at each end: on the
 /// archive's music logs that gives a = 0.0479, b = 0.391, R² = 0.992. A line at ω is seen too large by (ωΔt)²/12 in θ̈ (0.4 % there).
@@ -58,9 +58,9 @@ pub struct RollFit {
 /// The evidence behind a verdict.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Evidence {
-    /// RMS roll about zero [rad].
+    /// RMS roll about zero (rad).
     pub rms_roll_rad: f64,
-    /// The height's strongest line f [Hz].
+    /// The height's strongest line f (Hz).
     pub f_hz: Option<f64>,
     /// Share of roll power near f/2.
     pub share_at_half: Option<f64>,
@@ -245,7 +245,7 @@ fn eliminate(mut m: Vec<Vec<f64>>) -> Option<Vec<f64>> {
 /// M_{k−1} + 4 M_k + M_{k+1} = 6 (y_{k−1} − 2y_k + y_{k+1}) / h²,   M₀ = 2M₁ − M₂,   M_{n−1} = 2M_{n−2} − M_{n−3}
 /// y'_k = (y_{k+1} − y_k)/h − h (2M_k + M_{k+1}) / 6
 /// ```
-/// y [unit], h the step [s], M the second derivatives [unit/s²]. Source: de Boor, A Practical Guide to Splines (1978), ch. IV.
+/// y [unit], h the step (s), M the second derivatives [unit/s²]. Source: de Boor, A Practical Guide to Splines (1978), ch. IV.
 pub fn spline_derivatives(y: &[f64], step_s: f64) -> Option<(Vec<f64>, Vec<f64>)> {
     let n = y.len();
     if n < 4 {

@@ -8,7 +8,7 @@ use crate::spectrum::{DEFAULT_SEGMENT_S, Options, Spectrum, welch};
 /// A line of a spectrum.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Peak {
-    /// Frequency, refined between bins [Hz].
+    /// Frequency, refined between bins (Hz).
     pub hz: f64,
     /// Power spectral density at its bin [unit²/Hz].
     pub power: f64,
@@ -23,17 +23,17 @@ pub struct SpectrumSummary {
     pub method: &'static str,
     /// Taper.
     pub window: &'static str,
-    /// The strongest line [Hz].
+    /// The strongest line (Hz).
     pub peak_hz: Option<f64>,
     /// The lines, strongest first.
     pub peaks: Vec<Peak>,
-    /// f, after which the lines are named: the beat, else the height's strongest line [Hz].
+    /// f, after which the lines are named: the beat, else the height's strongest line (Hz).
     pub f_hz: Option<f64>,
-    /// Length of a segment [s].
+    /// Length of a segment (s).
     pub segment_s: f64,
-    /// 1 / segment length [Hz].
+    /// 1 / segment length (Hz).
     pub resolution_hz: f64,
-    /// Equivalent noise bandwidth [Hz].
+    /// Equivalent noise bandwidth (Hz).
     pub enbw_hz: f64,
     /// Segments averaged.
     pub segments: usize,

@@ -12,7 +12,7 @@ use realfft::num_complex::Complex64;
 /// ```text
 /// r(t) = |(1/N) Σ_j e^{iφ_j(t)}|
 /// ```
-/// φ_j phase of carrier j [rad], wrapped or not; r 0 (spread out) … 1 (together). One carrier gives 1; none gives nothing.
+/// φ_j phase of carrier j (rad), wrapped or not; r 0 (spread out) … 1 (together). One carrier gives 1; none gives nothing.
 /// Source: Acebrón et al., Rev. Mod. Phys. 77 (2005) 137.
 pub fn order_parameter(phases_rad: &[&[f64]]) -> Vec<f64> {
     let samples = phases_rad.iter().map(|p| p.len()).min().unwrap_or(0);
@@ -173,15 +173,15 @@ fn j0_zero(k: usize) -> f64 {
 /// Mean direction, concentration and spread of angles.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Circular {
-    /// Mean direction [rad], −π … π.
+    /// Mean direction (rad), −π … π.
     pub mean_rad: f64,
     /// Resultant length, 0 … 1; of a relative phase this is the phase-locking value (PLV).
     pub resultant: f64,
-    /// Circular standard deviation √(−2 ln R) [rad]; infinite spread is given as `None`.
+    /// Circular standard deviation √(−2 ln R) (rad); infinite spread is given as `None`.
     pub sd_rad: Option<f64>,
 }
 
-/// Circular statistics of angles [rad]. `None` for no angles. Source: Mardia & Jupp, Directional Statistics (2000), ch. 2.
+/// Circular statistics of angles (rad). `None` for no angles. Source: Mardia & Jupp, Directional Statistics (2000), ch. 2.
 pub fn circular(angles_rad: impl IntoIterator<Item = f64>) -> Option<Circular> {
     let (mut c, mut s, mut n) = (0.0, 0.0, 0usize);
     for angle in angles_rad {

@@ -14,7 +14,7 @@ pub const ANGLES: [&str; 3] = ["roll", "pitch", "yaw"];
 /// pitch = asin(2(wy − zx))
 /// yaw   = atan2(2(wz + xy), 1 − 2(y² + z²))
 /// ```
-/// (x, y, z, w) any multiple of a unit quaternion [1]; angles [rad], pitch within ±π/2. At pitch = ±π/2 roll and yaw are only known together:
+/// (x, y, z, w) any multiple of a unit quaternion (1); angles (rad), pitch within ±π/2. At pitch = ±π/2 roll and yaw are only known together:
 /// their difference or sum stays right. A quaternion whose norm² lies outside 0.5 … 2 is none: NaN. Source: REP-103; Diebel (2006).
 pub fn angles(x: f64, y: f64, z: f64, w: f64) -> [f64; 3] {
     let n = x * x + y * y + z * z + w * w;

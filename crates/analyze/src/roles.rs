@@ -8,19 +8,19 @@ use serde::Deserialize;
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash, serde::Serialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Role {
-    /// Height of the centre of mass [m].
+    /// Height of the centre of mass (m).
     Height,
-    /// Rotation about the pole [rad].
+    /// Rotation about the pole (rad).
     Roll,
-    /// Tilt of the pole [rad].
+    /// Tilt of the pole (rad).
     Pitch,
-    /// Heading [rad].
+    /// Heading (rad).
     Yaw,
-    /// Normal force of one handle [N]; as many as there are handles.
+    /// Normal force of one handle (N); as many as there are handles.
     Forces,
-    /// Gait phase of one carrier [rad]; as many as there are carriers.
+    /// Gait phase of one carrier (rad); as many as there are carriers.
     Phases,
-    /// Phase of the beat [rad].
+    /// Phase of the beat (rad).
     BeatPhase,
     /// Topic of the IMU on what is carried.
     Imu,
@@ -89,11 +89,11 @@ pub struct RolesFile {
     carriers: Vec<String>,
     beats: Option<String>,
     truth: Option<String>,
-    /// Mass of what is carried [kg]; stands over the recording's own.
+    /// Mass of what is carried (kg); stands over the recording's own.
     pub mass_kg: Option<f64>,
     /// Gravity [m/s²]; stands over the recording's own.
     pub gravity_m_per_s2: Option<f64>,
-    /// Start of the analysis window [s], where `--window` does not say.
+    /// Start of the analysis window (s), where `--window` does not say.
     pub analysis_start_s: Option<f64>,
 }
 

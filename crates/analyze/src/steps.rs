@@ -10,7 +10,7 @@
 //!                                           k the harmonic that swings most
 //! φ(t)  = arg( x + i H{x} )                 x: m within 0.6 f … 1.5 f, H the Hilbert transform
 //! ```
-//! m [m/s²], τ [s], f steps per second [Hz], φ gait phase, 2π per step, 0 at a step [rad].
+//! m [m/s²], τ (s), f steps per second (Hz), φ gait phase, 2π per step, 0 at a step (rad).
 //!
 //! Holds for walking and running at 0.8 – 3.3 steps/s, at least [`SHORTEST_S`] of it, sampled at 15 Hz or faster. Every
 //! place of wear sees a step early or late by a constant (−48 … +89 ms on the lower back, by detector): phases between

@@ -9,9 +9,9 @@ use crate::spectrum::{DEFAULT_SEGMENT_S, Options, Spectrum};
 pub struct Summary {
     /// Finite values.
     pub count: u64,
-    /// Mean rate: (messages − 1) / (last − first log time) [Hz]; `None` below two.
+    /// Mean rate: (messages − 1) / (last − first log time) (Hz); `None` below two.
     pub hz: Option<f64>,
-    /// Population standard deviation of the steps between log times [s].
+    /// Population standard deviation of the steps between log times (s).
     pub jitter_s: Option<f64>,
     /// Smallest value.
     pub min: Option<f64>,
@@ -21,7 +21,7 @@ pub struct Summary {
     pub mean: Option<f64>,
     /// Population standard deviation.
     pub sd: Option<f64>,
-    /// Strongest line of Welch's spectrum, constant part taken off [Hz].
+    /// Strongest line of Welch's spectrum, constant part taken off (Hz).
     pub peak_hz: Option<f64>,
     /// Unit, where known.
     pub unit: String,
@@ -164,13 +164,13 @@ impl Times {
         self.count
     }
 
-    /// Mean rate [Hz].
+    /// Mean rate (Hz).
     pub fn hz(&self) -> Option<f64> {
         let span_s = seconds(self.earliest_ns, self.latest_ns);
         (self.count > 1 && span_s > 0.0).then(|| (self.count - 1) as f64 / span_s)
     }
 
-    /// Population standard deviation of the steps [s].
+    /// Population standard deviation of the steps (s).
     pub fn jitter_s(&self) -> Option<f64> {
         self.steps.sd()
     }

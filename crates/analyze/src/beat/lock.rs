@@ -3,7 +3,7 @@
 //! ```text
 //! Δ = φ − ψ,     dΔ/dt = Δω − K sin(Δ − Δ₀)
 //! ```
-//! φ the carrier's phase, ψ the beat's [rad], Δω what the carrier would do alone minus the beat [rad/s], K the pull of the
+//! φ the carrier's phase, ψ the beat's (rad), Δω what the carrier would do alone minus the beat [rad/s], K the pull of the
 //! music [rad/s], Δ₀ where a carrier without detuning would settle (the detector's constant offset is in it). For |Δω| ≤ K
 //! the carrier is captured; outside it slips. Δω, K and Δ₀ are found by least squares from increments of Δ, so only a
 //! transient or slips show K: a carrier that has long settled says only that |Δω| ≤ K.

@@ -9,7 +9,7 @@ use recording::read::Recording;
 use recording::topics::MessageKind;
 use recording::write::{RawChannel, RecordingWriter, WriterOptions};
 
-/// Length of the moving stretch whose RMS roll is written [s].
+/// Length of the moving stretch whose RMS roll is written (s).
 const STRETCH_S: f64 = analyze::metrics::ONSET_STRETCH_S;
 
 /// Copies every message as it is and adds `/findings/...`; the file appears whole or not at all.

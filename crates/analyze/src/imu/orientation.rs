@@ -7,7 +7,7 @@
 //! q_gyr = Π exp(½ (ω − b) Δt)                strap-down integration into an almost inertial frame
 //! q_acc : takes LP{ q_gyr a q_gyr* } to the vertical, by the shortest turn
 //! ```
-//! ω gyroscope [rad/s], b its bias [rad/s], a specific force [m/s²], LP a second-order low-pass with time constant τ [s]. In the
+//! ω gyroscope [rad/s], b its bias [rad/s], a specific force [m/s²], LP a second-order low-pass with time constant τ (s). In the
 //! inertial frame gravity stands still while motion averages out, so τ of some seconds keeps both sides honest.
 //!
 //! Batch: the bias is smoothed over time (a filter forward, one backward over the reversed samples with −ω, joined by
@@ -287,7 +287,7 @@ fn integrate(track: &Track, bias: &[[f64; 3]]) -> Vec<UnitQuaternion<f64>> {
 
 /// Second-order Butterworth low-pass with time constant `tau_s`, forward and backward, in place.
 ///
-/// Corner √2/(2πτ) [Hz], the damped part of the step response then decays with τ. The first pass begins as if
+/// Corner √2/(2πτ) (Hz), the damped part of the step response then decays with τ. The first pass begins as if
 /// the mean of the first τ seconds had always been there, the second as if its first value had.
 fn smooth(x: &mut [f64], period_s: f64, tau_s: f64) {
     let rate_hz = 1.0 / period_s;

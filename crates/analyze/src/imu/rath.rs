@@ -5,7 +5,7 @@
 //! s     = (R f_com)_z / g = N_tot / (M g)     the support ratio: T_float counts s ≤ 0.05
 //! a_up  = (R f_com)_z − g                     its double integral is the height
 //! ```
-//! f specific force at the sensor [m/s²], r from the centre of mass to the sensor in the body's axes [m], ω angular velocity [rad/s], α its
+//! f specific force at the sensor [m/s²], r from the centre of mass to the sensor in the body's axes (m), ω angular velocity [rad/s], α its
 //! derivative [rad/s²], R body → earth, g gravity [m/s²]. Only contact lifts the body, so its specific force *is* the support force over its
 //! mass: no force sensor is needed for T_float. With r unknown (0) the term in brackets stays in, up to r·ω² and r·α.
 //!

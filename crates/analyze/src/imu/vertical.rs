@@ -4,7 +4,7 @@
 //! z = argmin Σ ( (z_{i−1} − 2 z_i + z_{i+1})/Δt² − (a_{i−1} + 10 a_i + a_{i+1})/12 )² + ω₀⁴ Σ z_i²
 //! |Z/A| = (1/ω²) · 1 / (1 + (f₀/f)⁴)
 //! ```
-//! a vertical acceleration [m/s²], z height about its slow course [m], Δt step [s], ω₀ = 2πf₀. Integrating twice lets the
+//! a vertical acceleration [m/s²], z height about its slow course (m), Δt step (s), ω₀ = 2πf₀. Integrating twice lets the
 //! smallest bias grow with t²; the second term holds what is slower than f₀ at zero. It is the zero-phase second-order
 //! Butterworth high-pass, but its ends are free: nothing is reflected or padded there, and no transient rings.
 //!

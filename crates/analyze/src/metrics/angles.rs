@@ -2,7 +2,7 @@
 
 use super::{Context, Value};
 
-/// |roll| beyond which a sample counts as excess [deg].
+/// |roll| beyond which a sample counts as excess (deg).
 const EXCESS_DEG: f64 = 15.0;
 
 /// Root mean square about zero, √(Σx²/n), in degrees.

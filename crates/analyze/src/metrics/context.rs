@@ -29,7 +29,7 @@ pub enum Need {
 
 /// One column in the window, finite.
 pub struct Series<'a> {
-    /// Times [s].
+    /// Times (s).
     pub t_s: Cow<'a, [f64]>,
     /// Values.
     pub x: Cow<'a, [f64]>,
@@ -37,7 +37,7 @@ pub struct Series<'a> {
 
 /// Several columns on one time axis in the window; samples at which any is not finite are left out of all.
 pub struct Table<'a> {
-    /// Times [s].
+    /// Times (s).
     pub t_s: Cow<'a, [f64]>,
     /// Columns.
     pub columns: Vec<Cow<'a, [f64]>>,
@@ -126,22 +126,22 @@ impl<'a> Context<'a> {
         }
     }
 
-    /// The roll [rad].
+    /// The roll (rad).
     pub fn roll(&self) -> &Series<'a> {
         self.roll.get_or_init(|| self.series(&self.inputs.roll_rad))
     }
 
-    /// The pitch [rad].
+    /// The pitch (rad).
     pub fn pitch(&self) -> Series<'a> {
         self.series(&self.inputs.pitch_rad)
     }
 
-    /// The yaw [rad].
+    /// The yaw (rad).
     pub fn yaw(&self) -> Series<'a> {
         self.series(&self.inputs.yaw_rad)
     }
 
-    /// The height [m].
+    /// The height (m).
     pub fn height(&self) -> &Series<'a> {
         self.height
             .get_or_init(|| self.series(&self.inputs.height_m))
@@ -152,7 +152,7 @@ impl<'a> Context<'a> {
         self.series(&self.inputs.support_ratio)
     }
 
-    /// The handles' normal forces [N].
+    /// The handles' normal forces (N).
     pub fn forces(&self) -> &Table<'a> {
         self.forces.get_or_init(|| {
             let columns: Vec<&[f64]> = self.inputs.normal_n.iter().map(|c| &c[..]).collect();
@@ -160,7 +160,7 @@ impl<'a> Context<'a> {
         })
     }
 
-    /// The carriers' phases [rad].
+    /// The carriers' phases (rad).
     pub fn phases(&self) -> &Table<'a> {
         self.phases.get_or_init(|| {
             let columns: Vec<&[f64]> = self.inputs.phase_rad.iter().map(|c| &c[..]).collect();
@@ -168,7 +168,7 @@ impl<'a> Context<'a> {
         })
     }
 
-    /// The beat's phase [rad], first column, then the carriers' phases: the samples at which a beat sounds.
+    /// The beat's phase (rad), first column, then the carriers' phases: the samples at which a beat sounds.
     pub fn beat(&self) -> Table<'a> {
         let mut columns: Vec<&[f64]> = vec![&self.inputs.beat_phase_rad];
         columns.extend(self.inputs.phase_rad.iter().map(|c| &c[..]));
@@ -182,7 +182,7 @@ impl<'a> Context<'a> {
             .as_ref()
     }
 
-    /// The end of the first unstable stretch [s].
+    /// The end of the first unstable stretch (s).
     pub fn onset(&self) -> Option<f64> {
         *self
             .onset
@@ -245,7 +245,7 @@ impl<'a> Context<'a> {
 }
 
 impl Series<'_> {
-    /// Mean sampling step [s].
+    /// Mean sampling step (s).
     pub fn step_s(&self) -> Option<f64> {
         mean_step_s(&self.t_s)
     }

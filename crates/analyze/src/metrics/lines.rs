@@ -4,7 +4,7 @@ use super::context::Series;
 use super::{Context, Value};
 use crate::spectrum::{rfft, rfft_hz, rfft_magnitude};
 
-/// How far from twice the peak the second harmonic is looked for [Hz].
+/// How far from twice the peak the second harmonic is looked for (Hz).
 const H2_HALF_WIDTH_HZ: f64 = 0.45;
 
 /// Half-width of "near a line", as a share of f.
@@ -12,7 +12,7 @@ pub const NEAR: f64 = 0.1;
 
 /// The strongest line of a signal and the transform it was found in.
 pub struct Line {
-    /// Its frequency, on the grid of the transform [Hz].
+    /// Its frequency, on the grid of the transform (Hz).
     pub hz: f64,
     bin: usize,
     hz_grid: Vec<f64>,

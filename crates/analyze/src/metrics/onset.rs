@@ -3,17 +3,17 @@
 use super::{Context, Value};
 use crate::inputs::mean_step_s;
 
-/// Length of the stretch whose RMS roll is judged [s].
+/// Length of the stretch whose RMS roll is judged (s).
 pub const ONSET_STRETCH_S: f64 = 2.0;
-/// RMS roll above which a stretch counts as unstable [deg].
+/// RMS roll above which a stretch counts as unstable (deg).
 pub const ONSET_ROLL_DEG: f64 = 10.0;
 
-/// The end of the first stretch of 2 s whose RMS roll exceeds 10° [s]; `None` if there is none.
+/// The end of the first stretch of 2 s whose RMS roll exceeds 10° (s); `None` if there is none.
 ///
 /// ```text
 /// t[k] of the smallest k ≥ m − 1 with Σ_{j=k−m+1}^{k} θ[j]² > m·(10°)²,   m = ⌊2 s / Δt⌋
 /// ```
-/// θ roll [rad], Δt the mean step [s]; m = 60 both at 30 Hz and at the archive's 30.303 Hz. Stretches lie wholly inside
+/// θ roll (rad), Δt the mean step (s); m = 60 both at 30 Hz and at the archive's 30.303 Hz. Stretches lie wholly inside
 /// the given samples, so the answer is never below t\[m − 1\]. Source: archive, stats.json (`uncontrolled_onset_time`).
 pub fn onset_s(t_s: &[f64], roll_rad: &[f64]) -> Option<f64> {
     let step_s = mean_step_s(t_s)?;

@@ -1,5 +1,5 @@
 //! An [`Analysis`](crate::examine::Analysis) as people and programs read it. Every output takes its metrics from the one table
-//! in [`crate::metrics`].
+//! in [`mod@crate::metrics`].
 
 mod csv;
 mod ensemble;

@@ -114,9 +114,9 @@ pub struct Image {
     pub y_label: String,
     /// What the colour means, with its unit.
     pub value_label: String,
-    /// First and last time [s].
+    /// First and last time (s).
     pub x_range: (f64, f64),
-    /// Lowest and highest frequency [Hz].
+    /// Lowest and highest frequency (Hz).
     pub y_range: (f64, f64),
     /// `values[time][frequency]`.
     pub values: Vec<Vec<f64>>,
@@ -366,7 +366,7 @@ fn thin(x: Vec<f64>) -> Vec<f64> {
     x.into_iter().step_by(step).collect()
 }
 
-/// Length of a spectrogram's segment [s].
+/// Length of a spectrogram's segment (s).
 const SPECTROGRAM_SEGMENT_S: f64 = 8.0;
 
 /// Density of the roll over time, in decibels, over the whole recording.

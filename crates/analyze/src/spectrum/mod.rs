@@ -39,7 +39,7 @@ pub enum Detrend {
 pub enum Scaling {
     /// Power spectral density [unit²/Hz].
     Density,
-    /// Power of a line [unit²]: a sine of amplitude A between no bins shows A²/2.
+    /// Power of a line (unit²): a sine of amplitude A between no bins shows A²/2.
     Spectrum,
 }
 
@@ -151,17 +151,17 @@ pub enum SpectrumError {
 /// A one-sided power spectrum and what is needed to judge it.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Spectrum {
-    /// Frequencies of the bins [Hz].
+    /// Frequencies of the bins (Hz).
     pub hz: Vec<f64>,
     /// Values [unit²/Hz or unit²].
     pub power: Vec<f64>,
     /// How many segments were averaged.
     pub segments: usize,
-    /// Length of a segment [s].
+    /// Length of a segment (s).
     pub segment_s: f64,
-    /// Distance between bins that carry information of their own: 1 / `segment_s` [Hz].
+    /// Distance between bins that carry information of their own: 1 / `segment_s` (Hz).
     pub resolution_hz: f64,
-    /// Equivalent noise bandwidth of the taper, f_s Σw² / (Σw)² [Hz].
+    /// Equivalent noise bandwidth of the taper, f_s Σw² / (Σw)² (Hz).
     pub enbw_hz: f64,
     /// Equivalent degrees of freedom of each bin's χ² distribution, with the overlap's correlation counted.
     pub degrees_of_freedom: f64,
@@ -184,7 +184,7 @@ impl Spectrum {
         )
     }
 
-    /// Power between two frequencies, ends included: the sum of the bins times their width [unit²] (for densities).
+    /// Power between two frequencies, ends included: the sum of the bins times their width (unit²) (for densities).
     pub fn band_power(&self, low_hz: f64, high_hz: f64) -> f64 {
         let width = if self.hz.len() > 1 {
             self.hz[1] - self.hz[0]
@@ -199,7 +199,7 @@ impl Spectrum {
         in_band.map(|(_, p)| p).sum::<f64>() * width
     }
 
-    /// The strongest bin above 0 Hz, refined by a parabola through the logarithms of its neighbours [Hz]. `None` when all is zero.
+    /// The strongest bin above 0 Hz, refined by a parabola through the logarithms of its neighbours (Hz). `None` when all is zero.
     pub fn peak_hz(&self) -> Option<f64> {
         let (k, p) = self
             .power
@@ -213,7 +213,7 @@ impl Spectrum {
         Some(self.refine(k))
     }
 
-    /// Frequency of the line whose highest bin is `k`, from a parabola through log power [Hz].
+    /// Frequency of the line whose highest bin is `k`, from a parabola through log power (Hz).
     pub fn refine(&self, k: usize) -> f64 {
         if k == 0 || k + 1 >= self.power.len() {
             return self.hz[k];
@@ -236,7 +236,7 @@ impl Spectrum {
 /// A complex one-sided cross spectrum.
 #[derive(Clone, Debug, PartialEq)]
 pub struct CrossSpectrum {
-    /// Frequencies of the bins [Hz].
+    /// Frequencies of the bins (Hz).
     pub hz: Vec<f64>,
     /// Mean of conj(X)·Y, scaled as [`Scaling`] says.
     pub power: Vec<Complex64>,
@@ -245,9 +245,9 @@ pub struct CrossSpectrum {
 /// A spectrum for every moment.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Spectrogram {
-    /// Frequencies [Hz].
+    /// Frequencies (Hz).
     pub hz: Vec<f64>,
-    /// Middles of the segments [s] after the first sample.
+    /// Middles of the segments (s) after the first sample.
     pub t_s: Vec<f64>,
     /// `power[segment][bin]`.
     pub power: Vec<Vec<f64>>,
@@ -267,7 +267,7 @@ pub enum Mode {
 /// ```text
 /// P[k] = mean_s |Σ_n w[n] (x_s[n] − trend) e^{−2πikn/nfft}|² · 2 / (f_s Σ w²)      (density; no 2 at 0 and f_s/2)
 /// ```
-/// x [unit], `fs_hz` [Hz], P [unit²/Hz]. A segment longer than the signal is cut to it. Source: Welch (1967); SciPy 1.17.
+/// x [unit], `fs_hz` (Hz), P [unit²/Hz]. A segment longer than the signal is cut to it. Source: Welch (1967); SciPy 1.17.
 ///
 /// # Errors
 /// [`SpectrumError`] for an empty signal, non-finite samples, a rate that is no rate, or lengths that do not fit.

@@ -8,7 +8,7 @@ use std::f64::consts::PI;
 /// cosine sums:  w[k] = Σ_j (−1)^j a_j cos(2πjk/N),  k = 0 … N−1   (periodic)
 /// Tukey:        a flat top with cosine flanks that together take the share α of the segment
 /// ```
-/// Dimensionless. N = 1 gives [1]. Source: Harris, Proc. IEEE 66 (1978) 51.
+/// Dimensionless. N = 1 gives (1). Source: Harris, Proc. IEEE 66 (1978) 51.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Taper {
     /// Ones.
