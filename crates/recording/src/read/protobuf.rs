@@ -51,7 +51,10 @@ fn descriptor(schema: &SchemaRef<'_>) -> Result<MessageDescriptor, String> {
             None => missing.push(name),
         }
     }
-    let pool = DescriptorPool::from_file_descriptor_set(set).map_err(|problem| {
+    // The library indexes past its files while it words some of its errors: a schema that makes it panic is one that does not parse.
+    let parsed = std::panic::catch_unwind(|| DescriptorPool::from_file_descriptor_set(set))
+        .map_err(|_| "the FileDescriptorSet is not consistent".to_owned())?;
+    let pool = parsed.map_err(|problem| {
         if missing.is_empty() {
             format!("the FileDescriptorSet is not consistent: {problem}")
         } else {
