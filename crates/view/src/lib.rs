@@ -1,7 +1,7 @@
 //! The Rerun bridge: a recording, with what `analyze` finds in it, as something to look at.
 //!
-//! [`load`](load::load) turns a recording into a [`Take`](take::Take), [`draw`] turns that into Rerun's entities and a layout, a
-//! [`Sink`](store::Sink) takes them: a file, a connection, a viewer's standard input.
+//! [`load::load`] turns a recording into a [`take::Take`], [`draw`] turns that into Rerun's entities and a layout, a
+//! [`store::Sink`] takes them: a file, a connection, a viewer's standard input.
 
 pub mod blueprint;
 pub mod draw;
