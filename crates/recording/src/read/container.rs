@@ -421,6 +421,7 @@ impl Walk<'_> {
                     let believed = end == end_of_file
                         || self.bytes[at] == op::FOOTER
                         || self.possible(end).is_some()
+                        || self.cut_record(end)
                         || self.tight(at, end);
                     // A record that leads nowhere is sound where nothing better begins inside it.
                     match if believed { None } else { self.resync(at + 9) } {
@@ -460,6 +461,19 @@ impl Walk<'_> {
         } else {
             self.closing(at);
         }
+    }
+
+    /// Whether what is left from `at` on reads as the beginning of a record that the end of the file cuts off.
+    fn cut_record(&self, at: usize) -> bool {
+        let rest = &self.bytes[at..];
+        let known = rest.first().is_some_and(|op| (1..=0x0f).contains(op));
+        let length = rest.get(1..9).and_then(|length| length.try_into().ok());
+        let beyond = |length| {
+            // As in `resync`, more than four gigabytes are not believed.
+            let length = u64::from_le_bytes(length);
+            length >> 32 == 0 && length > rest.len() as u64 - 9
+        };
+        known && length.is_none_or(beyond)
     }
 
     /// Whether a chunk begins at `at` that goes on beyond the end of the file: both its lengths say so.
