@@ -1,21 +1,11 @@
-//! `--tolerance X` means what it says: over 60 s, roll and height of the built-in scenes stay within 10 X of a far tighter run,
-//! relative to the motion's own size. Five scenes miss that today and are held to what was measured, so that they get no worse: their
-//! own growth of any difference (parametric roll, tumbling near a separatrix) is the likely cause, but the solver is not yet cleared.
+//! `--tolerance X` means what it says: over 60 s, roll and height of every built-in scene stay within 10 X of a far tighter run,
+//! relative to the motion's own size, the growth of errors by the scene itself included (`music` grows a difference in the first roll
+//! 460 times, `tumble` 70 times).
 
 use sim::model::Model;
 use sim::run::{Sample, run_model};
 use sim::scene::{BUILTIN, parse};
 use sim::solve::{Settings, method};
-
-/// How far beyond 10 X a scene's own growth carries an error, for its name; measured 290, 2.5, 90 (it is `music` with sensors), 210 (at 1e-6) and, for
-/// `tumble`, 2000 at 1e-4, where the turn has lost its count.
-const GROWTH: &[(&str, f64)] = &[
-    ("music", 400.0),
-    ("baseline", 4.0),
-    ("field-imu", 400.0),
-    ("strict-contact", 400.0),
-    ("tumble", 3000.0),
-];
 
 /// Below this a motion is rest, and errors are absolute: the units of `Freedoms::scales`, m and rad.
 const REST: f64 = 0.1;
@@ -48,7 +38,7 @@ fn the_tolerance_means_what_it_says_on_every_built_in_scene() {
         scene.duration_s = scene.duration_s.min(60.0);
         scene.solver.energy = false;
         let model = Model::new(&scene);
-        let truth = course(&model, "dop853", 1e-11);
+        let truth = course(&model, "dop853", 1e-10);
         // Half its range. A motion that is hardly one is held absolutely.
         let size = [0, 1].map(|a| {
             let (low, high) = truth
@@ -60,10 +50,6 @@ fn the_tolerance_means_what_it_says_on_every_built_in_scene() {
                 0.5 * (high - low)
             }
         });
-        let growth = GROWTH
-            .iter()
-            .find(|(n, _)| n == name)
-            .map_or(1.0, |(_, g)| *g);
         for tolerance in [1e-4, 1e-6, 1e-8] {
             let seen = course(&model, "auto", tolerance);
             for (a, what) in ["roll", "height"].into_iter().enumerate() {
@@ -74,7 +60,7 @@ fn the_tolerance_means_what_it_says_on_every_built_in_scene() {
                     .fold(0.0, f64::max)
                     / size[a];
                 println!("{name} {tolerance:e}: {what} {worst:.1e}");
-                if worst > 10.0 * growth * tolerance {
+                if worst > 10.0 * tolerance {
                     missed.push(format!(
                         "{name} at {tolerance:e}: {what} errs by {worst:.1e}"
                     ));

@@ -92,7 +92,7 @@ impl Pair for Dop853 {
     const DENSE_STAGES: usize = 3;
     const EXPONENT: f64 = 1.0 / 8.0;
     const DENSE_ROWS: usize = 7;
-    const SHARE: f64 = 0.03;
+    const SHARE: f64 = 7e-4;
     const A: &'static [Row] = &[
         &[(0, 0.05260015195876773)],
         &[(0, 0.0197250569845379), (1, 0.0591751709536137)],

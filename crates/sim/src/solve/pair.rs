@@ -80,8 +80,8 @@ pub trait Pair {
     const EXPONENT: f64;
     /// Coefficients of the dense polynomial needed per state.
     const DENSE_ROWS: usize;
-    /// What a step may err, in units of the tolerance asked for: so much less that the error of a whole run, grown by the
-    /// scene's own instabilities, stays within ten times what was asked (held by tests/tolerance.rs).
+    /// What a step may err, in units of the tolerance asked for: so much less that the error of a whole run stays within ten times
+    /// what was asked, also where a scene adds up the errors of hundreds of steps and then grows them (held by tests/tolerance.rs).
     const SHARE: f64;
     /// The size at `theta` of the polynomial's last term, whose coefficient is the last row.
     fn last_term(theta: f64) -> f64;
@@ -112,6 +112,8 @@ const SAFETY: f64 = 0.9;
 const SHRINK: f64 = 0.2;
 const GROW: f64 = 6.0;
 const SMALLEST_STEP_S: f64 = 1e-13;
+/// Below this a step's error estimate is rounding.
+const FINEST: f64 = 3e-15;
 /// The last term of the dense polynomial may be so many times the tolerance; its error is well below its last term.
 const TRUST: f64 = 10.0;
 
@@ -226,7 +228,7 @@ impl<'m, P: Pair, const EVENTS: bool> Run<'m, P, EVENTS> {
         }
         let mut run = Self {
             course,
-            tolerance: settings.tolerance * P::SHARE,
+            tolerance: (settings.tolerance * P::SHARE).max(FINEST),
             k: vec![[[0.0; TILE]; MOST_STAGES]; count],
             dense: vec![[[0.0; TILE]; MOST_ROWS]; count],
             trial: vec![0.0; size],
