@@ -1,73 +1,10 @@
 //! The commands as a person would run them: in an empty folder, on real files.
 
 use serde_json::Value;
-use std::path::{Path, PathBuf};
-use std::process::{Command, Output};
-use std::sync::OnceLock;
-
-/// Path of a command, built once beside this test: cargo gives a test only the binaries of its own package.
-fn bin(name: &str) -> PathBuf {
-    static BUILT: OnceLock<PathBuf> = OnceLock::new();
-    let folder = BUILT.get_or_init(|| {
-        let exe = std::env::current_exe().expect("a test has a path");
-        let folder = exe
-            .parent()
-            .and_then(Path::parent)
-            .expect("target/PROFILE/deps/test")
-            .to_owned();
-        let mut build = Command::new(env!("CARGO"));
-        build.args([
-            "build", "--quiet", "-p", "sim", "-p", "analyze", "-p", "study",
-        ]);
-        if folder.ends_with("release") {
-            build.arg("--release");
-        }
-        build.current_dir(concat!(env!("CARGO_MANIFEST_DIR"), "/.."));
-        assert!(
-            build.status().expect("cargo runs").success(),
-            "the commands do not build"
-        );
-        folder
-    });
-    folder.join(name)
-}
-
-fn run_in(folder: &Path, name: &str, args: &[&str]) -> Output {
-    Command::new(bin(name))
-        .args(args)
-        .current_dir(folder)
-        .output()
-        .expect("the command starts")
-}
-
-#[track_caller]
-fn good(output: Output) -> Output {
-    assert!(
-        output.status.success(),
-        "{:?}: {}",
-        output.status.code(),
-        String::from_utf8_lossy(&output.stderr)
-    );
-    output
-}
-
-fn files(folder: &Path) -> Vec<String> {
-    let entries = std::fs::read_dir(folder).expect("the folder is there");
-    let mut names: Vec<String> = entries
-        .map(|e| {
-            e.expect("an entry")
-                .file_name()
-                .to_string_lossy()
-                .into_owned()
-        })
-        .collect();
-    names.sort();
-    names
-}
-
-fn json(output: &Output) -> Value {
-    serde_json::from_slice(&output.stdout).expect("JSON on standard output")
-}
+use std::path::Path;
+use std::process::{Command, Stdio};
+use std::time::{Duration, Instant};
+use tests::{bin, files, good, json, run_in};
 
 #[test]
 fn a_scene_becomes_a_recording_and_the_recording_findings() {
@@ -342,4 +279,56 @@ fn val_numpy_statistics_of_the_samples() {
             );
         }
     }
+}
+
+#[cfg(unix)]
+#[test]
+fn an_interrupted_run_leaves_nothing_and_says_so() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let args = ["record", "--duration", "1e5", "--out", "long.mcap"];
+    let mut child = Command::new(bin("sim"))
+        .args(args)
+        .current_dir(folder.path())
+        .stderr(Stdio::piped())
+        .spawn()
+        .expect("starts");
+    // It has begun once its unfinished file is there.
+    let patience = Instant::now() + Duration::from_secs(60);
+    while files(folder.path()).is_empty() {
+        assert!(Instant::now() < patience, "nothing is written");
+        std::thread::sleep(Duration::from_millis(5));
+    }
+    std::thread::sleep(Duration::from_millis(100));
+    let mut interrupt = Command::new("kill");
+    interrupt.args(["-INT", &child.id().to_string()]);
+    assert!(interrupt.status().expect("kill runs").success());
+    let said = {
+        let mut said = String::new();
+        let stderr = child.stderr.as_mut().expect("a pipe");
+        std::io::Read::read_to_string(stderr, &mut said).expect("text");
+        said
+    };
+    assert_eq!(child.wait().expect("ends").code(), Some(1), "{said}");
+    assert!(
+        said.contains("interrupted at") && said.contains("no file was made"),
+        "{said}"
+    );
+    assert_eq!(files(folder.path()), [""; 0]);
+}
+
+#[cfg(target_os = "linux")]
+#[test]
+fn a_full_disk_is_said_in_one_sentence() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let full = std::fs::File::options().write(true).open("/dev/full");
+    let output = Command::new(bin("sim"))
+        .args(["record", "--duration", "5", "--out", "-"])
+        .current_dir(folder.path())
+        .stdout(full.expect("opens"))
+        .output()
+        .expect("starts");
+    let said = String::from_utf8_lossy(&output.stderr);
+    assert_eq!(output.status.code(), Some(1), "{said}");
+    assert!(said.contains("No space left on device"), "{said}");
+    assert_eq!(said.trim().lines().count(), 1, "{said}");
 }

@@ -5,7 +5,7 @@ use crate::freedoms::Pose;
 use crate::model::{Model, Workspace};
 use crate::scene::Scene;
 use crate::sensors::{Reading, Sensors};
-use crate::solve::{Event, Observer, Settings, Stats, Stopped, method};
+use crate::solve::{Event, Method, Observer, Settings, Stats, Stopped, method, resolve};
 
 /// Everything that is logged at one moment. Carriers and handles in the order of the scene.
 #[derive(Clone, Debug)]
@@ -76,21 +76,29 @@ pub fn settings(scene: &Scene) -> Settings {
     }
 }
 
-/// Runs a checked scene with the method it names.
+/// The method that integrates a checked scene: the one it names, or what `auto` stands for at its tolerance.
+///
+/// # Panics
+/// When the scene has not been checked and names none.
+pub fn method_of(scene: &Scene) -> &'static Method {
+    let named = method(&scene.solver.method).expect("a checked scene names a method");
+    resolve(named, &settings(scene))
+}
+
+/// Runs a checked scene with its method.
 ///
 /// # Errors
 /// [`Stopped`]; the samples before that moment have been handed over.
 pub fn run(scene: &Scene, listener: &mut dyn Listener) -> Result<Stats, Stopped> {
     let model = Model::new(scene);
-    let method = method(&scene.solver.method).expect("a checked scene names a method");
-    let (stats, outcome) = run_model(&model, method, &settings(scene), listener);
+    let (stats, outcome) = run_model(&model, method_of(scene), &settings(scene), listener);
     outcome.map(|()| stats)
 }
 
 /// Runs a model with any method and settings; the work done comes back in either case.
 pub fn run_model(
     model: &Model,
-    method: &crate::solve::Method,
+    method: &Method,
     settings: &Settings,
     listener: &mut dyn Listener,
 ) -> (Stats, Result<(), Stopped>) {

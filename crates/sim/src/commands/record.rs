@@ -5,10 +5,10 @@ use indicatif::{ProgressBar, ProgressStyle};
 use recording::write::{RecordingWriter, WriterOptions, remove_unfinished_files};
 use sim::model::Model;
 use sim::record::Recorder;
-use sim::run::{Listener, Sample, run_model, settings};
+use sim::run::{Listener, Sample, method_of, run_model, settings};
 use sim::scene::load;
 use sim::sensors::Reading;
-use sim::solve::{Stopped, method};
+use sim::solve::Stopped;
 use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant};
@@ -81,7 +81,7 @@ pub fn run(args: &Args) -> Result<()> {
         duration_s: scene.duration_s,
         samples: 0,
     };
-    let method = method(&scene.solver.method).map_err(|e| anyhow!(e))?;
+    let method = method_of(&scene);
     let (stats, outcome) = run_model(&model, method, &settings(&scene), &mut watch);
     if let Some(bar) = watch.progress.take() {
         bar.finish_and_clear();
