@@ -71,6 +71,10 @@ pub trait Freedoms: Send + Sync {
     fn drift(&self, h_s: f64, y: &mut [f64]);
     /// Kinetic energy and potential energy in the field of gravity, J.
     fn energy_j(&self, y: &[f64]) -> [f64; 2];
+    /// Where in the state a unit quaternion (x, y, z, w) and its angular velocity in the body begin, if there is one.
+    fn rotation(&self) -> Option<[usize; 2]> {
+        None
+    }
     /// What counts as one unit of each state in an error norm.
     fn scales(&self) -> &[f64];
 }
@@ -187,6 +191,10 @@ impl Freedoms for Six {
             "wy_rad_per_s",
             "wz_rad_per_s",
         ]
+    }
+
+    fn rotation(&self) -> Option<[usize; 2]> {
+        Some([3, 10])
     }
 
     fn positions(&self) -> usize {

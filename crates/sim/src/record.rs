@@ -378,7 +378,7 @@ pub fn metadata(scene: &Scene) -> BTreeMap<String, String> {
         ("version", VERSION.to_owned()),
         ("scene", scene.name.clone()),
         ("seed", scene.seed.to_string()),
-        ("method", crate::run::method_of(scene).name.to_owned()),
+        ("method", crate::run::method_name(scene)),
         ("tolerance", format!("{:e}", scene.solver.tolerance)),
         ("step_s", scene.solver.step_s.to_string()),
         ("analysis_start_s", scene.analysis_start_s.to_string()),

@@ -76,13 +76,25 @@ pub fn settings(scene: &Scene) -> Settings {
     }
 }
 
-/// The method that integrates a checked scene: the one it names, or what `auto` stands for at its tolerance.
+/// The method that a checked scene names.
 ///
 /// # Panics
 /// When the scene has not been checked and names none.
 pub fn method_of(scene: &Scene) -> &'static Method {
-    let named = method(&scene.solver.method).expect("a checked scene names a method");
-    resolve(named, &settings(scene))
+    method(&scene.solver.method).expect("a checked scene names a method")
+}
+
+/// The method's name for people and records: with what `auto` begins with at the scene's tolerance.
+pub fn method_name(scene: &Scene) -> String {
+    let (named, begun) = (
+        method_of(scene),
+        resolve(method_of(scene), &settings(scene)),
+    );
+    if named.name == begun.name {
+        named.name.into()
+    } else {
+        format!("{} ({})", named.name, begun.name)
+    }
 }
 
 /// Runs a checked scene with its method.

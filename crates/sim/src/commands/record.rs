@@ -5,7 +5,7 @@ use indicatif::{ProgressBar, ProgressStyle};
 use recording::write::{RecordingWriter, WriterOptions, remove_unfinished_files};
 use sim::model::Model;
 use sim::record::Recorder;
-use sim::run::{Listener, Sample, method_of, run_model, settings};
+use sim::run::{Listener, Sample, method_name, method_of, run_model, settings};
 use sim::scene::load;
 use sim::sensors::Reading;
 use sim::solve::Stopped;
@@ -81,8 +81,7 @@ pub fn run(args: &Args) -> Result<()> {
         duration_s: scene.duration_s,
         samples: 0,
     };
-    let method = method_of(&scene);
-    let (stats, outcome) = run_model(&model, method, &settings(&scene), &mut watch);
+    let (stats, outcome) = run_model(&model, method_of(&scene), &settings(&scene), &mut watch);
     if let Some(bar) = watch.progress.take() {
         bar.finish_and_clear();
     }
@@ -116,14 +115,19 @@ pub fn run(args: &Args) -> Result<()> {
     } else {
         path.display().to_string()
     };
+    let implicit = match stats.implicit {
+        0 => String::new(),
+        some if some == stats.steps => " (implicit)".to_owned(),
+        some => format!(" ({some} of them implicit, where the contact is stiff)"),
+    };
     eprintln!(
-        "{what}: {} seed {}, {} s at {} Hz ({} samples); {} in {:.3} s: {} steps, {} contact events",
+        "{what}: {} seed {}, {} s at {} Hz ({} samples); {} in {:.3} s: {} steps{implicit}, {} contact events",
         scene.name,
         scene.seed,
         scene.duration_s,
         scene.log_rate_hz,
         watch.samples,
-        method.name,
+        method_name(&scene),
         began.elapsed().as_secs_f64(),
         stats.steps,
         stats.events

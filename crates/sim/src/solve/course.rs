@@ -184,6 +184,27 @@ impl<'m> Course<'m> {
         }
     }
 
+    /// Hands over the samples at the start.
+    pub fn begin_log(&mut self, observer: &mut dyn Observer) -> Result<(), Stopped> {
+        let start = self.y.clone();
+        while self.sample_due(self.t_s).is_some() {
+            self.sample(&start, observer)?;
+        }
+        Ok(())
+    }
+
+    /// Whether the work is still within what is allowed.
+    pub fn check_work(&self) -> Result<(), Stopped> {
+        if self.stats.evaluations > self.most_evaluations {
+            return Err(Stopped::TooMuchWork {
+                method: self.method,
+                t_s: self.t_s,
+                evaluations: self.stats.evaluations,
+            });
+        }
+        Ok(())
+    }
+
     /// The right-hand side at (t, y).
     #[inline]
     pub fn rhs(&mut self, t_s: f64, y: &[f64], dy: &mut [f64]) {
@@ -227,13 +248,7 @@ impl<'m> Course<'m> {
                 state: self.model.state_names().swap_remove(bad),
             });
         }
-        if self.stats.evaluations > self.most_evaluations {
-            return Err(Stopped::TooMuchWork {
-                method: self.method,
-                t_s,
-                evaluations: self.stats.evaluations,
-            });
-        }
+        self.check_work()?;
         if !self.locate {
             self.note_unlocated(observer);
         } else if self.contacts.contains(&Contact::Clamped) {

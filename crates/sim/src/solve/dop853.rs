@@ -93,6 +93,7 @@ impl Pair for Dop853 {
     const EXPONENT: f64 = 1.0 / 8.0;
     const DENSE_ROWS: usize = 7;
     const SHARE: f64 = 7e-4;
+    const STABLE: f64 = 6.1;
     const A: &'static [Row] = &[
         &[(0, 0.05260015195876773)],
         &[(0, 0.0197250569845379), (1, 0.0591751709536137)],

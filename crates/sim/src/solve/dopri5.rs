@@ -30,6 +30,7 @@ impl Pair for Dopri5 {
     const EXPONENT: f64 = 1.0 / 5.0;
     const DENSE_ROWS: usize = 4;
     const SHARE: f64 = 2e-3;
+    const STABLE: f64 = 3.25;
     const A: &'static [Row] = &[
         &[(0, 1.0 / 5.0)],
         &[(0, 3.0 / 40.0), (1, 9.0 / 40.0)],

@@ -1,12 +1,15 @@
 //! Integration methods: one file each, and one line each in [`METHODS`].
 
+mod auto;
 mod course;
 mod dop853;
 mod dopri5;
 mod events;
 mod fixed;
 mod pair;
+mod radau5;
 mod rk4;
+mod rkmk4;
 mod semi_implicit_euler;
 
 pub use course::{Event, EventKind};
@@ -45,6 +48,8 @@ pub struct Stats {
     pub evaluations: u64,
     /// Contacts opened or closed.
     pub events: u64,
+    /// Accepted steps of an implicit method, among the others.
+    pub implicit: u64,
 }
 
 /// Why a run ended before its time.
@@ -88,6 +93,18 @@ pub enum Stopped {
         /// Evaluations spent.
         evaluations: u64,
     },
+    /// More states than an implicit method can hold matrices of.
+    #[error(
+        "{method} holds matrices of {states} by {states} numbers, at most {most} are allowed; use an explicit --method"
+    )]
+    TooManyStates {
+        /// Method name.
+        method: &'static str,
+        /// How many there are.
+        states: usize,
+        /// How many there may be.
+        most: usize,
+    },
     /// The observer asked to stop.
     #[error("stopped at t = {t_s} s")]
     ByObserver {
@@ -126,22 +143,14 @@ pub fn resolve(method: &'static Method, settings: &Settings) -> &'static Method 
     }
 }
 
-fn auto(
-    model: &Model,
-    settings: &Settings,
-    observer: &mut dyn Observer,
-) -> (Stats, Result<(), Stopped>) {
-    (resolve(&METHODS[0], settings).run)(model, settings, observer)
-}
-
 /// Every method. The first is the default.
 pub const METHODS: &[Method] = &[
     Method {
         name: "auto",
-        about: "the cheapest for the tolerance: dop853 below 3e-5, else dopri5",
+        about: "the cheapest for the tolerance: dop853 below 3e-5, else dopri5; radau5 where that is limited by stability",
         order: 8,
         adaptive: true,
-        run: auto,
+        run: auto::run,
     },
     Method {
         name: "dop853",
@@ -170,6 +179,27 @@ pub const METHODS: &[Method] = &[
         order: 5,
         adaptive: true,
         run: pair::run::<dopri5::Dopri5, false>,
+    },
+    Method {
+        name: "radau5",
+        about: "Radau IIA 5, implicit, adaptive, contact events located: for very stiff contacts",
+        order: 5,
+        adaptive: true,
+        run: radau5::run::<true>,
+    },
+    Method {
+        name: "radau5-blind",
+        about: "the same without locating contact events",
+        order: 5,
+        adaptive: true,
+        run: radau5::run::<false>,
+    },
+    Method {
+        name: "rkmk4",
+        about: "Runge-Kutta-Munthe-Kaas of order 4 on the rotation group, fixed step",
+        order: 4,
+        adaptive: false,
+        run: fixed::run::<rkmk4::Rkmk4>,
     },
     Method {
         name: "rk4",

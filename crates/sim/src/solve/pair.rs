@@ -83,6 +83,8 @@ pub trait Pair {
     /// What a step may err, in units of the tolerance asked for: so much less that the error of a whole run stays within ten times
     /// what was asked, also where a scene adds up the errors of hundreds of steps and then grows them (held by tests/tolerance.rs).
     const SHARE: f64;
+    /// h |λ| from which on the last two stages say that stability limits the step.
+    const STABLE: f64;
     /// The size at `theta` of the polynomial's last term, whose coefficient is the last row.
     fn last_term(theta: f64) -> f64;
 
@@ -108,6 +110,9 @@ pub fn sum<F: Arithmetic>(row: Row, k: &Slopes) -> Tile {
     out
 }
 
+/// So many steps in a row without a stop, each limited by stability, cost more than the one implicit step that could replace them:
+/// its Jacobian takes an evaluation per state, its iteration some more.
+const MANY: u32 = 100;
 const SAFETY: f64 = 0.9;
 const SHRINK: f64 = 0.2;
 const GROW: f64 = 6.0;
@@ -117,22 +122,46 @@ const FINEST: f64 = 3e-15;
 /// The last term of the dense polynomial may be so many times the tolerance; its error is well below its last term.
 const TRUST: f64 = 10.0;
 
+/// How an explicit run ended.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum End {
+    /// At its end.
+    Finished,
+    /// Stability rather than accuracy has limited the steps, at this price.
+    Stiff { evaluations_per_s: f64 },
+}
+
 /// Integrates a model with pair `P`; with `EVENTS` contacts are frozen within a step and their changes located.
 pub fn run<P: Pair, const EVENTS: bool>(
     model: &Model,
     settings: &Settings,
     observer: &mut dyn Observer,
 ) -> (Stats, Result<(), Stopped>) {
-    let mut run = Run::<P, EVENTS>::new(model, settings);
+    let mut course = Course::new(model, P::NAME, settings, EVENTS);
+    if let Err(stopped) = course.begin_log(observer) {
+        return (course.stats, Err(stopped));
+    }
+    let (course, outcome) = go::<P, EVENTS>(course, settings, false, observer);
+    (course.stats, outcome.map(|_| ()))
+}
+
+/// Goes on from where a course stands; with `watch` only until it turns out to be stiff.
+pub fn go<'m, P: Pair, const EVENTS: bool>(
+    course: Course<'m>,
+    settings: &Settings,
+    watch: bool,
+    observer: &mut dyn Observer,
+) -> (Course<'m>, Result<End, Stopped>) {
+    let mut run = Run::<P, EVENTS>::new(course, settings, watch);
     #[cfg(target_arch = "x86_64")]
     if is_x86_feature_detected!("avx2") && is_x86_feature_detected!("fma") {
         // SAFETY: the processor has just been asked for both features, all that the callee requires.
         #[allow(unsafe_code)]
         let outcome = unsafe { integrate_fused(&mut run, observer) };
-        return (run.course.stats, outcome);
+        return (run.course, outcome);
     }
     let outcome = run.integrate::<Plain>(observer);
-    (run.course.stats, outcome)
+    (run.course, outcome)
 }
 
 #[cfg(target_arch = "x86_64")]
@@ -140,7 +169,7 @@ pub fn run<P: Pair, const EVENTS: bool>(
 fn integrate_fused<P: Pair, const EVENTS: bool>(
     run: &mut Run<'_, P, EVENTS>,
     observer: &mut dyn Observer,
-) -> Result<(), Stopped> {
+) -> Result<End, Stopped> {
     run.integrate::<Fused>(observer)
 }
 
@@ -163,6 +192,10 @@ struct Run<'m, P, const EVENTS: bool> {
     relative: Vec<Tile>,
     watched: f64,
     looks: Looks,
+    /// Whether somebody asks if the steps are limited by stability; how many were, one after the other; since when.
+    watch: bool,
+    stiff_in_row: u32,
+    row_began: (f64, u64),
     method: std::marker::PhantomData<P>,
 }
 
@@ -207,8 +240,8 @@ macro_rules! stages {
 }
 
 impl<'m, P: Pair, const EVENTS: bool> Run<'m, P, EVENTS> {
-    fn new(model: &'m Model, settings: &Settings) -> Self {
-        let course = Course::new(model, P::NAME, settings, EVENTS);
+    fn new(course: Course<'m>, settings: &Settings, watch: bool) -> Self {
+        let model = course.model;
         let size = course.y.len().next_multiple_of(TILE);
         let count = size / TILE;
         let (mut weight, mut relative) = (vec![[0.0; TILE]; count], vec![[0.0; TILE]; count]);
@@ -239,6 +272,9 @@ impl<'m, P: Pair, const EVENTS: bool> Run<'m, P, EVENTS> {
             relative,
             watched: watched as f64,
             looks: Looks::new(),
+            watch,
+            stiff_in_row: 0,
+            row_began: (0.0, 0),
             method: std::marker::PhantomData,
         };
         run.course.y.resize(size, 0.0);
@@ -246,11 +282,7 @@ impl<'m, P: Pair, const EVENTS: bool> Run<'m, P, EVENTS> {
     }
 
     #[inline(always)]
-    fn integrate<F: Arithmetic>(&mut self, observer: &mut dyn Observer) -> Result<(), Stopped> {
-        while self.course.sample_due(self.course.t_s).is_some() {
-            self.at.copy_from_slice(&self.course.y);
-            self.course.sample(&self.at, observer)?;
-        }
+    fn integrate<F: Arithmetic>(&mut self, observer: &mut dyn Observer) -> Result<End, Stopped> {
         self.begin();
         let mut h_next = self.first_step();
         let mut error_before: f64 = 1e-4;
@@ -289,6 +321,9 @@ impl<'m, P: Pair, const EVENTS: bool> Run<'m, P, EVENTS> {
                 };
                 h_next = h;
             };
+            if self.watch {
+                self.note_stiffness(h);
+            }
             let mut t1 = if h == left {
                 self.course.stop_s()
             } else {
@@ -325,9 +360,38 @@ impl<'m, P: Pair, const EVENTS: bool> Run<'m, P, EVENTS> {
             rejected_before = false;
             if moved != Moved::On && !self.course.finished() {
                 self.begin();
+                self.stiff_in_row = 0;
+            }
+            if self.stiff_in_row > MANY {
+                let (t_s, evaluations) = self.row_began;
+                let spent = (self.course.stats.evaluations - evaluations) as f64;
+                let evaluations_per_s = spent / (self.course.t_s - t_s);
+                return Ok(End::Stiff { evaluations_per_s });
             }
         }
-        Ok(())
+        Ok(End::Finished)
+    }
+
+    /// Counts accepted steps at the edge of stability: h |λ| from the last two stages, both at the end of the step. Source:
+    /// Hairer & Wanner, Solving Ordinary Differential Equations II (1996), IV.2.
+    fn note_stiffness(&mut self, h: f64) {
+        let (mut rates, mut states) = (0.0, 0.0);
+        let pairs = tiles(&self.y1).iter().zip(tiles(&self.trial));
+        for ((k, (y1, trial)), weight) in self.k.iter().zip(pairs).zip(&self.weight) {
+            for l in 0..TILE {
+                let w = weight[l];
+                rates += ((k[P::STAGES][l] - k[P::STAGES - 1][l]) * w).powi(2);
+                states += ((y1[l] - trial[l]) * w).powi(2);
+            }
+        }
+        if self.stiff_in_row == 0 {
+            self.row_began = (self.course.t_s, self.course.stats.evaluations);
+        }
+        if h * h * rates > P::STABLE * P::STABLE * states {
+            self.stiff_in_row += 1;
+        } else {
+            self.stiff_in_row = self.stiff_in_row.saturating_sub(3);
+        }
     }
 
     /// The first slope after a switch or an event.

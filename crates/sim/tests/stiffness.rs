@@ -1,0 +1,67 @@
+//! `auto` goes over to the implicit method where the contact is stiff, stays explicit where it is not, and agrees with both.
+
+use sim::model::Model;
+use sim::run::{Sample, run_model};
+use sim::scene::{Scene, builtin, parse};
+use sim::solve::{Settings, Stats, method};
+
+fn course(scene: &Scene, name: &str, tolerance: f64) -> (Vec<f64>, Stats) {
+    let settings = Settings {
+        tolerance,
+        step_s: f64::NAN,
+        most_evaluations: 1 << 40,
+    };
+    let mut heights = Vec::new();
+    let (stats, outcome) = run_model(
+        &Model::new(scene),
+        method(name).unwrap(),
+        &settings,
+        &mut |s: &Sample| {
+            heights.push(s.pose.position_m[2]);
+            true
+        },
+    );
+    outcome.unwrap();
+    (heights, stats)
+}
+
+fn worst(a: &[f64], b: &[f64]) -> f64 {
+    assert_eq!(a.len(), b.len());
+    let apart = a.iter().zip(b).map(|(x, y)| (x - y).abs());
+    apart.fold(0.0, f64::max)
+}
+
+#[test]
+fn stiff_contacts_are_solved_implicitly_and_right() {
+    let text = builtin("music").expect("a built-in scene");
+    let stiff = [
+        "duration_s=10",
+        "effects.contact.stiffness_n_per_m=3e6",
+        "effects.contact.damping_n_s_per_m=4e5",
+    ]
+    .map(str::to_owned);
+    let scene = parse("music", text, &stiff).unwrap();
+    let (auto, stats) = course(&scene, "auto", 1e-5);
+    assert!(
+        stats.implicit > 100 && stats.implicit > stats.steps * 9 / 10,
+        "{stats:?}"
+    );
+    let (explicit, explicit_stats) = course(&scene, "dop853", 1e-7);
+    assert_eq!(stats.events, explicit_stats.events);
+    let apart = worst(&auto, &explicit);
+    assert!(apart < 1e-5, "{apart:e}");
+    assert!(stats.evaluations * 3 < explicit_stats.evaluations);
+}
+
+#[test]
+fn what_is_not_stiff_stays_explicit() {
+    // Scenes in which nobody stands still: at rest every contact is stiff, since nothing but stability limits a step.
+    for name in ["music", "baseline", "strict-contact", "eight-carriers"] {
+        let mut scene = parse(name, builtin(name).unwrap(), &[]).unwrap();
+        scene.duration_s = 20.0;
+        for tolerance in [1e-3, 1e-8] {
+            let (_, stats) = course(&scene, "auto", tolerance);
+            assert_eq!(stats.implicit, 0, "{name} at {tolerance:e}");
+        }
+    }
+}
