@@ -78,9 +78,12 @@ pub fn sin_cos(x: f64x2) -> (f64x2, f64x2) {
     let n = shifted - splat(ROUND);
     let r = ((x - n * HALF_PI[0]) - n * HALF_PI[1]) - n * HALF_PI[2];
     let z = r * r;
-    let poly = |c: &[f64x2; 6]| ((((c[0] * z + c[1]) * z + c[2]) * z + c[3]) * z + c[4]) * z + c[5];
+    // By pairs (Estrin) rather than one after the other: the stages of a step wait for this.
+    let z2 = z * z;
+    let poly =
+        |c: &[f64x2; 6]| (c[4] * z + c[5]) + z2 * ((c[2] * z + c[3]) + z2 * (c[0] * z + c[1]));
     let s = r + r * z * poly(&SIN);
-    let c = splat(1.0) - (z * splat(0.5) - z * z * poly(&COS));
+    let c = splat(1.0) - (z * splat(0.5) - z2 * poly(&COS));
     // Odd quadrants swap; bit 1 of n and of n + 1 is the sign.
     let odd: f64x2 = cast(i64x2::ZERO - (quadrant & i64x2::splat(1)));
     let swapped = (s ^ c) & odd;

@@ -553,7 +553,9 @@ impl Model {
         self.freedoms.accelerate(y, w, dy);
         let phases = self.layout.phase_range();
         lanes::store(w.pair.iter().map(|p| p.rate), &mut dy[phases]);
-        dy[self.layout.extra_range()].copy_from_slice(&w.extra_rate);
+        if !w.extra.is_empty() {
+            dy[self.layout.extra_range()].copy_from_slice(&w.extra_rate);
+        }
         for ((_, account), out) in self
             .accounts
             .iter()
@@ -567,7 +569,10 @@ impl Model {
     /// Everything up to the forces; what the accelerations need.
     #[inline]
     pub fn forces(&self, t_s: f64, y: &[f64], w: &mut Workspace) {
-        w.extra.copy_from_slice(&y[self.layout.extra_range()]);
+        // Even a copy of nothing would be a call.
+        if !w.extra.is_empty() {
+            w.extra.copy_from_slice(&y[self.layout.extra_range()]);
+        }
         if self.has_phases {
             self.phases(t_s, y, w);
         }

@@ -9,7 +9,7 @@
 //! |2πf_m − ω| < K, at sin(ψ − φ) = (2πf_m − ω)/K; outside it drifts at √(Δω² − K²). At t₀ with τ = 0, at the ends of pauses
 //! and at changes of tempo the phase rates jump or bend: events. Source: paper, eqs. (music), (adler); Adler (1946).
 
-use crate::lanes::{f64x2, pack};
+use crate::lanes::{f64x2, pack, sin_cos};
 use crate::model::{Model, Stage, Switch, Term, Workspace};
 use crate::scene::{Checker, PerCarrier, Problem, Scene, problem};
 use schemars::JsonSchema;
@@ -326,7 +326,7 @@ impl Beat {
 #[inline(always)]
 fn pull(w: &mut Workspace, beat_phase: f64, strength: &[f64x2], grown: f64) {
     // sin(ψ − φ) from the sines and cosines that are there already.
-    let (sin, cos) = beat_phase.sin_cos();
+    let (sin, cos) = sin_cos(f64x2::splat(beat_phase));
     let (sin, cos) = (sin * grown, cos * grown);
     for (p, strength) in w.pair.iter_mut().zip(strength) {
         p.rate += *strength * (p.cos * sin - p.sin * cos);

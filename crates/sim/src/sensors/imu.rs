@@ -297,7 +297,8 @@ const DIFFERENCE_S: f64 = 1e-4;
 /// b̈ of every shoulder at (t, y), m/s²: the derivative of ḃ along the flow, by a five-point difference.
 ///
 /// ḃ is a function of time and state, so b̈ = d/ds ḃ(t + s, y + s ẏ) at s = 0, whatever moves the shoulders. The noise
-/// cell and the contacts stay those of the segment, where ḃ is smooth.
+/// cell and the contacts stay those of the segment, where ḃ is smooth. `near` is scratch of the size of the state; the accelerations
+/// go into `sums`, one for each carrier.
 pub fn shoulder_accelerations(
     model: &Model,
     t_s: f64,
@@ -305,8 +306,9 @@ pub fn shoulder_accelerations(
     dy: &[f64],
     w: &mut Workspace,
     near: &mut [f64],
-) -> Vec<[f64; 3]> {
-    let mut sums = vec![[0.0; 3]; model.carriers()];
+    sums: &mut [[f64; 3]],
+) {
+    sums.fill([0.0; 3]);
     for (steps, weight) in [(-2.0, 1.0), (-1.0, -8.0), (1.0, 8.0), (2.0, -1.0)] {
         let s = steps * DIFFERENCE_S;
         for ((n, y), d) in near.iter_mut().zip(y).zip(dy) {
@@ -319,5 +321,4 @@ pub fn shoulder_accelerations(
             }
         }
     }
-    sums
 }

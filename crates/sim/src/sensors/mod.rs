@@ -20,9 +20,10 @@ pub struct Clock {
 pub struct Sensors<'m> {
     model: &'m Model,
     memories: Vec<imu::Memory>,
-    /// Scratch: rates of the state, the state at a neighbouring moment.
+    /// Scratch: rates of the state, the state at a neighbouring moment, accelerations of the shoulders.
     dy: Vec<f64>,
     near: Vec<f64>,
+    shoulders: Vec<[f64; 3]>,
 }
 
 impl<'m> Sensors<'m> {
@@ -38,6 +39,7 @@ impl<'m> Sensors<'m> {
             memories: model.imus().iter().map(Imu::switch_on).collect(),
             dy: vec![0.0; size],
             near: vec![0.0; size],
+            shoulders: vec![[0.0; 3]; if size > 0 { model.carriers() } else { 0 }],
         }
     }
 
@@ -60,22 +62,20 @@ impl<'m> Sensors<'m> {
             linear_m_per_s2: linear,
             angular_rad_per_s2: angular,
         };
-        let shoulders = model
-            .imus()
-            .iter()
-            .any(|imu| imu.clock == clock && imu.is_on_a_carrier())
-            .then(|| imu::shoulder_accelerations(model, t_s, y, &self.dy, w, &mut self.near));
+        let here = |imu: &Imu| imu.clock == clock && imu.is_on_a_carrier();
+        let on_carriers = model.imus().iter().any(here);
+        if on_carriers {
+            let (near, out) = (&mut self.near, &mut self.shoulders);
+            imu::shoulder_accelerations(model, t_s, y, &self.dy, w, near, out);
+        }
+        let shoulders = on_carriers.then_some(&self.shoulders[..]);
         for (imu, memory) in model
             .imus()
             .iter()
             .zip(&mut self.memories)
             .filter(|(imu, _)| imu.clock == clock)
         {
-            let truth = imu.truth(
-                &on_body,
-                shoulders.as_deref(),
-                model.body.gravity_m_per_s2.into(),
-            );
+            let truth = imu.truth(&on_body, shoulders, model.body.gravity_m_per_s2.into());
             if let Some(reading) = imu.measure(tick, t_s, truth, memory) {
                 sink(&reading);
             }

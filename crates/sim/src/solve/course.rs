@@ -85,6 +85,8 @@ pub struct Course<'m> {
     switch_s: f64,
     /// `Some` where contacts open and close.
     contacts: Vec<Contact>,
+    /// How they stood before the last switch.
+    contacts_before: Vec<Contact>,
     /// Whether N > 0 at the end of the last step, per handle; for methods that locate nothing.
     touching: Vec<bool>,
     /// What makes a margin of N*, by pairs: ±1 and 0, or 0 and ∞ for a handle without events.
@@ -120,6 +122,7 @@ impl<'m> Course<'m> {
                 .collect(),
             switch_s: f64::INFINITY,
             contacts: vec![Contact::Clamped; n],
+            contacts_before: vec![Contact::Clamped; n],
             touching: vec![false; n],
             watch: vec![(f64x2::ZERO, f64x2::splat(f64::INFINITY)); pairs(n)],
             locate,
@@ -256,10 +259,10 @@ impl<'m> Course<'m> {
         }
         if self.t_s >= self.switch_s - SAME_MOMENT_S {
             self.t_s = self.t_s.max(self.switch_s.min(self.end_s));
-            let before = self.contacts.clone();
+            self.contacts_before.copy_from_slice(&self.contacts);
             self.begin_segment();
-            for (i, old) in before.into_iter().enumerate() {
-                match (old, self.contacts[i]) {
+            for i in 0..self.contacts.len() {
+                match (self.contacts_before[i], self.contacts[i]) {
                     (Contact::Closed, Contact::Open) => {
                         self.changed(i, EventKind::ContactOpened, observer)
                     }

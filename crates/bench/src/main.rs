@@ -1,0 +1,219 @@
+//! palanquin-bench: the methods of `sim` beside `ode_solvers` and `diffsol`, on one thread, in one run, answers checked.
+//!
+//! One rigid body on two handles, carried by two phase oscillators that a drum pulls; smooth but for the clamp N ≥ 0. Cases and
+//! references (binary128, good to 1e-11 rad) are those of `crates/sim/tests/palanquin_bench`. Every solver runs over a ladder of
+//! tolerances; the cheapest setting that keeps max |roll error| over 60 s below 1e-3, 1e-6, 1e-9 rad counts (in case C the angle
+//! between the orientations). Times are the least of several runs. The ladders go to stderr, what comes of them to stdout.
+//!
+//! `cargo run --release --manifest-path crates/bench/Cargo.toml`
+
+mod by_hand;
+mod peers;
+
+use by_hand::Problem;
+use sim::model::Model;
+use sim::run::{Sample, run_model};
+use sim::solve::{METHODS, Method, Settings};
+use std::hint::black_box;
+use std::time::Instant;
+
+/// Samples of roll (A, B) or of the quaternion w, x, y, z.
+pub struct Course {
+    /// Quaternions at 30 Hz.
+    pub turn: Vec<[f64; 4]>,
+    /// Evaluations of the right-hand side; 0 where a peer does not count them.
+    pub evaluations: u64,
+}
+
+struct Case {
+    name: &'static str,
+    model: Model,
+    problem: Problem,
+    truth: Vec<[f64; 4]>,
+}
+
+fn case(name: &'static str) -> Case {
+    let folder = concat!(env!("CARGO_MANIFEST_DIR"), "/../sim/tests/palanquin_bench");
+    let text = std::fs::read_to_string(format!("{folder}/{name}.toml")).expect("the case");
+    let scene = sim::scene::parse(name, &text, &[]).unwrap_or_else(|e| panic!("{e}"));
+    let table = std::fs::read_to_string(format!("{folder}/ref_{name}.csv")).expect("the truth");
+    let row = |line: &str| {
+        let mut numbers = line
+            .split(',')
+            .skip(5)
+            .map(|x| x.parse().expect("a number"));
+        std::array::from_fn(|_| numbers.next().expect("four numbers"))
+    };
+    Case {
+        name,
+        model: Model::new(&scene),
+        problem: Problem::case(name),
+        truth: table.lines().skip(1).map(row).collect(),
+    }
+}
+
+/// Largest error over the run, rad: of roll, or in case C of the whole orientation. NaN where samples are missing.
+fn error(case: &Case, course: &Course) -> f64 {
+    if course.turn.len() != case.truth.len() {
+        return f64::NAN;
+    }
+    let roll = |[w, x, y, z]: [f64; 4]| (2.0 * (w * x + y * z)).atan2(1.0 - 2.0 * (x * x + y * y));
+    let of = |(a, b): (&[f64; 4], &[f64; 4])| {
+        if case.name != "C" {
+            return (roll(*a) - roll(*b)).abs();
+        }
+        let ([w, x, y, z], [rw, rx, ry, rz]) = (*a, *b);
+        let real = w * rw + x * rx + y * ry + z * rz;
+        let part = [
+            w * rx - x * rw - y * rz + z * ry,
+            w * ry - y * rw - z * rx + x * rz,
+            w * rz - z * rw - x * ry + y * rx,
+        ];
+        let part = part.iter().map(|p| p * p).sum::<f64>().sqrt();
+        2.0 * part.atan2(real.abs())
+    };
+    // `max` would step over a NaN.
+    let worst = |a: f64, b: f64| if b > a || b.is_nan() { b } else { a };
+    course.turn.iter().zip(&case.truth).map(of).fold(0.0, worst)
+}
+
+fn ours(model: &Model, method: &Method, setting: f64) -> Course {
+    let settings = Settings {
+        tolerance: setting,
+        step_s: setting,
+        most_evaluations: 50_000_000,
+    };
+    let mut turn = Vec::with_capacity(1801);
+    let (stats, _) = run_model(model, method, &settings, &mut |s: &Sample| {
+        let [x, y, z, w] = s.pose.orientation;
+        turn.push([w, x, y, z]);
+        true
+    });
+    Course {
+        turn,
+        evaluations: stats.evaluations,
+    }
+}
+
+/// Least time of several runs, s; a slow run is not repeated as often.
+fn least(mut run: impl FnMut() -> Course) -> (f64, Course) {
+    let (mut best, mut spent, mut course) = (f64::INFINITY, 0.0, None);
+    for i in 0..15 {
+        let start = Instant::now();
+        let got = black_box(run());
+        let took = start.elapsed().as_secs_f64();
+        (best, spent) = (best.min(took), spent + took);
+        course = Some(got);
+        if i >= 2 && spent > 0.5 {
+            break;
+        }
+    }
+    (best, course.expect("ran"))
+}
+
+struct Rung {
+    who: String,
+    ours: bool,
+    wall_s: f64,
+    error: f64,
+}
+
+fn main() {
+    let only = std::env::args().nth(1);
+    right_hand_sides();
+    let tolerances: Vec<f64> = (-4..=26).map(|i| 10f64.powf(-0.5 * f64::from(i))).collect();
+    for name in ["A", "B", "C"] {
+        if only.as_deref().is_some_and(|only| only != name) {
+            continue;
+        }
+        let case = case(name);
+        let mut rungs = Vec::new();
+        let mut add = |who: String, ours: bool, run: &mut dyn FnMut() -> Course| {
+            let (wall_s, course) = least(run);
+            let error = error(&case, &course);
+            let (ms, calls) = (wall_s * 1e3, course.evaluations);
+            eprintln!(
+                "{name}  {who:<34} {ms:>9.3} ms  {calls:>9} evaluations  error {error:.1e} rad"
+            );
+            rungs.push(Rung {
+                who,
+                ours,
+                wall_s,
+                error,
+            });
+        };
+        for method in METHODS.iter().filter(|m| m.adaptive && m.name != "auto") {
+            // Case B by an implicit method at the finest tolerances takes seconds and wins nothing.
+            for &tolerance in tolerances.iter().filter(|t| **t > 1e-11) {
+                let who = format!("sim {} {tolerance:.0e}", method.name);
+                add(who, true, &mut || ours(&case.model, method, tolerance));
+            }
+        }
+        for (peer, solve) in peers::PEERS {
+            for &tolerance in &tolerances {
+                let who = format!("{peer} {tolerance:.0e}");
+                add(who, false, &mut || solve(&case.problem, tolerance));
+            }
+        }
+        for within in [1e-3, 1e-6, 1e-9] {
+            let cheapest = |ours: bool| {
+                let good = rungs.iter().filter(|r| r.ours == ours && r.error <= within);
+                good.min_by(|a, b| a.wall_s.total_cmp(&b.wall_s))
+            };
+            let told = |r: Option<&Rung>| {
+                r.map_or("none".into(), |r| {
+                    format!("{} {:.3} ms", r.who, r.wall_s * 1e3)
+                })
+            };
+            let (us, them) = (cheapest(true), cheapest(false));
+            let ratio = us.zip(them).map_or(String::new(), |(us, them)| {
+                format!("  ratio 1/{:.1}", them.wall_s / us.wall_s)
+            });
+            println!(
+                "{name} to {within:.0e} rad: {}; peers: {}{ratio}",
+                told(us),
+                told(them)
+            );
+        }
+        println!();
+    }
+}
+
+/// One evaluation of case A: the model's, term by term, and one written by hand; both must give the same.
+fn right_hand_sides() {
+    let case = case("A");
+    let mut y = case.model.initial_state();
+    let (mut dy, mut w) = (vec![0.0; y.len()], case.model.workspace());
+    case.model.begin_segment(0.0, &mut w);
+    let hand = by_hand::State::from_column_slice(&y[..15]);
+    let mut slope = hand;
+    case.model.rhs(0.0, &y, &mut dy, &mut w);
+    by_hand::rhs(&case.problem, 0.0, hand.as_slice(), slope.as_mut_slice());
+    for (a, b) in dy.iter().zip(slope.iter()) {
+        assert!(
+            (a - b).abs() < 1e-9,
+            "the two right-hand sides differ: {a} {b}"
+        );
+    }
+    let time = |run: &mut dyn FnMut()| {
+        let round = |run: &mut dyn FnMut()| {
+            let start = Instant::now();
+            (0..100_000).for_each(|_| run());
+            start.elapsed().as_secs_f64() * 1e9 / 1e5
+        };
+        let mut rounds: Vec<f64> = (0..15).map(|_| round(run)).collect();
+        rounds.sort_by(f64::total_cmp);
+        (rounds[0], rounds[7])
+    };
+    let (least, median) = time(&mut || {
+        case.model.rhs(0.1, black_box(&y), &mut dy, &mut w);
+        black_box(&dy);
+    });
+    println!("one right-hand side of case A: sim {least:.1} ns (median {median:.1})");
+    y.truncate(15);
+    let (least, median) = time(&mut || {
+        by_hand::rhs(&case.problem, 0.1, black_box(&y), slope.as_mut_slice());
+        black_box(&slope);
+    });
+    println!("                               by hand {least:.1} ns (median {median:.1})\n");
+}

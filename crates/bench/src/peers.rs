@@ -1,0 +1,134 @@
+//! Other solvers on the same equations, each at its own dense output of 30 Hz.
+
+use crate::Course;
+use crate::by_hand::{Problem, State, rhs, unclamped};
+use diffsol::{NalgebraMat, OdeBuilder, OdeSolverMethod, OdeSolverStopReason, VectorCommon};
+use std::cell::Cell;
+
+/// A peer: name, and a run at a tolerance.
+pub type Peer = (&'static str, fn(&Problem, f64) -> Course);
+
+/// All of them.
+pub const PEERS: &[Peer] = &[
+    ("ode_solvers Dopri5", dopri5),
+    ("ode_solvers Dop853", dop853),
+    ("diffsol tsit45 with roots", tsit45),
+];
+
+struct System(Problem);
+
+impl ode_solvers::System<f64, State> for System {
+    fn system(&self, t: f64, y: &State, dy: &mut State) {
+        rhs(&self.0, t, y.as_slice(), dy.as_mut_slice());
+    }
+}
+
+fn unit(y: &[f64]) -> [f64; 4] {
+    let length = y[3..7].iter().map(|q| q * q).sum::<f64>().sqrt();
+    [y[6], y[3], y[4], y[5]].map(|q| q / length)
+}
+
+const END_S: f64 = 60.0;
+const SAMPLES: usize = 1801;
+
+macro_rules! classical {
+    ($name:ident, $method:ident) => {
+        fn $name(problem: &Problem, tolerance: f64) -> Course {
+            let start = State::from_column_slice(&problem.start());
+            let mut solver = ode_solvers::$method::new(
+                System(*problem),
+                0.0,
+                END_S,
+                1.0 / 30.0,
+                start,
+                tolerance,
+                tolerance,
+            );
+            let evaluations = solver
+                .integrate()
+                .map_or(0, |stats| u64::from(stats.num_eval));
+            // Its last sample is at the end or one short of it.
+            let mut turn: Vec<[f64; 4]> =
+                solver.y_out().iter().map(|y| unit(y.as_slice())).collect();
+            turn.truncate(SAMPLES);
+            if turn.len() + 1 == SAMPLES {
+                turn.extend(turn.last().copied());
+            }
+            Course { turn, evaluations }
+        }
+    };
+}
+
+classical!(dopri5, Dopri5);
+classical!(dop853, Dop853);
+
+fn tsit45(problem: &Problem, tolerance: f64) -> Course {
+    let evaluations = Cell::new(0u64);
+    let failed = || Course {
+        turn: Vec::new(),
+        evaluations: 0,
+    };
+    let builder = OdeBuilder::<NalgebraMat<f64>>::new()
+        .rtol(tolerance)
+        .atol([tolerance])
+        .h0(1e-4)
+        .rhs(|y, _p, t, dy| {
+            evaluations.set(evaluations.get() + 1);
+            rhs(problem, t, y, dy);
+        })
+        .init(|_p, _t, y| y.copy_from_slice(&problem.start()), 15)
+        .root(
+            |y, _p, t, out| out.copy_from_slice(&unclamped(problem, t, y)),
+            2,
+        );
+    let Ok(built) = builder.build() else {
+        return failed();
+    };
+    let Ok(mut solver) = built.tsit45() else {
+        return failed();
+    };
+    let mut turn = Vec::with_capacity(SAMPLES);
+    let due = |n: usize| n as f64 / 30.0;
+    if solver.set_stop_time(END_S).is_err() {
+        return failed();
+    }
+    loop {
+        let reason = match solver.step() {
+            Ok(reason) => reason,
+            Err(_) => {
+                return Course {
+                    turn,
+                    evaluations: evaluations.get(),
+                };
+            }
+        };
+        let until = match reason {
+            OdeSolverStopReason::RootFound(t, _) => t,
+            _ => solver.state().t,
+        };
+        while turn.len() < SAMPLES && due(turn.len()) <= until + 1e-12 {
+            match solver.interpolate(due(turn.len()).min(until)) {
+                Ok(y) => turn.push(unit(y.inner().as_slice())),
+                Err(_) => {
+                    return Course {
+                        turn,
+                        evaluations: evaluations.get(),
+                    };
+                }
+            }
+        }
+        match reason {
+            OdeSolverStopReason::TstopReached => break,
+            OdeSolverStopReason::RootFound(t, _) => {
+                if solver.state_mut_back(t).is_err() || solver.set_stop_time(END_S).is_err() {
+                    break;
+                }
+            }
+            OdeSolverStopReason::InternalTimestep => {}
+        }
+    }
+    Course {
+        turn,
+        evaluations: evaluations.get(),
+    }
+}
