@@ -42,25 +42,35 @@ impl Default for WriterOptions {
     }
 }
 
+/// What the system said, without the name of the unfinished file that the error may carry.
+fn plain(error: io::Error) -> io::Error {
+    match error.kind() {
+        io::ErrorKind::Other => error,
+        io::ErrorKind::NotFound => io::Error::new(error.kind(), "there is no such folder"),
+        kind if error.get_ref().is_some() => kind.into(),
+        _ => error,
+    }
+}
+
 /// Why a recording could not be written. Nothing is left under the final name.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum WriteError {
     /// The file or stream took no more bytes, or could not be made.
-    #[error("{target}: cannot be written: {source}; no file of that name was made or changed")]
+    #[error("{target}: cannot be written: {cause}; no file of that name was made or changed")]
     Io {
         /// The path, or `standard output`.
         target: String,
         /// What the system said.
-        source: io::Error,
+        cause: io::Error,
     },
     /// The container format cannot hold what was asked for.
-    #[error("{target}: cannot be written: {source}")]
+    #[error("{target}: cannot be written: {cause}")]
     Format {
         /// The path, or `standard output`.
         target: String,
         /// What the format's library said.
-        source: mcap::McapError,
+        cause: mcap::McapError,
     },
     /// A message's time cannot be stored.
     #[error("{target}: a message on {topic} has the time {t_ns} ns; times must not be negative")]
@@ -171,7 +181,10 @@ impl RecordingWriter {
         let target = path.display().to_string();
         match Sink::beside(path) {
             Ok(sink) => Self::begin(sink, target, options),
-            Err(source) => Err(WriteError::Io { target, source }),
+            Err(cause) => Err(WriteError::Io {
+                target,
+                cause: plain(cause),
+            }),
         }
     }
 
@@ -335,16 +348,21 @@ impl RecordingWriter {
             .map_err(|error| failed(&self.target, error))?;
         let target = self.target;
         let sink = self.writer.into_inner().into_inner();
-        sink.commit()
-            .map_err(|source| WriteError::Io { target, source })
+        sink.commit().map_err(|cause| WriteError::Io {
+            target,
+            cause: plain(cause),
+        })
     }
 }
 
 fn failed(target: &str, error: mcap::McapError) -> WriteError {
     let target = target.to_owned();
     match error {
-        mcap::McapError::Io(source) => WriteError::Io { target, source },
-        source => WriteError::Format { target, source },
+        mcap::McapError::Io(cause) => WriteError::Io {
+            target,
+            cause: plain(cause),
+        },
+        cause => WriteError::Format { target, cause },
     }
 }
 

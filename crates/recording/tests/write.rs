@@ -132,7 +132,7 @@ fn nothing_is_left_when_it_fails_or_is_given_up() {
     .expect("refused");
     let text = error.to_string();
     assert!(
-        text.starts_with("no/such/folder/a.mcap: cannot be written: No such file or directory"),
+        text.starts_with("no/such/folder/a.mcap: cannot be written: there is no such folder"),
         "{text}"
     );
     let error = RecordingWriter::create(folder.path(), &WriterOptions::default())
