@@ -44,10 +44,10 @@ impl Default for WriterOptions {
 
 /// What the system said, without the name of the unfinished file that the error may carry.
 fn plain(error: io::Error) -> io::Error {
+    use io::ErrorKind::{NotFound, PermissionDenied, StorageFull};
     match error.kind() {
-        io::ErrorKind::Other => error,
-        io::ErrorKind::NotFound => io::Error::new(error.kind(), "there is no such folder"),
-        kind if error.get_ref().is_some() => kind.into(),
+        NotFound => io::Error::new(NotFound, "there is no such folder"),
+        kind @ (PermissionDenied | StorageFull) if error.get_ref().is_some() => kind.into(),
         _ => error,
     }
 }
