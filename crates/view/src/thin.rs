@@ -17,15 +17,17 @@ pub struct Thin {
 }
 
 impl Thin {
-    /// For about `points` points between `start_ns` and `end_ns`; an interval of 0 keeps everything.
+    /// For at most `points` finite points between `start_ns` and `end_ns`; an interval of 0 keeps everything.
     pub fn new(name: &str, start_ns: i64, end_ns: i64, samples: u64, points: u64) -> Self {
-        let span_ns = end_ns.saturating_sub(start_ns).max(1);
+        // The last moment belongs to it.
+        let span_ns = end_ns.saturating_sub(start_ns).saturating_add(1).max(1);
         // Two points come of each interval.
         let intervals = i64::try_from((points / 2).max(1)).unwrap_or(i64::MAX);
         let interval_ns = if samples <= points {
             0
         } else {
-            (span_ns / intervals).max(1)
+            // Rounded up: one interval more than these would be two points too many.
+            span_ns / intervals + i64::from(span_ns % intervals > 0)
         };
         Thin {
             start_ns,
