@@ -8,6 +8,7 @@
 pub mod cdr;
 pub mod finding;
 pub mod import;
+pub mod load;
 pub mod read;
 pub mod schema;
 pub mod signal;

@@ -8,6 +8,7 @@ use crate::sensors::Reading;
 use recording::cdr::{
     Header, Imu, Quaternion, StringMessage, TfMessage, Time, Transform, TransformStamped, Vector3,
 };
+use recording::load::Load;
 use recording::schema::{foxglove, rath};
 use recording::topics::{self, MessageKind};
 use recording::write::{ChannelId, RecordingWriter, WriteError};
@@ -287,8 +288,9 @@ impl<'m> Recorder<'m> {
 
     /// Force arrows (one metre is the body's weight) and contact marks.
     fn arrows(&self, s: &Sample, t_ns: i64) -> foxglove::SceneUpdate {
-        let mut arrows = Vec::with_capacity(s.normal_n.len());
-        let mut spheres = Vec::with_capacity(s.normal_n.len());
+        let handles = s.normal_n.len();
+        let mut arrows = Vec::with_capacity(handles);
+        let mut spheres = Vec::with_capacity(handles);
         for ((&normal_n, tangential_n), handle_m) in
             s.normal_n.iter().zip(&s.tangential_n).zip(&s.handle_m)
         {
@@ -297,7 +299,7 @@ impl<'m> Recorder<'m> {
             } else {
                 0.0
             };
-            let color = Some(contact_color(normal_n, self.weight_n));
+            let color = Some(contact_color(Load::of(normal_n, self.weight_n, handles)));
             let [tx, ty] = tangential_n.map(|t| {
                 if self.weight_n > 0.0 {
                     t / self.weight_n
@@ -389,14 +391,12 @@ pub fn metadata(scene: &Scene) -> BTreeMap<String, String> {
     .into()
 }
 
-/// Loaded, nearly unloaded (below a tenth of the fair share) and slack, in colours that colour-blind people tell apart.
-fn contact_color(normal_n: f64, weight_n: f64) -> foxglove::Color {
-    let [r, g, b] = if normal_n <= 0.0 {
-        [0.84, 0.37, 0.0]
-    } else if normal_n < 0.05 * weight_n {
-        [0.94, 0.89, 0.26]
-    } else {
-        [0.0, 0.45, 0.70]
+/// How a handle is loaded, in colours that colour-blind people tell apart.
+fn contact_color(load: Load) -> foxglove::Color {
+    let [r, g, b] = match load {
+        Load::Slack => [0.84, 0.37, 0.0],
+        Load::NearlyUnloaded => [0.94, 0.89, 0.26],
+        Load::Loaded => [0.0, 0.45, 0.70],
     };
     foxglove::Color { r, g, b, a: 1.0 }
 }

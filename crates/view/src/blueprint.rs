@@ -27,6 +27,7 @@ pub enum Node {
 }
 
 /// One view: its class, title, the entities in it and its properties.
+#[derive(Clone)]
 pub struct View {
     class: &'static str,
     title: String,
@@ -73,7 +74,23 @@ impl View {
             )
     }
 
-    /// With a fixed range of values.
+    /// Only so many seconds before and after the cursor, whatever the other plots show.
+    pub fn near(mut self, seconds: f64) -> Self {
+        let boundary = |s: f64| TimeRangeBoundary::CursorRelative(TimeInt((s * 1e9) as i64));
+        let range = TimeRange {
+            start: boundary(-seconds),
+            end: boundary(seconds),
+        };
+        self.properties.retain(|(name, _)| *name != "TimeAxis");
+        self.with(
+            "TimeAxis",
+            &a::TimeAxis::new()
+                .with_link(c::LinkAxis::Independent)
+                .with_view_range(c::TimeRange(range)),
+        )
+    }
+
+    /// With a range of values to begin with.
     pub fn range(self, low: f64, high: f64) -> Self {
         self.with(
             "ScalarAxis",

@@ -52,6 +52,7 @@ pub fn load(
         name: name.to_owned(),
         start_ns: info.start_ns,
         end_ns: info.end_ns,
+        growing: detail == Detail::Whole,
         ..Take::default()
     };
     name_of_scene(&mut take, info);
@@ -82,9 +83,9 @@ pub fn load(
 
 /// Metrics, events, remarks and the columns behind them, as `analyze` finds them.
 fn examined(take: &mut Take, recording: &Recording) -> Result<(), ReadError> {
-    // No list of signals is asked for: the empty pattern fits no path.
+    // No list of signals is asked for: no topic has the empty name. (To name no signal would switch the estimates off.)
     let request = Request {
-        signals: vec![String::new()],
+        topics: vec![String::new()],
         ..Request::default()
     };
     let analysis = examine(&take.name, recording, &request)?;
@@ -99,6 +100,8 @@ fn examined(take: &mut Take, recording: &Recording) -> Result<(), ReadError> {
     take.phase_ns = at(analysis.inputs.phase_times());
     take.window = analysis.window;
     take.metrics = analysis.metrics;
+    let imu = analysis.roles.into_iter().find(|(role, _)| *role == "imu");
+    take.main_imu = imu.and_then(|(_, topics)| topics.into_iter().next());
     take.events = analysis.events;
     take.remarks = analysis
         .quality
@@ -484,6 +487,9 @@ fn others(
         .map(|(topic, sensor)| sensor.finish(topic))
         .filter(Sensor::has_any)
         .collect();
+    // The load's own sensor comes first.
+    take.imus
+        .sort_by_key(|sensor| Some(&sensor.topic) != take.main_imu.as_ref());
     take.topics = plain
         .into_iter()
         .map(|(name, curves)| topic(name, curves))

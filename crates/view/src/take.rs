@@ -12,6 +12,8 @@ pub struct Take {
     pub start_ns: i64,
     /// Log time of the last message, ns.
     pub end_ns: i64,
+    /// More may come: axes cannot be fixed yet.
+    pub growing: bool,
     /// The columns that `analyze` computes from.
     pub inputs: Inputs,
     /// Log times of height and angles, ns: what `inputs` has in seconds.
@@ -32,7 +34,9 @@ pub struct Take {
     pub shape: Shape,
     /// The energy ledger.
     pub energy: Option<Ledger>,
-    /// Inertial sensors.
+    /// Topic of the inertial sensor on the load, where one is known as that.
+    pub main_imu: Option<String>,
+    /// Inertial sensors, that of the load first.
     pub imus: Vec<Sensor>,
     /// Every other topic with numbers.
     pub topics: Vec<Topic>,
@@ -153,6 +157,7 @@ impl Default for Take {
             name: String::new(),
             start_ns: 0,
             end_ns: 0,
+            growing: false,
             inputs: Inputs::default(),
             state_ns: Vec::new(),
             force_ns: Vec::new(),
@@ -163,60 +168,12 @@ impl Default for Take {
             carriers: None,
             shape: Shape::default(),
             energy: None,
+            main_imu: None,
             imus: Vec::new(),
             topics: Vec::new(),
             events: Vec::new(),
             remarks: Vec::new(),
             notes: Vec::new(),
-        }
-    }
-}
-
-/// How a handle is loaded.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Load {
-    /// It carries.
-    Loaded,
-    /// It carries less than a tenth of its fair share M·g/N: for two handles, the paper's 0.05·M·g.
-    NearlyUnloaded,
-    /// It does not touch.
-    Slack,
-}
-
-impl Load {
-    /// The state of a handle that presses with `normal_n`, of `handles` that share `weight_n`.
-    pub fn of(normal_n: f64, weight_n: f64, handles: usize) -> Self {
-        if normal_n.is_nan() || normal_n <= 0.0 {
-            Load::Slack
-        } else if normal_n < 0.1 * weight_n / handles.max(1) as f64 {
-            Load::NearlyUnloaded
-        } else {
-            Load::Loaded
-        }
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn load_has_the_papers_line_for_two_handles() {
-        let weight_n = 600.0;
-        for (normal_n, handles, load) in [
-            (0.0, 2, Load::Slack),
-            (-1.0, 2, Load::Slack),
-            (f64::NAN, 2, Load::Slack),
-            (29.9, 2, Load::NearlyUnloaded),
-            (30.0, 2, Load::Loaded),
-            (7.4, 8, Load::NearlyUnloaded),
-            (7.6, 8, Load::Loaded),
-        ] {
-            assert_eq!(
-                Load::of(normal_n, weight_n, handles),
-                load,
-                "{normal_n} N of {handles}"
-            );
         }
     }
 }

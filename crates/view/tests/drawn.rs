@@ -117,29 +117,45 @@ fn sensors_alone_show_sensors_alone() {
                 Some(&3000)
             );
         }
-        assert_eq!(
-            rows.get(&format!("/topics/imu/{sensor}/attitude/roll")),
-            Some(&3000)
-        );
     }
+    // The first sensor is taken for that of the load, whose motion is estimated better elsewhere.
+    assert_eq!(rows.get("/topics/imu/s1/attitude/roll"), Some(&3000));
+    assert!(rows["/plots/angles/roll"] > 1000);
     let entities = sent.entities();
     assert!(entities.contains("/topics/imu/s0/accel_spectra/z"));
     assert!(
-        !entities
-            .iter()
-            .any(|e| e.starts_with("/world") || e.starts_with("/phases")),
+        !entities.iter().any(|e| e.starts_with("/world")),
         "{entities:?}"
     );
     assert!(
         !titles
             .iter()
-            .any(|t| t.starts_with("Scene") || t.starts_with("Phases")),
+            .any(|t| t.starts_with("Scene") || t.starts_with("Phases and beat")),
         "{titles:?}"
     );
     assert_eq!(
         sent.timelines().into_iter().collect::<Vec<_>>(),
         ["time", "utc"]
     );
+}
+
+#[test]
+fn what_is_estimated_from_the_sensor_on_the_load_is_drawn() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("imu.mcap");
+    imus(&path, 1, 60, 100);
+    let (sent, titles) = taken(&path);
+    let rows = sent.rows();
+    for entity in ["/plots/height/z", "/plots/angles/roll", "/plots/forces/all"] {
+        assert!(
+            rows.get(entity).is_some_and(|n| *n > 1000),
+            "{entity}: {rows:?}"
+        );
+    }
+    // One estimate of the roll is enough.
+    assert!(!rows.contains_key("/topics/imu/s0/attitude/roll"));
+    let spectra = titles.iter().find(|t| t.starts_with("Spectr")).unwrap();
+    assert!(spectra.contains("height"), "{titles:?}");
 }
 
 #[test]

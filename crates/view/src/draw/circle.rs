@@ -56,7 +56,8 @@ pub fn draw(store: &mut Store<'_>, take: &Take) -> anyhow::Result<Option<View>> 
         .with_radii([0.075f32])
         .with_colors((0..carriers).map(|i| palette::carrier(i).0))
         .with_labels((1..=carriers).map(|i| i.to_string()))
-        .with_show_labels(carriers <= 12);
+        // Of many that walk together the numbers would lie on each other; the colours are those of the figures.
+        .with_show_labels(carriers <= 2);
     store.fixed("/phases/carriers", &style)?;
 
     let beat = &take.inputs.beat_phase_rad;

@@ -7,6 +7,19 @@ use crate::palette;
 use crate::store::Store;
 use crate::take::Take;
 
+/// Characters of a line: the log does not wrap, and its panel is narrow.
+const LINE: usize = 46;
+
+/// The beginning of a long line, cut after a word; the summary has the reader's remarks in full.
+fn shortened(line: &str) -> String {
+    if line.chars().count() <= LINE {
+        return line.to_owned();
+    }
+    let head: String = line.chars().take(LINE - 2).collect();
+    let end = head.rfind(' ').unwrap_or(head.len());
+    format!("{} …", head[..end].trim_end_matches([' ', ',', ':', '(']))
+}
+
 /// Sends the log where there is anything to say.
 pub fn draw(store: &mut Store<'_>, take: &Take) -> anyhow::Result<Option<View>> {
     let mut lines: Vec<(i64, String, &'static str, u32)> = Vec::new();
@@ -25,7 +38,7 @@ pub fn draw(store: &mut Store<'_>, take: &Take) -> anyhow::Result<Option<View>> 
         };
         lines.push((
             at(event.t_s),
-            format!("{:.2} s  {}", event.t_s, what),
+            shortened(&format!("{:.2} s  {}", event.t_s, what)),
             level,
             color,
         ));
@@ -34,7 +47,7 @@ pub fn draw(store: &mut Store<'_>, take: &Take) -> anyhow::Result<Option<View>> 
         let when = t_s.map(|t_s| format!("{t_s:.2} s  ")).unwrap_or_default();
         lines.push((
             at(t_s.unwrap_or(0.0)),
-            format!("{when}{text}"),
+            shortened(&format!("{when}{text}")),
             "WARN",
             palette::ORANGE,
         ));
@@ -51,4 +64,21 @@ pub fn draw(store: &mut Store<'_>, take: &Take) -> anyhow::Result<Option<View>> 
         .columns_of_unit_batches()?;
     store.rows("/events", &times, columns)?;
     Ok(Some(View::log("Events", "/events")))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::{LINE, shortened};
+
+    #[test]
+    fn long_lines_end_after_a_word() {
+        let short = "30.40 s  handle 1 goes slack";
+        assert_eq!(shortened(short), short);
+        let long = "/imu/rath: orientation is declared as not given (covariance -1)";
+        assert_eq!(
+            shortened(long),
+            "/imu/rath: orientation is declared as not …"
+        );
+        assert!(shortened(&"ü".repeat(100)).chars().count() <= LINE);
+    }
 }

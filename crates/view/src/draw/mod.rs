@@ -40,40 +40,37 @@ struct Scene {
     plots: Vec<View>,
 }
 
-/// Columns of plots beside the scene; a tab for every sensor and for topics of other kinds. Where there is no scene, a single
-/// sensor is shown together with what was estimated from it.
+/// The overview first, then a tab for every sensor and for topics of other kinds. Without anything to overview, the first of those
+/// tabs has the words beside it.
 fn layout(scene: Scene, log: Option<View>, page: View, mut panels: Vec<Panel>) -> Node {
     let words = match log {
         Some(log) => Node::Tabs("Words".into(), vec![log.into(), page.into()]),
         None => page.into(),
     };
-    let known = scene.space.is_some() || !scene.small.is_empty() || !scene.plots.is_empty();
-    let sensors = panels.iter().filter(|panel| panel.is_sensor).count();
-    let tabs = |first: Node, panels: Vec<Panel>| match panels.is_empty() {
-        true => first,
-        false => {
-            let mut tabs = vec![first];
-            tabs.extend(panels.into_iter().map(|panel| panel.node(None)));
-            Node::Tabs("Recording".into(), tabs)
-        }
-    };
-    if scene.space.is_none() && sensors == 1 {
-        // Sensors stand first.
-        let mut panel = panels.remove(0);
-        panel.plots.extend(scene.plots);
-        panel.small.extend(scene.small);
-        return tabs(panel.node(Some(words)), panels);
+    let mut tabs: Vec<Node> = Vec::new();
+    if scene.space.is_some() {
+        tabs.extend(around(scene, words));
+    } else if !scene.plots.is_empty() || !scene.small.is_empty() {
+        // What was measured stands before what was estimated from it.
+        let measured = panels.first().filter(|panel| panel.is_sensor);
+        let mut plots: Vec<View> = measured.map_or(Vec::new(), |panel| panel.plots.clone());
+        plots.extend(scene.plots);
+        tabs.push(side_by_side(plots, scene.small, words));
+    } else if panels.is_empty() {
+        return words;
+    } else {
+        tabs.push(panels.remove(0).node(Some(words)));
     }
-    if !known {
-        let nodes: Vec<Node> = panels.into_iter().map(|panel| panel.node(None)).collect();
-        return match nodes.is_empty() {
-            true => words,
-            false => Node::Row(vec![
-                (3.4, Node::Tabs("Topics".into(), nodes)),
-                (1.0, words),
-            ]),
-        };
+    tabs.extend(panels.into_iter().map(|panel| panel.node(None)));
+    match tabs.len() {
+        1 => tabs.remove(0),
+        _ => Node::Tabs("Recording".into(), tabs),
     }
+}
+
+/// The scene in space with drawings and words below it and plots to its right; the energies, which are of other sizes, a tab for
+/// themselves: of more plots in a column the axes could not be read.
+fn around(scene: Scene, words: Node) -> Vec<Node> {
     let mut small: Vec<(f32, Node)> = Vec::new();
     for view in scene.small {
         // A spectrum is wider than the circle.
@@ -84,35 +81,39 @@ fn layout(scene: Scene, log: Option<View>, page: View, mut panels: Vec<Panel>) -
         };
         small.push((share, view.into()));
     }
-    small.push((1.25, words));
+    small.push((1.3, words));
     let mut left: Vec<(f32, Node)> = Vec::new();
     left.extend(scene.space.map(|view| (3.0, view.into())));
     left.push((2.0, Node::Row(small)));
+    let (energies, plots): (Vec<View>, Vec<View>) = scene
+        .plots
+        .into_iter()
+        .partition(|view| view.title().contains("nergy"));
     let mut columns = vec![(5.0, Node::Column(left))];
-    if !scene.plots.is_empty() {
-        // What is stored and what went in and out are of different size: one behind the other.
-        let (energy, plots): (Vec<View>, Vec<View>) = scene
-            .plots
-            .into_iter()
-            .partition(|v| v.title().contains("nergy"));
-        let mut rows = even(plots);
-        match energy.len() {
-            0 => {}
-            1 => rows.extend(even(energy)),
-            _ => rows.push((
-                1.0,
-                Node::Tabs(
-                    "Energy".into(),
-                    energy.into_iter().map(Node::from).collect(),
-                ),
-            )),
-        }
-        columns.push((4.0, Node::Column(rows)));
+    if !plots.is_empty() {
+        columns.push((4.0, Node::Column(even(plots))));
     }
-    tabs(
-        Node::Named("Overview".into(), Box::new(Node::Row(columns))),
-        panels,
-    )
+    let mut tabs = vec![named("Overview", Node::Row(columns))];
+    if !energies.is_empty() {
+        tabs.push(named("Energy", Node::Column(even(energies))));
+    }
+    tabs
+}
+
+/// Plots in columns of three, then drawings and words.
+fn side_by_side(plots: Vec<View>, small: Vec<View>, words: Node) -> Node {
+    let columns = plots.chunks(3);
+    let mut row: Vec<(f32, Node)> = columns
+        .map(|views| (1.2, Node::Column(even(views.to_vec()))))
+        .collect();
+    let mut right = even(small);
+    right.push((1.0, words));
+    row.push((1.0, Node::Column(right)));
+    named("Overview", Node::Row(row))
+}
+
+fn named(name: &str, node: Node) -> Node {
+    Node::Named(name.into(), Box::new(node))
 }
 
 fn even(views: Vec<View>) -> Vec<(f32, Node)> {

@@ -3,7 +3,7 @@
 use analyze::spectrum::Spectrum;
 
 use super::Panel;
-use super::series::{Line, lines};
+use super::series::{Line, plot, spread};
 use super::spectra::{self, Curve};
 use crate::blueprint::View;
 use crate::palette;
@@ -20,13 +20,14 @@ const GAIT_HZ: [f64; 2] = [0.5, 4.0];
 /// Draws sensors and other topics; a panel for each.
 pub fn draw(store: &mut Store<'_>, take: &Take) -> anyhow::Result<Vec<Panel>> {
     let mut out = Vec::new();
-    // What `analyze` estimates from the only sensor stands over the display's own estimate.
-    let estimated = take.imus.len() == 1 && !take.inputs.roll_rad.is_empty();
     for sensor in &take.imus {
-        out.extend(self::sensor(store, sensor, !estimated)?);
+        // What `analyze` estimates from the load's sensor stands over the display's own estimate.
+        let known =
+            take.main_imu.as_ref() == Some(&sensor.topic) && !take.inputs.roll_rad.is_empty();
+        out.extend(self::sensor(store, sensor, !known, take.growing)?);
     }
     for topic in &take.topics {
-        out.push(self::topic(store, topic)?);
+        out.push(self::topic(store, topic, take.growing)?);
     }
     Ok(out)
 }
@@ -46,7 +47,12 @@ fn place(topic: &str) -> String {
     format!("/topics/{}", clean.trim_matches('/'))
 }
 
-fn sensor(store: &mut Store<'_>, sensor: &Sensor, attitude: bool) -> anyhow::Result<Option<Panel>> {
+fn sensor(
+    store: &mut Store<'_>,
+    sensor: &Sensor,
+    attitude: bool,
+    growing: bool,
+) -> anyhow::Result<Option<Panel>> {
     let origin = place(&sensor.topic);
     let xyz = "x vermilion, y green, z blue";
     let mut plots: Vec<View> = Vec::new();
@@ -54,7 +60,7 @@ fn sensor(store: &mut Store<'_>, sensor: &Sensor, attitude: bool) -> anyhow::Res
         (
             "gyro",
             &sensor.gyro,
-            format!("{}: angular velocity [rad/s] ({xyz})", sensor.topic),
+            format!("{} angular velocity [rad/s] ({xyz})", sensor.topic),
         ),
         (
             "accel",
@@ -82,8 +88,8 @@ fn sensor(store: &mut Store<'_>, sensor: &Sensor, attitude: bool) -> anyhow::Res
             continue;
         }
         let path = format!("{origin}/{name}");
-        lines(store, &path, made)?;
-        plots.push(View::plot(title, path));
+        let range = spread(&made, growing);
+        plots.push(plot(store, title, &path, made, range)?);
     }
     let f_hz = gait_line(&sensor.accel_spectra).or_else(|| gait_line(&sensor.gyro_spectra));
     let top_hz = f_hz.map_or(TOP_HZ, |f_hz| (TOP_TIMES * f_hz).clamp(4.0, TOP_HZ));
@@ -92,12 +98,12 @@ fn sensor(store: &mut Store<'_>, sensor: &Sensor, attitude: bool) -> anyhow::Res
         (
             "accel_spectra",
             &sensor.accel_spectra,
-            "Spectra of specific force",
+            "Specific force, dB below its peak",
         ),
         (
             "gyro_spectra",
             &sensor.gyro_spectra,
-            "Spectra of angular velocity",
+            "Angular velocity, dB below its peak",
         ),
     ];
     for (name, found, title) in groups {
@@ -112,8 +118,14 @@ fn sensor(store: &mut Store<'_>, sensor: &Sensor, attitude: bool) -> anyhow::Res
             })
             .collect();
         let path = format!("{origin}/{name}");
+        // One reference for the three axes, so that they can be compared.
+        let peak = curves
+            .iter()
+            .map(|c| spectra::peak(c.spectrum, top_hz))
+            .fold(0.0, f64::max);
+        let reference = vec![peak; curves.len()];
         small.extend(spectra::drawing(
-            store, &path, title, &curves, f_hz, top_hz,
+            store, &path, title, &curves, &reference, f_hz, top_hz,
         )?);
     }
     Ok((!plots.is_empty() || !small.is_empty()).then_some(Panel {
@@ -145,7 +157,7 @@ fn gait_line(spectra: &[Spectrum]) -> Option<f64> {
     })
 }
 
-fn topic(store: &mut Store<'_>, topic: &take::Topic) -> anyhow::Result<Panel> {
+fn topic(store: &mut Store<'_>, topic: &take::Topic, growing: bool) -> anyhow::Result<Panel> {
     let mut plots = Vec::new();
     for (unit, curves) in &topic.plots {
         let path = match unit.as_str() {
@@ -170,7 +182,6 @@ fn topic(store: &mut Store<'_>, topic: &take::Topic) -> anyhow::Result<Panel> {
             .iter()
             .map(|l| format!("{path}/{}", l.entity))
             .collect();
-        lines(store, &path, made)?;
         let shown = match names.len() {
             0..=4 => names.join(", "),
             n => format!("{n} fields"),
@@ -180,7 +191,9 @@ fn topic(store: &mut Store<'_>, topic: &take::Topic) -> anyhow::Result<Panel> {
         } else {
             format!(" [{unit}]")
         };
-        plots.push(View::plot(format!("{}: {shown}{unit}", topic.name), path).contents(paths));
+        let title = format!("{}: {shown}{unit}", topic.name);
+        let range = spread(&made, growing);
+        plots.push(plot(store, title, &path, made, range)?.contents(paths));
     }
     Ok(Panel {
         name: topic.name.clone(),

@@ -81,12 +81,61 @@ pub fn lines(store: &mut Store<'_>, origin: &str, lines: Vec<Line<'_>>) -> anyho
     Ok(())
 }
 
+/// Sends the curves of a plot and gives its view. `range` is that of the values to begin with, where the viewer shall not choose.
+pub fn plot(
+    store: &mut Store<'_>,
+    title: String,
+    origin: &str,
+    curves: Vec<Line<'_>>,
+    range: Option<(f64, f64)>,
+) -> anyhow::Result<View> {
+    lines(store, origin, curves)?;
+    let view = View::plot(title, origin);
+    Ok(match range {
+        Some((low, high)) => view.range(low, high),
+        None => view,
+    })
+}
+
+/// All values with a little room, and two numbers on the axis at least: the viewer writes them at multiples of powers of ten only.
+/// `None` where there is nothing to choose, or where more values may come.
+pub fn spread(curves: &[Line<'_>], growing: bool) -> Option<(f64, f64)> {
+    let values = curves.iter().flat_map(|line| line.values.iter());
+    let (low, high) = values
+        .filter(|x| x.is_finite())
+        .fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), x| {
+            (l.min(*x), h.max(*x))
+        });
+    if growing || !(low < high) {
+        return None;
+    }
+    let room = 0.06 * (high - low);
+    let (low, high) = (low - room, high + room);
+    let step = 10f64.powf((high - low).log10().floor());
+    let (first, last) = ((low / step).ceil() * step, (high / step).floor() * step);
+    if last > first {
+        return Some((low, high));
+    }
+    // None or one: the next multiple on the nearer side makes two.
+    let (below, above) = (low - (first - step), last + step - high);
+    Some(if below < above {
+        (first - step - 0.5 * room, high)
+    } else {
+        (low, last + step + 0.5 * room)
+    })
+}
+
 /// A plot: where its curves are, and what makes them and the title.
 struct Plot {
     origin: &'static str,
     make: for<'a> fn(&'a Take) -> Option<(String, Vec<Line<'a>>)>,
     range: Option<(f64, f64)>,
+    /// Seconds before and after the cursor that are shown, where all would be too many cycles to tell apart.
+    near_s: Option<f64>,
 }
+
+/// Seconds before and after the cursor in the plot of forces: some ten strides.
+const NEAR_S: f64 = 5.0;
 
 /// The plots, from top to bottom.
 const PLOTS: &[Plot] = &[
@@ -94,31 +143,37 @@ const PLOTS: &[Plot] = &[
         origin: "/plots/height",
         make: height,
         range: None,
+        near_s: None,
     },
     Plot {
         origin: "/plots/angles",
         make: angles,
         range: None,
+        near_s: None,
     },
     Plot {
         origin: "/plots/forces",
         make: forces,
         range: None,
+        near_s: Some(NEAR_S),
     },
     Plot {
         origin: "/plots/synchrony",
         make: synchrony,
-        range: Some((0.0, 1.05)),
+        range: Some((-0.05, 1.06)),
+        near_s: None,
     },
     Plot {
         origin: "/plots/energy",
         make: stored,
         range: None,
+        near_s: None,
     },
     Plot {
         origin: "/plots/ledger",
         make: ledger,
         range: None,
+        near_s: None,
     },
 ];
 
@@ -129,10 +184,10 @@ pub fn draw(store: &mut Store<'_>, take: &Take) -> anyhow::Result<Vec<View>> {
         let Some((title, curves)) = (plot.make)(take) else {
             continue;
         };
-        lines(store, plot.origin, curves)?;
-        let view = View::plot(title, plot.origin);
-        views.push(match plot.range {
-            Some((low, high)) => view.range(low, high),
+        let range = plot.range.or_else(|| spread(&curves, take.growing));
+        let view = self::plot(store, title, plot.origin, curves, range)?;
+        views.push(match plot.near_s {
+            Some(seconds) => view.near(seconds),
             None => view,
         });
     }
@@ -234,8 +289,9 @@ fn forces(take: &Take) -> Option<(String, Vec<Line<'_>>)> {
             .join(", "),
         _ => "carriers' colours".to_owned(),
     };
-    let title =
-        format!("Support over {unit}: N_tot (white), N_i ({colours}), {floating} (vermilion)");
+    let title = format!(
+        "Support/{unit}, now ± {NEAR_S} s: N_tot (white), N_i ({colours}), {floating} (vermilion)"
+    );
     Some((title, lines))
 }
 
@@ -258,7 +314,7 @@ fn support(take: &Take) -> Option<(String, Vec<Line<'_>>)> {
     );
     let from = estimated(&take.inputs.sources.forces);
     Some((
-        format!("N_tot/Mg (white), {floating} (vermilion){from}"),
+        format!("N_tot/Mg (white), {floating} (vermilion), now ± {NEAR_S} s{from}"),
         std::iter::once(line).chain(limit).collect(),
     ))
 }
@@ -356,4 +412,32 @@ fn energies<'a>(
         }
     }
     (!lines.is_empty()).then(|| (format!("{title}: {}", names.join(", ")), lines))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn every_range_has_two_numbers_on_its_axis() {
+        let times = [0, 1];
+        for (low, high) in [
+            (0.81, 0.89),
+            (-29.3, 29.4),
+            (0.0, 2.4),
+            (1.01, 1.02),
+            (-0.001, 250.0),
+            (0.96, 1.04),
+        ] {
+            let line = Line::new("x", "x", 0, &times, vec![low, high]).unwrap();
+            let (from, to) = spread(&[line], false).unwrap();
+            assert!(from < low && to > high, "{low} {high}: {from} {to}");
+            assert!(to - from < 2.5 * (high - low), "{low} {high}: {from} {to}");
+            let step = 10f64.powf((1.12f64 * (high - low)).log10().floor());
+            let numbers = (to / step).floor() - (from / step).ceil();
+            assert!(numbers >= 1.0, "{low} {high}: {from} {to}");
+        }
+        let flat = Line::new("x", "x", 0, &times, vec![1.0, 1.0]).unwrap();
+        assert_eq!(spread(&[flat], false), None);
+    }
 }

@@ -8,11 +8,12 @@ use re_sdk_types::archetypes::{
 };
 use re_sdk_types::components::FillMode;
 use re_sdk_types::datatypes::Quaternion;
+use recording::load::Load;
 
 use crate::blueprint::View;
 use crate::palette;
 use crate::store::Store;
-use crate::take::{Carriers, Load, Pose, Take};
+use crate::take::{Carriers, Pose, Take};
 
 /// How long the trail of the centre of mass is, s.
 const TRAIL_S: f64 = 5.0;
@@ -47,7 +48,7 @@ pub fn draw(store: &mut Store<'_>, take: &Take) -> anyhow::Result<Option<View>> 
         .iter()
         .map(|h| h[0].abs().max(1.4 * h[1].abs()))
         .fold(1.2, f64::max) as f32;
-    let eye = [0.55 * reach_m, -1.45 * reach_m - 0.7, 0.25 * reach_m + 0.45];
+    let eye = [0.5 * reach_m, -1.2 * reach_m - 0.6, 0.22 * reach_m + 0.4];
     let target = [0.0, 0.0, 0.78 - level_m];
     let title = match forces {
         Some(unit) => format!(

@@ -1,4 +1,6 @@
-//! Power spectra as drawings with axes: frequency linear, power in dB below each curve's own peak, lines at f/2, f and 2f.
+//! Power spectra as drawings with axes: frequency linear, power in dB below the peak, lines at f/2, f and 2f.
+//!
+//! Curves of one unit share a reference, the highest of their peaks; curves of different units have each its own.
 //!
 //! Rerun plots over timelines only, and its bar charts have no logarithm; hence lines in a plane with ticks of their own.
 
@@ -36,7 +38,10 @@ pub fn draw(store: &mut Store<'_>, take: &Take) -> anyhow::Result<Option<View>> 
         if x.len() != inputs.t_s.len() {
             return None;
         }
-        let range = window.range(&inputs.t_s);
+        let mut range = window.range(&inputs.t_s);
+        // An estimated height is not known at the very beginning and end.
+        let known = |k: &usize| x[*k].is_finite();
+        range = range.clone().find(known)?..range.clone().rfind(known)? + 1;
         let step_s = analyze::inputs::mean_step_s(&inputs.t_s[range.clone()])?;
         let options = Options::seconds(DEFAULT_SEGMENT_S, 1.0 / step_s);
         // Non-finite samples have no spectrum: the curve is left out.
@@ -67,15 +72,37 @@ pub fn draw(store: &mut Store<'_>, take: &Take) -> anyhow::Result<Option<View>> 
         _ => return Ok(None),
     };
     let top_hz = f_hz.map_or(6.0, |f| 2.6 * f);
-    drawing(store, "/spectra/rath", title, &curves, f_hz, top_hz)
+    // Metres and radians have no common decibel.
+    let own = curves
+        .iter()
+        .map(|c| peak(c.spectrum, top_hz))
+        .collect::<Vec<f64>>();
+    drawing(store, "/spectra/rath", title, &curves, &own, f_hz, top_hz)
 }
 
-/// Sends a drawing of `curves` from 0 to `top_hz` and gives its view; `None` where no curve has power.
+/// The highest power up to `top_hz`, without 0 Hz.
+pub fn peak(spectrum: &Spectrum, top_hz: f64) -> f64 {
+    bins(spectrum, top_hz).map(|(_, p)| p).fold(0.0, f64::max)
+}
+
+/// Frequencies and powers that are drawn.
+fn bins(spectrum: &Spectrum, top_hz: f64) -> impl Iterator<Item = (f64, f64)> {
+    let all = spectrum
+        .hz
+        .iter()
+        .copied()
+        .zip(spectrum.power.iter().copied());
+    all.skip(1).take_while(move |(hz, _)| *hz <= top_hz)
+}
+
+/// Sends a drawing of `curves` from 0 to `top_hz`, each in dB below its `reference`, and gives its view; `None` where no curve has
+/// power.
 pub fn drawing(
     store: &mut Store<'_>,
     origin: &str,
     title: &str,
     curves: &[Curve<'_>],
+    reference: &[f64],
     f_hz: Option<f64>,
     top_hz: f64,
 ) -> anyhow::Result<Option<View>> {
@@ -86,8 +113,8 @@ pub fn drawing(
         .fold(0.0, f64::max);
     let top_hz = top_hz.min(nyquist);
     let mut any = false;
-    for curve in curves {
-        let Some(points) = polyline(curve.spectrum, top_hz) else {
+    for (curve, reference) in curves.iter().zip(reference) {
+        let Some(points) = polyline(curve.spectrum, *reference, top_hz) else {
             continue;
         };
         any = true;
@@ -108,7 +135,7 @@ pub fn drawing(
         title,
         origin,
         [-0.16, WIDTH + 0.08],
-        [-HEIGHT - 0.16, 0.17],
+        [-HEIGHT - 0.28, 0.17],
     )))
 }
 
@@ -121,23 +148,15 @@ fn place(hz: f64, db: f64, top_hz: f64) -> [f32; 2] {
     ]
 }
 
-/// The curve, without 0 Hz, in dB below its peak; `None` where there is no power.
-fn polyline(spectrum: &Spectrum, top_hz: f64) -> Option<Vec<[f32; 2]>> {
-    let bins = || {
-        spectrum
-            .hz
-            .iter()
-            .zip(&spectrum.power)
-            .skip(1)
-            .filter(|(hz, _)| **hz <= top_hz)
-    };
-    let peak = bins().map(|(_, p)| *p).fold(0.0, f64::max);
-    if !(peak > 0.0 && top_hz > 0.0) {
+/// The curve, without 0 Hz, in dB below `reference`; `None` where there is no power.
+fn polyline(spectrum: &Spectrum, reference: f64, top_hz: f64) -> Option<Vec<[f32; 2]>> {
+    if !(peak(spectrum, top_hz) > 0.0 && reference > 0.0 && top_hz > 0.0) {
         return None;
     }
+    let points = bins(spectrum, top_hz);
     Some(
-        bins()
-            .map(|(hz, p)| place(*hz, 10.0 * (p / peak).log10(), top_hz))
+        points
+            .map(|(hz, p)| place(hz, 10.0 * (p / reference).log10(), top_hz))
             .collect(),
     )
 }
@@ -229,7 +248,9 @@ fn marks(store: &mut Store<'_>, origin: &str, f_hz: f64, top_hz: f64) -> anyhow:
     store.fixed(&format!("{origin}/lines"), &lines)?;
     let places = marks
         .iter()
-        .map(|(hz, _)| [(WIDTH * hz / top_hz) as f32, -HEIGHT as f32 - 0.13])
+        // Neighbours at different heights: their names are wider than what lies between them.
+        .zip([0.13f32, 0.25, 0.13])
+        .map(|((hz, _), up)| [(WIDTH * hz / top_hz) as f32, -HEIGHT as f32 - up])
         .collect();
     let labels = marks.into_iter().map(|(_, label)| label).collect();
     text(
@@ -269,7 +290,7 @@ mod tests {
             .map(|k| (std::f64::consts::TAU * 2.0 * f64::from(k) / fs).sin())
             .collect();
         let spectrum = welch(&x, fs, &Options::seconds(20.0, fs)).unwrap();
-        let points = polyline(&spectrum, 5.0).unwrap();
+        let points = polyline(&spectrum, peak(&spectrum, 5.0), 5.0).unwrap();
         let top = points.iter().min_by(|a, b| a[1].total_cmp(&b[1])).unwrap();
         assert!(
             (f64::from(top[0]) / WIDTH * 5.0 - 2.0).abs() < 1e-6,
@@ -286,6 +307,6 @@ mod tests {
     #[test]
     fn nothing_comes_of_no_power() {
         let spectrum = welch(&[1.0; 100], 10.0, &Options::seconds(5.0, 10.0)).unwrap();
-        assert!(polyline(&spectrum, 5.0).is_none());
+        assert!(polyline(&spectrum, 1.0, 5.0).is_none());
     }
 }

@@ -47,6 +47,10 @@ fn page(take: &Take) -> String {
     for note in &take.notes {
         let _ = write!(text, "\n\n{note}");
     }
+    for (t_s, remark) in &take.remarks {
+        let when = t_s.map(|t_s| format!("{t_s:.2} s: ")).unwrap_or_default();
+        let _ = write!(text, "\n\n{when}{remark}");
+    }
     text
 }
 
