@@ -181,7 +181,10 @@ fn command_line() -> String {
             format!("'{}'", arg.replace('\'', "'\\''"))
         }
     };
-    let args = std::env::args().skip(1).map(quoted);
+    // A name that is no Unicode is shown as near as can be.
+    let args = std::env::args_os()
+        .skip(1)
+        .map(|arg| quoted(arg.to_string_lossy().into_owned()));
     std::iter::once("analyze".to_owned())
         .chain(args)
         .collect::<Vec<_>>()

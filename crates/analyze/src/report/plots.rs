@@ -1,7 +1,7 @@
 //! What is drawn, whatever draws it: the HTML report and the figures share these descriptions, so they share one look.
 
 use crate::envelope::outline;
-use crate::examine::Analysis;
+use crate::examine::{Analysis, Trace};
 use crate::inputs::Window;
 use crate::mechanism::spline_derivatives;
 use crate::peaks::SpectrumSummary;
@@ -202,6 +202,11 @@ pub fn plots(a: &Analysis) -> Vec<Plot> {
         panel(sync);
     }
 
+    ENERGIES
+        .iter()
+        .filter_map(|energy| energies(a, energy))
+        .for_each(&mut panel);
+
     for (id, title, name) in [
         ("psd_roll", "Spectrum of the roll", "roll"),
         ("psd_height", "Spectrum of the height", "height"),
@@ -215,7 +220,8 @@ pub fn plots(a: &Analysis) -> Vec<Plot> {
         .into_iter()
         .chain(force_plane(a))
         .for_each(&mut panel);
-    for trace in &a.traces {
+    let is_ledger = |trace: &&Trace| trace.topic == recording::topics::ENERGY;
+    for trace in a.traces.iter().filter(|t| !is_ledger(t)) {
         let mut p = Panel::over_time("signals", &trace.topic, &trace.label, a);
         for (name, t_s, x) in &trace.series {
             p.line(name.clone(), t_s, x);
@@ -238,6 +244,59 @@ fn marks(a: &Analysis) -> Vec<(f64, String)> {
         .filter(|e| count(e.kind) <= MOST_MARKS && e.kind != "jump")
         .map(|e| (e.t_s, e.kind.replace('_', " ")))
         .collect()
+}
+
+/// A plot of energies: id, title, note, and the fields of the ledger with their names.
+type Energies = (
+    &'static str,
+    &'static str,
+    &'static str,
+    [(&'static str, &'static str); 3],
+);
+
+/// What is stored and what went in and out are of different size: a plot each.
+const ENERGIES: [Energies; 2] = [
+    (
+        "energy",
+        "Stored energy",
+        "The potential's zero is arbitrary: it is drawn about its mean.",
+        [
+            ("kinetic_j", "kinetic"),
+            ("potential_j", "potential"),
+            ("elastic_j", "elastic"),
+        ],
+    ),
+    (
+        "ledger",
+        "Energy ledger",
+        "Since the start. What is stored and dissipated came from work; the solver's error is what stays unexplained.",
+        [
+            ("work_in_j", "work in"),
+            ("dissipated_j", "dissipated"),
+            ("unexplained_j", "unexplained"),
+        ],
+    ),
+];
+
+fn energies(a: &Analysis, (id, title, note, fields): &Energies) -> Option<Panel> {
+    let trace = a
+        .traces
+        .iter()
+        .find(|t| t.topic == recording::topics::ENERGY)?;
+    let mut p = Panel::over_time(id, title, "energy, J", a);
+    p.note = (*note).into();
+    for (field, name) in fields {
+        let Some((_, t_s, j)) = trace.series.iter().find(|(known, ..)| known == field) else {
+            continue;
+        };
+        let mean_j = match *field {
+            "potential_j" => j.iter().sum::<f64>() / j.len().max(1) as f64,
+            _ => 0.0,
+        };
+        let about: Vec<f64> = j.iter().map(|j| j - mean_j).collect();
+        p.line(*name, t_s, &about);
+    }
+    Some(p)
 }
 
 /// The spectrum of the signal that plays a role.
