@@ -2,6 +2,7 @@
 
 use std::fs::File;
 use std::io::{BufWriter, Read, Write};
+use std::net::{TcpStream, ToSocketAddrs};
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 use std::time::Duration;
@@ -194,8 +195,10 @@ fn connect(file: &Path, url: &str) -> anyhow::Result<Vec<Finding>> {
     let parsed = url
         .parse()
         .map_err(|error| anyhow!("--connect: {url:?} is no address of Rerun ({error}); expected one such as rerun+http://127.0.0.1:9876/proxy"))?;
-    let mut client =
-        re_grpc_client::write::Client::new(parsed, re_grpc_client::write::Options::default());
+    let mut client = re_grpc_client::write::Client::new(
+        answering(parsed, url)?,
+        re_grpc_client::write::Options::default(),
+    );
     let findings = send(file, &mut client)?;
     client
         .flush_blocking(Duration::from_secs(20))
@@ -203,6 +206,24 @@ fn connect(file: &Path, url: &str) -> anyhow::Result<Vec<Finding>> {
             anyhow!("{url}: did not take what was sent ({error}); is a viewer running there?")
         })?;
     Ok(findings)
+}
+
+/// The address, if somebody listens there: the client itself would wait for that without end.
+fn answering(uri: re_uri::ProxyUri, url: &str) -> anyhow::Result<re_uri::ProxyUri> {
+    let nobody = |why: &dyn std::fmt::Display| {
+        anyhow!(
+            "{url}: nobody answers there ({why}); start a viewer with `rerun`, or write a file with --save FILE.rrd"
+        )
+    };
+    let place = format!("{}:{}", uri.origin.host, uri.origin.port);
+    let mut last = None;
+    for address in place.to_socket_addrs().map_err(|e| nobody(&e))? {
+        match TcpStream::connect_timeout(&address, Duration::from_secs(5)) {
+            Ok(_) => return Ok(uri),
+            Err(error) => last = Some(error),
+        }
+    }
+    Err(last.map_or_else(|| nobody(&"the name has no address"), |e| nobody(&e)))
 }
 
 /// Starts the viewer, sends the recording into it and waits until it is closed.

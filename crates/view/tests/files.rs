@@ -54,6 +54,15 @@ fn nothing_is_left_where_it_cannot_be_done() {
             vec![path("run.mcap"), "--connect".into(), "nonsense".into()],
             "is no address of Rerun",
         ),
+        (
+            vec![
+                path("run.mcap"),
+                "--connect".into(),
+                // A port that only the system's own services may use, and none does.
+                "rerun+http://127.0.0.1:1/proxy".into(),
+            ],
+            "nobody answers there",
+        ),
     ] {
         let output = view(&arguments.iter().map(String::as_str).collect::<Vec<_>>());
         let said = String::from_utf8_lossy(&output.stderr).into_owned();

@@ -100,6 +100,7 @@ fn distribution(
             x,
             y,
             colour: k % COLOURS.len(),
+            ..Series::default()
         });
     }
     p.note = "Each step is one run.".into();
@@ -135,10 +136,10 @@ fn mean_psd(
             .collect();
         let n = same.len() as f64;
         let panel = p.get_or_insert_with(|| {
-            let unit = first.unit.replace("^2", "²");
+            let unit = super::plots::unit(&first.unit);
             let mut panel = Panel::new(id, title, "frequency, Hz", &format!("density, {unit}"));
             panel.log_y = true;
-            panel.note = "Mean over the runs of each condition; thin: one standard deviation above and below.".into();
+            panel.note = "Mean over the runs of each condition; shaded: one standard deviation above and below.".into();
             let nyquist = first.spectrum.hz.last().copied().unwrap_or(1.0);
             panel.x_range = Some((0.0, first.f_hz.map_or(nyquist, |f| (4.0 * f).min(nyquist))));
             panel
@@ -156,24 +157,19 @@ fn mean_psd(
                 (first.spectrum.hz[b], mean, variance.sqrt())
             })
             .collect();
-        let mut line = |name: String, value: &dyn Fn(f64, f64) -> f64| {
-            let (x, y): (Vec<f64>, Vec<f64>) = rows
-                .iter()
-                .map(|(f, m, s)| (*f, value(*m, *s)))
-                .filter(|(_, y)| *y > 0.0)
-                .unzip();
-            panel.series.push(Series {
-                name,
-                x,
-                y,
-                colour: k % COLOURS.len(),
-            });
+        let mut line = Series {
+            name: format!("{group} ({})", same.len()),
+            colour: k % COLOURS.len(),
+            ..Series::default()
         };
-        line(format!("{group} ({})", same.len()), &|m, _| m);
-        if same.len() > 1 {
-            line(format!("{group} + SD"), &|m, s| m + s);
-            line(format!("{group} − SD"), &|m, s| m - s);
+        for (hz, mean, sd) in rows.into_iter().filter(|(_, mean, _)| *mean > 0.0) {
+            line.x.push(hz);
+            line.y.push(mean);
+            if same.len() > 1 {
+                line.spread.push((mean - sd, mean + sd));
+            }
         }
+        panel.series.push(line);
     }
     p
 }

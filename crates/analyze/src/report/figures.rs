@@ -78,24 +78,47 @@ pub fn figures(plots: &[Plot], folder: &Path) -> Result<Vec<PathBuf>, FigureErro
     Ok(written)
 }
 
-fn panel(p: &Panel) -> Scene {
-    let log = |y: f64| {
-        if p.log_y {
-            y.max(f64::MIN_POSITIVE).log10()
-        } else {
-            y
+/// The panel as it stands still: quick curves near their end only, densities in decibels (the library's logarithmic axis ends at
+/// 1e-10, where densities do not).
+fn still(p: &Panel) -> Panel {
+    let mut p = p.clone();
+    if let Some(last_s) = p.last_s {
+        let ends = p.series.iter().filter_map(|s| s.x.last());
+        let end_s = ends.copied().fold(f64::NEG_INFINITY, f64::max);
+        let from_s = end_s - last_s;
+        for s in &mut p.series {
+            let from = s.x.partition_point(|x| *x < from_s);
+            s.x.drain(..from);
+            s.y.drain(..from);
         }
-    };
-    let (mut x0, mut x1, mut y0, mut y1) = (
-        f64::INFINITY,
-        f64::NEG_INFINITY,
-        f64::INFINITY,
-        f64::NEG_INFINITY,
-    );
+        if p.series.iter().any(|s| !s.x.is_empty()) {
+            p.title += &format!(", last {last_s} s");
+        }
+    }
+    if p.log_y {
+        let db = |x: f64| 10.0 * x.max(f64::MIN_POSITIVE).log10();
+        for s in &mut p.series {
+            s.y.iter_mut().for_each(|y| *y = db(*y));
+            // A spread may reach zero: it is then drawn to the lowest mean.
+            let lowest = s.y.iter().copied().fold(f64::INFINITY, f64::min);
+            s.spread
+                .iter_mut()
+                .for_each(|(low, high)| (*low, *high) = (db(*low).max(lowest), db(*high)));
+        }
+        p.y_label = p.y_label.replacen(", ", ", dB re 1 ", 1);
+        p.log_y = false;
+    }
+    p
+}
+
+fn panel(p: &Panel) -> Scene {
+    let p = &still(p);
+    let ((mut x0, mut x1), (mut y0, mut y1)) = (NOTHING, NOTHING);
     for s in &p.series {
-        for (x, y) in s.x.iter().zip(&s.y) {
-            (x0, x1) = (x0.min(*x), x1.max(*x));
-            (y0, y1) = (y0.min(log(*y)), y1.max(log(*y)));
+        (x0, x1) = s.x.iter().fold((x0, x1), reach);
+        (y0, y1) = s.y.iter().fold((y0, y1), reach);
+        for (low, high) in &s.spread {
+            (y0, y1) = reach(reach((y0, y1), low), high);
         }
     }
     let others = p
@@ -104,7 +127,7 @@ fn panel(p: &Panel) -> Scene {
         .map(|(y, _)| *y)
         .chain(p.band.iter().flat_map(|(a, b, _)| [*a, *b]));
     for y in others {
-        (y0, y1) = (y0.min(log(y)), y1.max(log(y)));
+        (y0, y1) = reach((y0, y1), &y);
     }
     if let Some((a, b)) = p.x_range {
         (x0, x1) = (a, b);
@@ -116,17 +139,8 @@ fn panel(p: &Panel) -> Scene {
         (x0, x1) = (x0 - 1.0, x0 + 1.0);
     }
     let room = 0.06 * (y1 - y0);
-    // Whole decades: the library's logarithmic axis ends on them.
-    let (low, high) = if p.log_y {
-        (y0.floor(), (y1 + 0.05).ceil())
-    } else {
-        (y0 - room, y1 + room)
-    };
-    let range = if p.log_y {
-        (10f64.powf(low), 10f64.powf(high))
-    } else {
-        (low, high)
-    };
+    let (low, high) = (y0 - room, y1 + room);
+    let range = (low, high);
     let several = p.series.len() > 1;
     let marks: Vec<Mark> = p
         .series
@@ -152,6 +166,10 @@ fn panel(p: &Panel) -> Scene {
                 if several {
                     line = line.with_legend(s.name.clone());
                 }
+                if !s.spread.is_empty() {
+                    let (below, above): (Vec<f64>, Vec<f64>) = s.spread.iter().copied().unzip();
+                    line = line.with_band(below, above);
+                }
                 line.into()
             }
         })
@@ -166,9 +184,6 @@ fn panel(p: &Panel) -> Scene {
     .with_x_axis_max(x1)
     .with_y_axis_min(range.0)
     .with_y_axis_max(range.1);
-    if p.log_y {
-        layout = layout.with_log_y();
-    }
     if several {
         layout.show_legend = true;
         layout = layout.with_legend_position(LegendPosition::OutsideRightTop);
@@ -212,11 +227,7 @@ fn panel(p: &Panel) -> Scene {
         );
         // Names of neighbours at different heights.
         let up = 1.0 - 0.05 * (1 + k % 4) as f64;
-        let y = if p.log_y {
-            10f64.powf(low + up * (high - low))
-        } else {
-            low + up * (high - low)
-        };
+        let y = low + up * (high - low);
         layout = layout.with_annotation(note(
             name,
             (x + 0.035 * (x1 - x0)).min(x1 - 0.035 * (x1 - x0)),
@@ -224,6 +235,14 @@ fn panel(p: &Panel) -> Scene {
         ));
     }
     render_multiple(marks, layout)
+}
+
+/// The range of no values.
+const NOTHING: (f64, f64) = (f64::INFINITY, f64::NEG_INFINITY);
+
+/// A range made to hold one more value.
+fn reach((low, high): (f64, f64), x: &f64) -> (f64, f64) {
+    (low.min(*x), high.max(*x))
 }
 
 fn note(text: &str, x: f64, y: f64) -> TextAnnotation {
@@ -262,7 +281,11 @@ fn image(i: &Image) -> Scene {
             .with_title(i.title.clone())
             .with_x_label("time, s")
             .with_y_label(i.y_label.clone()),
-    );
+    )
+    .with_x_axis_min(i.x_range.0)
+    .with_x_axis_max(i.x_range.1)
+    .with_y_axis_min(i.y_range.0)
+    .with_y_axis_max(i.y_range.1);
     render_multiple(marks, layout)
 }
 

@@ -106,14 +106,14 @@
         el(inside, "text", { class: "note", x: right - 4, y: sy(v) - 4, "text-anchor": "end" }, name);
       }
       spec.series.forEach((s, k) => { if (!this.hidden.has(k)) this.curve(inside, s, k, x0, x1); });
-      let last = -1e9, row = 0;
+      let free = -1e9, row = 0; // where the last name ends
       for (const [v, name] of spec.marks) {
         if (v < x0 || v > x1) continue;
         el(inside, "line", { class: "mark", x1: sx(v), x2: sx(v), y1: top, y2: bottom });
         // Names that would touch go one line down.
-        row = sx(v) - last < 8 * name.length ? (row + 1) % 4 : 0;
-        last = sx(v);
         const end = sx(v) + 7 * name.length > right;
+        row = sx(v) - (end ? 7 * name.length : 0) < free ? (row + 1) % 4 : 0;
+        free = Math.max(free, sx(v) + (end ? 0 : 7 * name.length));
         el(inside, "text", { class: "note", x: sx(v) + (end ? -3 : 3), y: top + 11 + 12 * row, "text-anchor": end ? "end" : "start" }, name);
       }
       el(svg, "path", { class: "axis", fill: "none", d: `M${left} ${top}V${bottom}H${right}` });

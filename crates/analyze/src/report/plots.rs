@@ -1,12 +1,13 @@
 //! What is drawn, whatever draws it: the HTML report and the figures share these descriptions, so they share one look.
 
 use crate::envelope::outline;
-use crate::examine::{Analysis, Trace};
+use crate::examine::Analysis;
 use crate::inputs::Window;
 use crate::mechanism::spline_derivatives;
 use crate::peaks::SpectrumSummary;
 use crate::phase;
 use crate::spectrum::{Mode, Options, spectrogram};
+use recording::topics;
 
 /// Okabe and Ito's colours, distinct to every kind of colour vision (jfly, 2008); black comes last: it vanishes on dark paper.
 pub const COLOURS: [&str; 7] = [
@@ -14,7 +15,7 @@ pub const COLOURS: [&str; 7] = [
 ];
 
 /// A line or a cloud of points.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, Default)]
 pub struct Series {
     /// Name in the legend.
     pub name: String,
@@ -24,6 +25,8 @@ pub struct Series {
     pub y: Vec<f64>,
     /// Index into [`COLOURS`].
     pub colour: usize,
+    /// Spread below and above the line, where it is a mean; empty otherwise.
+    pub spread: Vec<(f64, f64)>,
 }
 
 /// One pair of axes with what is on them.
@@ -57,6 +60,8 @@ pub struct Panel {
     pub points: bool,
     /// The abscissa is the recording's time: such panels are zoomed together.
     pub time: bool,
+    /// Where nobody can zoom, only the last so many seconds are drawn: all of them would be one patch of colour.
+    pub last_s: Option<f64>,
 }
 
 impl Panel {
@@ -76,6 +81,7 @@ impl Panel {
             x_range: None,
             points: false,
             time: false,
+            last_s: None,
         }
     }
 
@@ -96,6 +102,7 @@ impl Panel {
                 x,
                 y,
                 colour: self.series.len() % COLOURS.len(),
+                ..Series::default()
             });
         }
     }
@@ -131,6 +138,8 @@ pub enum Plot {
     Image(Image),
 }
 
+/// Seconds of quick curves in a picture that nobody can zoom.
+const LAST_S: f64 = 10.0;
 /// Events marked in plots over time: kinds of which there are at most this many.
 const MOST_MARKS: usize = 12;
 /// Highest frequency shown in spectra, as a multiple of f.
@@ -160,6 +169,7 @@ pub fn plots(a: &Analysis) -> Vec<Plot> {
     panel(height);
 
     let mut forces = Panel::over_time("forces", "Normal forces of the handles", "force, N", a);
+    forces.last_s = Some(LAST_S);
     for (k, n) in i.normal_n.iter().enumerate() {
         forces.line(format!("handle {}", k + 1), i.force_times(), n);
     }
@@ -220,10 +230,11 @@ pub fn plots(a: &Analysis) -> Vec<Plot> {
         .into_iter()
         .chain(force_plane(a))
         .for_each(&mut panel);
-    let is_ledger = |trace: &&Trace| trace.topic == recording::topics::ENERGY;
-    for trace in a.traces.iter().filter(|t| !is_ledger(t)) {
-        let mut p = Panel::over_time("signals", &trace.topic, &trace.label, a);
-        for (name, t_s, x) in &trace.series {
+    for trace in a.traces.iter().filter(|t| t.topic != topics::ENERGY) {
+        let mut p = Panel::over_time("signals", &trace.topic, &unit(&trace.label), a);
+        // That beats are counted is no curve.
+        let counts = |name: &str| trace.topic == topics::BEAT && name == "number";
+        for (name, t_s, x) in trace.series.iter().filter(|(name, ..)| !counts(name)) {
             p.line(name.clone(), t_s, x);
         }
         panel(p);
@@ -279,10 +290,7 @@ const ENERGIES: [Energies; 2] = [
 ];
 
 fn energies(a: &Analysis, (id, title, note, fields): &Energies) -> Option<Panel> {
-    let trace = a
-        .traces
-        .iter()
-        .find(|t| t.topic == recording::topics::ENERGY)?;
+    let trace = a.traces.iter().find(|t| t.topic == topics::ENERGY)?;
     let mut p = Panel::over_time(id, title, "energy, J", a);
     p.note = (*note).into();
     for (field, name) in fields {
@@ -322,7 +330,7 @@ fn psd(id: &'static str, title: &str, name: &str, s: &SpectrumSummary) -> Panel 
         id,
         title,
         "frequency, Hz",
-        &format!("density, {}", s.unit.replace("^2", "²")),
+        &format!("density, {}", unit(&s.unit)),
     );
     p.note = format!(
         "Welch, {} segments of {:.1} s, bins {:.3} Hz apart, 95 % of the noise within ×{:.2} … ×{:.2}.",
@@ -339,7 +347,7 @@ fn psd(id: &'static str, title: &str, name: &str, s: &SpectrumSummary) -> Panel 
         name: name.into(),
         x,
         y,
-        colour: 0,
+        ..Series::default()
     });
     p.log_y = true;
     p.x_range = Some((0.0, reach));
@@ -352,6 +360,19 @@ fn psd(id: &'static str, title: &str, name: &str, s: &SpectrumSummary) -> Panel 
             .collect();
     }
     p
+}
+
+/// A unit as people write it: `m/s²` for `m/s^2`, `rad²/Hz` for `(rad)^2/Hz`.
+pub(super) fn unit(text: &str) -> String {
+    let mut out = text.replace("^2", "²");
+    if let (Some(open), Some(close)) = (out.find('('), out.find(")²")) {
+        // Brackets around one word say nothing.
+        if open < close && out[open + 1..close].chars().all(char::is_alphabetic) {
+            out.remove(close);
+            out.remove(open);
+        }
+    }
+    out
 }
 
 fn inside(t_s: &[f64], window: Window) -> std::ops::Range<usize> {
@@ -385,7 +406,7 @@ fn portrait(a: &Analysis) -> Option<Panel> {
         name: "roll".into(),
         x: thin(x),
         y: thin(y),
-        colour: 0,
+        ..Series::default()
     });
     Some(p)
 }
@@ -413,7 +434,7 @@ fn force_plane(a: &Analysis) -> Option<Panel> {
         name: "samples".into(),
         x: thin(x),
         y: thin(y),
-        colour: 0,
+        ..Series::default()
     });
     p.points = true;
     Some(p)
@@ -456,18 +477,25 @@ fn roll_spectrogram(a: &Analysis) -> Option<Image> {
         .or_else(|| a.metrics.number("peak_hz"));
     let reach = f_hz.map_or(fs_hz / 2.0, |f| (2.5 * f).min(fs_hz / 2.0));
     let bins = s.hz.iter().take_while(|f| **f <= reach).count();
+    if bins < 3 {
+        return None;
+    }
     let every = s.power.len().div_ceil(300).max(1);
     let values: Vec<Vec<f64>> = s
         .power
         .iter()
         .step_by(every)
+        // Each segment is counted from its own mean: what is left at 0 Hz is none of the roll's.
         .map(|p| {
-            p[..bins]
+            p[1..bins]
                 .iter()
                 .map(|p| 10.0 * p.max(1e-12).log10())
                 .collect()
         })
         .collect();
+    // A cell reaches half a step to either side of its middle.
+    let (half_s, half_hz) = (0.5 * (every * step) as f64 / fs_hz, 0.5 * s.hz[1]);
+    let last_s = s.t_s[(values.len() - 1) * every];
     Some(Image {
         id: "spectrogram",
         title: "Spectrogram of the roll".into(),
@@ -477,8 +505,24 @@ fn roll_spectrogram(a: &Analysis) -> Option<Image> {
         ),
         y_label: "frequency, Hz".into(),
         value_label: "dB re 1 deg²/Hz".into(),
-        x_range: (i.t_s[0] + s.t_s[0], i.t_s[0] + s.t_s[s.t_s.len() - 1]),
-        y_range: (0.0, s.hz[bins - 1]),
+        x_range: (i.t_s[0] + s.t_s[0] - half_s, i.t_s[0] + last_s + half_s),
+        y_range: (s.hz[1] - half_hz, s.hz[bins - 1] + half_hz),
         values,
     })
+}
+
+#[cfg(test)]
+mod tests {
+    #[test]
+    fn units_are_written_as_people_do() {
+        for (text, shown) in [
+            ("(rad)^2/Hz", "rad²/Hz"),
+            ("(m/s^2)^2/Hz", "(m/s²)²/Hz"),
+            ("m/s^2", "m/s²"),
+            ("rad/s", "rad/s"),
+            ("", ""),
+        ] {
+            assert_eq!(super::unit(text), shown);
+        }
+    }
 }

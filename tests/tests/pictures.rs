@@ -1,0 +1,220 @@
+//! What the Rerun viewer makes of `view --save`: entities, timelines and rows by its own tools, views by a picture without a screen.
+//!
+//! The picture is taken by `../shared/tools/screenshot-rerun`, which brings the viewer with it; where it is not there, or cannot
+//! install what it needs, the test is skipped.
+
+mod common;
+
+use std::path::{Path, PathBuf};
+use std::process::Command;
+
+use common::{ROOT, built, on_path, run};
+use recording::read::{ReadOptions, Recording};
+use recording::topics::MessageKind;
+use recording::write::{RecordingWriter, WriterOptions};
+
+/// What is expected of one recording.
+struct Case {
+    scene: &'static str,
+    /// Only the inertial sensors' topics of it.
+    sensors_only: bool,
+    /// Beginnings of the titles of the views that are seen first, in order.
+    views: &'static [&'static str],
+    /// Entities and their rows.
+    rows: &'static [(&'static str, usize)],
+}
+
+const SCENE: &[&str] = &[
+    "Scene: 0.5 m of arrow",
+    "Phases",
+    "Spectra of height (blue), roll (vermilion)",
+    "Events",
+    "Height of the centre of mass [m]",
+    "Roll (vermilion) and tilt (blue) [deg]",
+    "Support/Mg",
+    "Order parameter r",
+];
+
+/// A minute at 30 Hz has 1801 samples.
+const CASES: &[Case] = &[
+    Case {
+        scene: "music",
+        sensors_only: false,
+        views: SCENE,
+        rows: &[
+            ("/world/rath", 1801),
+            ("/world/forces", 1801),
+            ("/world/carrier_2", 1801),
+            ("/phases/carriers", 1801),
+            ("/plots/height/z", 1801),
+            ("/plots/angles/roll", 1801),
+            ("/plots/forces/handle_2", 1801),
+            ("/plots/forces/unloaded", 2),
+            ("/plots/synchrony/r", 1801),
+            ("/plots/ledger/work_in", 1801),
+        ],
+    },
+    Case {
+        scene: "baseline",
+        sensors_only: false,
+        views: SCENE,
+        rows: &[("/world/rath", 1801), ("/plots/synchrony/chance", 2)],
+    },
+    Case {
+        scene: "eight-carriers",
+        sensors_only: false,
+        views: SCENE,
+        rows: &[
+            ("/world/carrier_8", 1801),
+            ("/plots/forces/handle_8", 1801),
+            ("/plots/synchrony/band_low", 2),
+        ],
+    },
+    Case {
+        scene: "field-imu",
+        sensors_only: true,
+        views: &[
+            "/imu/rath angular velocity [rad/s]",
+            "Specific force [m/s²]",
+            "Height about its mean [m], estimated",
+            "Roll (vermilion) and tilt (blue) [deg], estimated",
+            "N_tot/Mg",
+            "Order parameter r",
+            "Phases",
+            "Spectra of height (blue), roll (vermilion)",
+            "Events",
+        ],
+        // 60 s at 200 Hz.
+        rows: &[
+            ("/topics/imu/rath/gyro/x", 12001),
+            ("/topics/imu/rath/accel/z", 12001),
+            ("/topics/imu/carrier_2/attitude/roll", 12001),
+            ("/plots/angles/roll", 12001),
+        ],
+    },
+];
+
+/// The messages of inertial sensors alone, as a logger on the road would have them.
+fn sensors_of(from: &Path, to: &Path) {
+    let recording = Recording::open(from, &ReadOptions::default()).expect("a recording");
+    let mut writer = RecordingWriter::create(to, &WriterOptions::default()).expect("a file");
+    let mut channels = std::collections::BTreeMap::new();
+    for (k, channel) in recording.info().channels.iter().enumerate() {
+        if channel.schema == "sensor_msgs/msg/Imu" {
+            let made = writer.channel(&channel.topic, MessageKind::Imu);
+            channels.insert(k, made.expect("a channel"));
+        }
+    }
+    recording
+        .messages(&|_| true, &mut |message| {
+            if let Some(channel) = channels.get(&message.channel) {
+                writer
+                    .message(*channel, message.log_time_ns, message.data)
+                    .expect("written");
+            }
+        })
+        .expect("read");
+    writer.finish().expect("written");
+}
+
+/// The viewer's command line: on PATH, or where the picture's tool keeps it.
+fn rerun() -> Option<PathBuf> {
+    let home = std::env::var_os("HOME").map(PathBuf::from);
+    let kept = || {
+        let cache = std::env::var_os("XDG_CACHE_HOME")
+            .map(PathBuf::from)
+            .or(home.map(|home| home.join(".cache")))?;
+        let folders = std::fs::read_dir(cache.join("screenshot-rerun")).ok()?;
+        folders
+            .filter_map(|folder| Some(folder.ok()?.path().join("bin/rerun")))
+            .find(|file| file.is_file())
+    };
+    on_path(&["rerun"]).or_else(kept)
+}
+
+#[test]
+fn the_viewer_shows_what_is_meant() {
+    let tool = Path::new(ROOT).join("../shared/tools/screenshot-rerun");
+    if !tool.is_file() {
+        eprintln!("skipped: {} is not there", tool.display());
+        return;
+    }
+    let sim = built(&["sim"]).join("sim");
+    let view = built(&["view"]).join("view");
+    let folder = tempfile::tempdir().expect("a folder");
+    for case in CASES {
+        let file = |extension: &str| folder.path().join(format!("{}.{extension}", case.scene));
+        let (mut mcap, rrd, png) = (file("mcap"), file("rrd"), file("png"));
+        run(Command::new(&sim)
+            .args(["record", case.scene, "--out"])
+            .arg(&mcap));
+        if case.sensors_only {
+            let sensors = file("imu.mcap");
+            sensors_of(&mcap, &sensors);
+            mcap = sensors;
+        }
+        run(Command::new(&view).arg(&mcap).arg("--save").arg(&rrd));
+
+        let picture = Command::new(&tool)
+            .arg(&rrd)
+            .arg(&png)
+            .args(["--at", "time=30.3", "--timeout", "300"])
+            .output();
+        let said = match picture {
+            Ok(output) if output.status.success() => {
+                String::from_utf8_lossy(&output.stdout).into_owned()
+            }
+            // 3 and 4 are verdicts on the picture; 1 is about the machine.
+            Ok(output) if output.status.code() == Some(1) => {
+                let why = String::from_utf8_lossy(&output.stderr);
+                eprintln!("skipped: no picture could be taken: {why}");
+                return;
+            }
+            other => panic!("{}: {other:?}", case.scene),
+        };
+        let drawn = said
+            .split_once("views drawn: ")
+            .map(|(_, rest)| rest)
+            .expect("the views' names");
+        assert!(!drawn.contains("BLANK"), "{}: {drawn}", case.scene);
+        let titles: Vec<&str> = drawn
+            .split("; time: ")
+            .next()
+            .unwrap_or(drawn)
+            .split(" | ")
+            .collect();
+        assert_eq!(titles.len(), case.views.len(), "{}: {titles:?}", case.scene);
+        for (title, expected) in titles.iter().zip(case.views) {
+            assert!(
+                title.starts_with(expected),
+                "{}: {title}, expected {expected}",
+                case.scene
+            );
+        }
+
+        let Some(rerun) = rerun() else {
+            eprintln!("skipped: there is no `rerun` on PATH");
+            return;
+        };
+        let tool = |verb: &str| {
+            let output = run(Command::new(&rerun).args(["rrd", verb]).arg(&rrd));
+            String::from_utf8_lossy(&output.stdout).into_owned()
+        };
+        tool("verify");
+        let stats = tool("stats");
+        let printed = tool("print");
+        assert!(stats.contains("time"), "{stats}");
+        assert!(!stats.contains("utc"), "a simulated run has no wall clock");
+        for (entity, rows) in case.rows {
+            let line = format!(" - {entity} - ");
+            let rows = format!("with {rows} rows");
+            assert!(
+                printed
+                    .lines()
+                    .any(|l| l.contains(&line) && l.contains(&rows)),
+                "{}: {entity} {rows}",
+                case.scene
+            );
+        }
+    }
+}
