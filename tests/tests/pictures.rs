@@ -3,15 +3,13 @@
 //! The picture is taken by `../shared/tools/screenshot-rerun`, which brings the viewer with it; where it is not there, or cannot
 //! install what it needs, the test is skipped.
 
-mod common;
-
 use std::path::{Path, PathBuf};
 use std::process::Command;
 
-use common::{ROOT, built, on_path, run};
 use recording::read::{ReadOptions, Recording};
 use recording::topics::MessageKind;
 use recording::write::{RecordingWriter, WriterOptions};
+use tests::{ROOT, good, on_path, run_in};
 
 /// What is expected of one recording.
 struct Case {
@@ -139,25 +137,24 @@ fn the_viewer_shows_what_is_meant() {
         eprintln!("skipped: {} is not there", tool.display());
         return;
     }
-    let sim = built(&["sim"]).join("sim");
-    let view = built(&["view"]).join("view");
     let folder = tempfile::tempdir().expect("a folder");
     for case in CASES {
-        let file = |extension: &str| folder.path().join(format!("{}.{extension}", case.scene));
-        let (mut mcap, rrd, png) = (file("mcap"), file("rrd"), file("png"));
-        run(Command::new(&sim)
-            .args(["record", case.scene, "--out"])
-            .arg(&mcap));
+        let (mut mcap, rrd) = (
+            format!("{}.mcap", case.scene),
+            format!("{}.rrd", case.scene),
+        );
+        let command = |name: &str, args: &[&str]| good(run_in(folder.path(), name, args));
+        command("sim", &["record", case.scene, "--out", &mcap]);
         if case.sensors_only {
-            let sensors = file("imu.mcap");
-            sensors_of(&mcap, &sensors);
+            let sensors = "sensors.mcap".to_owned();
+            sensors_of(&folder.path().join(&mcap), &folder.path().join(&sensors));
             mcap = sensors;
         }
-        run(Command::new(&view).arg(&mcap).arg("--save").arg(&rrd));
+        command("view", &[&mcap, "--save", &rrd]);
 
         let picture = Command::new(&tool)
-            .arg(&rrd)
-            .arg(&png)
+            .current_dir(folder.path())
+            .args([&rrd, "picture.png"])
             .args(["--at", "time=30.3", "--timeout", "300"])
             .output();
         let said = match picture {
@@ -196,13 +193,15 @@ fn the_viewer_shows_what_is_meant() {
             eprintln!("skipped: there is no `rerun` on PATH");
             return;
         };
-        let tool = |verb: &str| {
-            let output = run(Command::new(&rerun).args(["rrd", verb]).arg(&rrd));
+        let says = |verb: &str| {
+            let mut command = Command::new(&rerun);
+            command.current_dir(folder.path()).args(["rrd", verb, &rrd]);
+            let output = good(command.output().expect("the viewer starts"));
             String::from_utf8_lossy(&output.stdout).into_owned()
         };
-        tool("verify");
-        let stats = tool("stats");
-        let printed = tool("print");
+        says("verify");
+        let stats = says("stats");
+        let printed = says("print");
         assert!(stats.contains("time"), "{stats}");
         assert!(!stats.contains("utc"), "a simulated run has no wall clock");
         for (entity, rows) in case.rows {

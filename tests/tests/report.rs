@@ -1,13 +1,12 @@
 //! The HTML report as a browser shows it: headless Chromium, where there is one on PATH.
 
-mod common;
+mod browser;
 
 use std::path::PathBuf;
-use std::process::Command;
 
-use common::browser::{Browser, Look, Page};
-use common::{built, json, run};
+use browser::{Browser, Look, Page};
 use serde_json::{Value, json};
+use tests::{good, run_in};
 
 const SCREEN: Look = Look {
     width: 1440,
@@ -23,16 +22,11 @@ struct Made {
 }
 
 fn made() -> Made {
-    let bins = built(&["sim", "analyze"]);
     let folder = tempfile::tempdir().expect("a folder");
-    let command = |name: &str, args: &[&str]| {
-        run(Command::new(bins.join(name))
-            .args(args)
-            .current_dir(folder.path()))
-    };
+    let command = |name: &str, args: &[&str]| good(run_in(folder.path(), name, args));
     command("sim", &["record", "music", "--out", "music.mcap"]);
     let args = ["music.mcap", "--report", "music.html", "--format", "json"];
-    let numbers = json(&command("analyze", &args));
+    let numbers = tests::json(&command("analyze", &args));
     let page = folder.path().join("music.html");
     Made {
         folder,
