@@ -203,6 +203,15 @@ pub(super) enum Block {
     Loose(Range<usize>),
 }
 
+impl Block {
+    /// Where it lies in the file.
+    pub fn range(&self) -> &Range<usize> {
+        match self {
+            Block::Chunk { body, .. } | Block::Loose(body) => body,
+        }
+    }
+}
+
 /// What a chunk's header says.
 pub(super) struct ChunkHeader<'a> {
     pub start_time: u64,
@@ -275,8 +284,14 @@ pub(super) struct Container {
 /// Loose records are cut into stretches of this size, so that they can be read like chunks.
 const LOOSE_BYTES: usize = 1 << 20;
 
+/// A look at one record brings its neighbourhood into memory: every so many bytes, what lies behind is given back.
+const FORGET_BYTES: usize = 64 << 20;
+
 struct Walk<'a> {
     bytes: &'a [u8],
+    forget: &'a dyn Fn(&Range<usize>),
+    /// Up to where that was done.
+    forgotten: usize,
     found: Container,
     summary: Definitions,
     statistics: Option<Statistics>,
@@ -287,11 +302,14 @@ struct Walk<'a> {
     unknown: BTreeMap<u8, u64>,
 }
 
-/// Walks over a whole file, which must not be empty; `None` if nothing in it looks like an MCAP.
-pub(super) fn walk(bytes: &[u8]) -> Option<Container> {
+/// Walks over a whole file, which must not be empty; `None` if nothing in it looks like an MCAP. `forget` hears of stretches that
+/// are not needed for now.
+pub(super) fn walk(bytes: &[u8], forget: &dyn Fn(&Range<usize>)) -> Option<Container> {
     let magic = bytes.starts_with(MAGIC);
     let mut walk = Walk {
         bytes,
+        forget,
+        forgotten: 0,
         found: Container::default(),
         summary: Definitions::default(),
         statistics: None,
@@ -412,6 +430,10 @@ impl Walk<'_> {
         let end_of_file = self.bytes.len();
         let mut at = MAGIC.len();
         while at < end_of_file {
+            if at - self.forgotten > FORGET_BYTES {
+                (self.forget)(&(self.forgotten..at));
+                self.forgotten = at;
+            }
             if self.footer.is_some() {
                 self.closing(at);
                 return;

@@ -25,6 +25,7 @@ use std::{
     collections::BTreeMap,
     fs::File,
     io::Read,
+    ops::Range,
     path::Path,
     sync::atomic::{AtomicU64, Ordering},
 };
@@ -155,6 +156,27 @@ enum Data {
     Held(Vec<u8>),
 }
 
+impl Data {
+    /// Gives back the memory that a stretch of the file took when it was read; it is read from the file again when needed. Without
+    /// this, a file larger than the memory that a program may have would count as memory of this program.
+    fn forget(&self, stretch: &Range<usize>) {
+        #[cfg(unix)]
+        if let Data::Mapped(map) = self {
+            // SAFETY: nothing ever writes to the map, so that its pages and those of the file are the same bytes.
+            #[allow(unsafe_code)]
+            let advised = unsafe {
+                map.unchecked_advise_range(
+                    memmap2::UncheckedAdvice::DontNeed,
+                    stretch.start,
+                    stretch.len(),
+                )
+            };
+            // A system that does not take the advice keeps the pages: nothing is wrong then.
+            let _ = advised;
+        }
+    }
+}
+
 impl std::ops::Deref for Data {
     type Target = [u8];
 
@@ -228,7 +250,7 @@ impl Recording {
                 name: name.to_owned(),
             });
         }
-        let Some(mut container) = container::walk(&data) else {
+        let Some(mut container) = container::walk(&data, &|stretch| data.forget(stretch)) else {
             let found = data
                 .iter()
                 .take(8)

@@ -127,6 +127,7 @@ pub(super) fn run(
             } else {
                 taker.take(result, sink);
             }
+            recording.data.forget(block.range());
             let mut progress = shared.lock();
             progress.taken = position + 1;
             drop(progress);
