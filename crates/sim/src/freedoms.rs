@@ -1,12 +1,14 @@
 //! The body's coordinates: how a state places the handles, and what forces do to it.
 
+mod gimbal;
+mod hinge;
 mod reduced;
 
-pub use reduced::{Pinned, Reduced, choose};
+pub use reduced::{Pinned, choose};
 
 use crate::body::Body;
 use crate::lanes::{f64x2, pack, sum};
-use crate::model::Workspace;
+use crate::model::{Pair, Workspace};
 use crate::scene::Start;
 use nalgebra::{Matrix3, Quaternion, UnitQuaternion, Vector3};
 
@@ -149,6 +151,59 @@ impl Six {
     }
 }
 
+/// Places the handles, two by two: arm and its rate from `arm_of`, gap and its rate against a centre of mass at
+/// `motion` = position (m) and velocity (m/s).
+#[inline(always)]
+fn place_handles<H>(
+    pairs: &mut [Pair],
+    handles: &[H],
+    motion: [[f64; 3]; 2],
+    arm_of: impl Fn(&H) -> [[f64x2; 3]; 2],
+) {
+    let [position, velocity] = motion.map(|v| v.map(f64x2::splat));
+    for (p, h) in pairs.iter_mut().zip(handles) {
+        let [arm, arm_rate] = arm_of(h);
+        for a in 0..3 {
+            p.arm[a] = arm[a];
+            p.gap[a] = p.base[a] - position[a] - arm[a];
+            p.gap_rate[a] = p.base_rate[a] - velocity[a] - arm_rate[a];
+        }
+    }
+}
+
+/// Arms in the world and their rates ω × arm, for a body of this rotation and this spin (body axes, rad/s).
+#[inline(always)]
+fn turning(r: [[f64; 3]; 3], spin: [f64; 3]) -> impl Fn(&[f64x2; 3]) -> [[f64x2; 3]; 2] {
+    let world = r.map(|row| f64x2::splat(row[0] * spin[0] + row[1] * spin[1] + row[2] * spin[2]));
+    let rows = r.map(|row| row.map(f64x2::splat));
+    move |h| {
+        let arm = rows.map(|row| row[0] * h[0] + row[1] * h[1] + row[2] * h[2]);
+        let arm_rate = [
+            world[1] * arm[2] - world[2] * arm[1],
+            world[2] * arm[0] - world[0] * arm[2],
+            world[0] * arm[1] - world[1] * arm[0],
+        ];
+        [arm, arm_rate]
+    }
+}
+
+/// Sums of the handle forces (N) and of their torques about the centre of mass (N·m), in the world.
+#[inline(always)]
+fn pull(pairs: &[Pair]) -> [[f64; 3]; 2] {
+    let zero = f64x2::ZERO;
+    let (mut force, mut torque) = ([zero; 3], [zero; 3]);
+    for p in pairs {
+        let ([fx, fy], fz, [ax, ay, az]) = (p.tangential, p.normal, p.arm);
+        force[0] += fx;
+        force[1] += fy;
+        force[2] += fz;
+        torque[0] += ay * fz - az * fy;
+        torque[1] += az * fx - ax * fz;
+        torque[2] += ax * fy - ay * fx;
+    }
+    [force.map(sum), torque.map(sum)]
+}
+
 /// M v
 #[inline(always)]
 fn times(m: &Matrix3<f64>, v: [f64; 3]) -> [f64; 3] {
@@ -222,42 +277,19 @@ impl Freedoms for Six {
         let spin = [y[10], y[11], y[12]];
         w.spin = spin;
         w.rotation = r;
-        // ω in the world: the rates of the arms are ω × arm there.
-        let world =
-            r.map(|row| f64x2::splat(row[0] * spin[0] + row[1] * spin[1] + row[2] * spin[2]));
-        let rows = r.map(|row| row.map(f64x2::splat));
-        let position = [y[0], y[1], y[2]].map(f64x2::splat);
-        let velocity = [y[7], y[8], y[9]].map(f64x2::splat);
-        for (p, h) in w.pair.iter_mut().zip(&self.handle) {
-            let arm = rows.map(|row| row[0] * h[0] + row[1] * h[1] + row[2] * h[2]);
-            let arm_rate = [
-                world[1] * arm[2] - world[2] * arm[1],
-                world[2] * arm[0] - world[0] * arm[2],
-                world[0] * arm[1] - world[1] * arm[0],
-            ];
-            for a in 0..3 {
-                p.arm[a] = arm[a];
-                p.gap[a] = p.base[a] - position[a] - arm[a];
-                p.gap_rate[a] = p.base_rate[a] - velocity[a] - arm_rate[a];
-            }
-        }
+        let (position, velocity) = ([y[0], y[1], y[2]], [y[7], y[8], y[9]]);
+        place_handles(
+            &mut w.pair,
+            &self.handle,
+            [position, velocity],
+            turning(r, spin),
+        );
     }
 
     fn accelerate(&self, y: &[f64], w: &mut Workspace, dy: &mut [f64]) {
         let y: &[f64; 13] = y.first_chunk().expect("thirteen states");
         let dy: &mut [f64; 13] = dy.first_chunk_mut().expect("thirteen states");
-        let zero = f64x2::ZERO;
-        let (mut force, mut torque) = ([zero; 3], [zero; 3]);
-        for p in &w.pair {
-            let ([fx, fy], fz, [ax, ay, az]) = (p.tangential, p.normal, p.arm);
-            force[0] += fx;
-            force[1] += fy;
-            force[2] += fz;
-            torque[0] += ay * fz - az * fy;
-            torque[1] += az * fx - ax * fz;
-            torque[2] += ax * fy - ay * fx;
-        }
-        let (force, t, r) = (force.map(sum), torque.map(sum), &w.rotation);
+        let ([force, t], r) = (pull(&w.pair), &w.rotation);
         let in_body =
             [0, 1, 2].map(|a| r[0][a] * t[0] + r[1][a] * t[1] + r[2][a] * t[2] + w.body_torque[a]);
         let [wx, wy, wz] = w.spin;

@@ -4,16 +4,18 @@
 //! q = (x, y, z, φ roll, θ tilt, ψ yaw) without the held ones        R = R_z(ψ) R_y(θ) R_x(φ)        ω = J(φ, θ) (φ̇, θ̇, ψ̇)ᵀ
 //! M r̈_a = F_a + M g_a        (JᵀIJ) θ̈ = Jᵀ (τ − ω × Iω − I J̇ θ̇)
 //! ```
-//! J holds the columns of the free angles: ω = (φ̇ − ψ̇ sin θ, θ̇ cos φ + ψ̇ cos θ sin φ, −θ̇ sin φ + ψ̇ cos θ cos φ) in the body [rad/s]; τ
-//! torque on the body in its axes [N·m]. These are Lagrange's equations of the body with ideal (workless) constraints, in Kane's form: the held
-//! coordinates cost nothing, neither states nor equations. A held coordinate keeps its value at t = 0; `start` velocities along it are
-//! dropped. With all three angles free the attitude stays a quaternion ([`Pinned`]), so no choice of freedoms has a singular
+//! J holds the columns of the free angles; τ torque on the body in its axes (N·m). These are Lagrange's equations of the body with ideal
+//! (workless) constraints, in Kane's form: the held coordinates cost nothing, neither states nor equations. A held coordinate keeps its
+//! value at t = 0; `start` velocities along it are dropped. With all three angles free the attitude stays a quaternion ([`Pinned`]), with
+//! two it is a gimbal (`gimbal.rs`), with one or none a hinge (`hinge.rs`), so no choice of freedoms has a singular
 //! attitude that motion can reach; roll and yaw alone need the held tilt away from ±90°, which the scene's check asks for.
 //! Source: Landau & Lifshitz, *Mechanics*, §35 (Euler angles); Kane & Levinson, *Dynamics* (1985), ch. 6.
 
-use super::{Freedoms, Pose, Six, times};
+use super::gimbal::Gimbal;
+use super::hinge::Hinge;
+use super::{Freedoms, Pose, Six, pull};
 use crate::body::Body;
-use crate::lanes::{f64x2, pack, sum};
+use crate::lanes::{f64x2, pack};
 use crate::model::Workspace;
 use crate::scene::{Freedom, Start};
 use nalgebra::{DMatrix, DVector, Matrix3, UnitQuaternion, Vector3};
@@ -28,13 +30,17 @@ pub fn choose(
 ) -> Box<dyn Freedoms> {
     let is_free = Freedom::ALL.map(|f| free.contains(&f));
     let six = || Six::new(body, handles_m);
+    let rails = || Rails::new(body, is_free, start, height_m);
     match is_free {
         [true, true, true, true, true, true] => Box::new(six()),
         [x, y, z, true, true, true] => Box::new(Pinned {
             six: six(),
             free: [x, y, z],
         }),
-        _ => Box::new(Reduced::new(body, handles_m, is_free, start, height_m)),
+        [.., roll, tilt, yaw] if u8::from(roll) + u8::from(tilt) + u8::from(yaw) == 2 => {
+            Box::new(Reduced::<Gimbal>::new(rails(), handles_m))
+        }
+        _ => Box::new(Reduced::<Hinge>::new(rails(), handles_m)),
     }
 }
 
@@ -95,19 +101,17 @@ impl Freedoms for Pinned {
     }
 }
 
-/// Up to two free angles and any translations: one state for each free coordinate, and one for its rate.
-pub struct Reduced {
-    handle: Vec<[f64x2; 3]>,
-    mass: f64,
-    gravity: [f64; 3],
-    inertia: Matrix3<f64>,
+/// Which coordinates are free and where the others are held, and the body that they place.
+pub(super) struct Rails {
+    pub mass: f64,
+    pub gravity: [f64; 3],
+    pub inertia: Matrix3<f64>,
     /// Where the held coordinates are: x, y, z, roll, tilt, yaw.
-    held: [f64; 6],
-    /// Sine and cosine of the held angles.
-    turned: [(f64, f64); 3],
+    pub held: [f64; 6],
     /// Place among the positions of the state of each coordinate, or none.
-    place: [Option<usize>; 6],
-    free: usize,
+    pub place: [Option<usize>; 6],
+    /// How many are free.
+    pub free: usize,
     names: Vec<&'static str>,
     scales: Vec<f64>,
 }
@@ -121,63 +125,8 @@ const NAMES: [[&str; 2]; 6] = [
     ["yaw_rad", "yaw_rate_rad_per_s"],
 ];
 
-/// The attitude at a state: what gaps and accelerations both need.
-struct Attitude {
-    /// Sine and cosine of roll, tilt, yaw.
-    roll: (f64, f64),
-    tilt: (f64, f64),
-    /// Rates of roll, tilt, yaw; zero for held ones.
-    rates: [f64; 3],
-    yaw: (f64, f64),
-}
-
-impl Attitude {
-    #[inline(always)]
-    fn rows(&self) -> [[f64; 3]; 3] {
-        let ((sr, cr), (st, ct), (sy, cy)) = (self.roll, self.tilt, self.yaw);
-        [
-            [cy * ct, cy * st * sr - sy * cr, cy * st * cr + sy * sr],
-            [sy * ct, sy * st * sr + cy * cr, sy * st * cr - cy * sr],
-            [-st, ct * sr, ct * cr],
-        ]
-    }
-
-    /// Columns of J: what one rad/s of roll, of tilt, of yaw adds to ω.
-    #[inline(always)]
-    fn columns(&self) -> [[f64; 3]; 3] {
-        let ((sr, cr), (st, ct)) = (self.roll, self.tilt);
-        [[1.0, 0.0, 0.0], [0.0, cr, -sr], [-st, ct * sr, ct * cr]]
-    }
-
-    #[inline(always)]
-    fn spin(&self) -> [f64; 3] {
-        let j = self.columns();
-        [0, 1, 2]
-            .map(|a| j[0][a] * self.rates[0] + j[1][a] * self.rates[1] + j[2][a] * self.rates[2])
-    }
-
-    /// J̇ (φ̇, θ̇, ψ̇)
-    #[inline(always)]
-    fn drag(&self) -> [f64; 3] {
-        let ((sr, cr), (st, ct), [roll, tilt, yaw]) = (self.roll, self.tilt, self.rates);
-        [
-            -yaw * ct * tilt,
-            -tilt * sr * roll + yaw * (ct * cr * roll - st * sr * tilt),
-            -tilt * cr * roll - yaw * (st * cr * tilt + ct * sr * roll),
-        ]
-    }
-}
-
-impl Reduced {
-    fn new(
-        body: &Body,
-        handles_m: &[[f64; 3]],
-        free: [bool; 6],
-        start: &Start,
-        height_m: f64,
-    ) -> Self {
-        let [x, y, z] = [0, 1, 2].map(|a| pack(handles_m.iter().map(|h| h[a])));
-        let [roll, tilt, yaw] = start.roll_pitch_yaw_deg.map(f64::to_radians);
+impl Rails {
+    fn new(body: &Body, free: [bool; 6], start: &Start, height_m: f64) -> Self {
         let mut place = [None; 6];
         let mut count = 0;
         for (p, is_free) in place.iter_mut().zip(free) {
@@ -187,20 +136,13 @@ impl Reduced {
             }
         }
         let listed = |which: usize| (0..6).filter(|&c| free[c]).map(move |c| NAMES[c][which]);
+        let [roll, tilt, yaw] = start.roll_pitch_yaw_deg.map(f64::to_radians);
+        let [x, y] = start.position_m;
         Self {
-            handle: (0..x.len()).map(|p| [x[p], y[p], z[p]]).collect(),
             mass: body.mass_kg,
             gravity: body.gravity_m_per_s2.into(),
             inertia: body.inertia_kg_m2,
-            held: [
-                start.position_m[0],
-                start.position_m[1],
-                height_m,
-                roll,
-                tilt,
-                yaw,
-            ],
-            turned: [roll, tilt, yaw].map(f64::sin_cos),
+            held: [x, y, height_m, roll, tilt, yaw],
             place,
             free: count,
             names: listed(0).chain(listed(1)).collect(),
@@ -211,198 +153,185 @@ impl Reduced {
     }
 
     #[inline(always)]
-    fn coordinate(&self, c: usize, y: &[f64]) -> f64 {
+    pub fn coordinate(&self, c: usize, y: &[f64]) -> f64 {
         self.place[c].map_or(self.held[c], |p| y[p])
     }
 
+    /// Its rate, from the state; its second derivative, from the state's rates.
     #[inline(always)]
-    fn rate(&self, c: usize, y: &[f64]) -> f64 {
+    pub fn rate(&self, c: usize, y: &[f64]) -> f64 {
         self.place[c].map_or(0.0, |p| y[self.free + p])
     }
+}
 
-    #[inline(always)]
-    fn attitude(&self, y: &[f64]) -> Attitude {
-        let angle = |a: usize| self.place[3 + a].map_or(self.turned[a], |p| sin_cos(y[p]));
-        Attitude {
-            roll: angle(0),
-            tilt: angle(1),
-            yaw: angle(2),
-            rates: [3, 4, 5].map(|c| self.rate(c, y)),
+/// How up to two free angles turn the body.
+pub(super) trait Turning: Send + Sync {
+    /// For handles in body coordinates, packed two by two (m).
+    fn new(rails: &Rails, handles: Vec<[f64x2; 3]>) -> Self;
+    /// Fills `rotation` and `spin` of the workspace and places the handles; `motion` of the centre of mass as in [`super::place_handles`].
+    fn gaps(&self, rails: &Rails, y: &[f64], motion: [[f64; 3]; 2], w: &mut Workspace);
+    /// Writes the second derivatives of the free angles; `torque` of the handle forces in the world (N·m).
+    fn accelerate(
+        &self,
+        rails: &Rails,
+        torque: [f64; 3],
+        y: &[f64],
+        w: &Workspace,
+        dy: &mut [f64],
+    );
+    /// Columns of J: what one rad/s of roll, of tilt, of yaw adds to ω; those of held angles are not read.
+    fn columns(&self, rails: &Rails, y: &[f64]) -> [[f64; 3]; 3];
+    /// J̇ (φ̇, θ̇, ψ̇)
+    fn drag(&self, rails: &Rails, y: &[f64]) -> [f64; 3];
+}
+
+/// Up to two free angles and any translations: one state for each free coordinate, and one for its rate.
+pub(super) struct Reduced<T> {
+    rails: Rails,
+    turning: T,
+}
+
+impl<T: Turning> Reduced<T> {
+    fn new(rails: Rails, handles_m: &[[f64; 3]]) -> Self {
+        let [x, y, z] = [0, 1, 2].map(|a| pack(handles_m.iter().map(|h| h[a])));
+        let handles = (0..x.len()).map(|p| [x[p], y[p], z[p]]).collect();
+        Self {
+            turning: T::new(&rails, handles),
+            rails,
         }
+    }
+
+    /// J (φ̇, θ̇, ψ̇), or with the rates of a state J (φ̈, θ̈, ψ̈).
+    fn through_columns(&self, y: &[f64], rates_from: &[f64]) -> [f64; 3] {
+        let j = self.turning.columns(&self.rails, y);
+        let rates = [3, 4, 5].map(|c| self.rails.rate(c, rates_from));
+        [0, 1, 2].map(|a| (0..3).map(|k| j[k][a] * rates[k]).sum())
     }
 }
 
-/// Of one angle, in one lane: half the instructions of libm's.
-#[inline(always)]
-fn sin_cos(x: f64) -> (f64, f64) {
-    let (s, c) = crate::lanes::sin_cos(f64x2::splat(x));
-    (s.to_array()[0], c.to_array()[0])
-}
-
-#[inline(always)]
-fn dot(a: [f64; 3], b: [f64; 3]) -> f64 {
-    a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
-}
-
-#[inline(always)]
-fn cross(a: [f64; 3], b: [f64; 3]) -> [f64; 3] {
-    [
-        a[1] * b[2] - a[2] * b[1],
-        a[2] * b[0] - a[0] * b[2],
-        a[0] * b[1] - a[1] * b[0],
-    ]
-}
-
-impl Freedoms for Reduced {
+impl<T: Turning> Freedoms for Reduced<T> {
     fn size(&self) -> usize {
-        2 * self.free
+        2 * self.rails.free
     }
 
     fn names(&self) -> &[&'static str] {
-        &self.names
+        &self.rails.names
     }
 
     fn positions(&self) -> usize {
-        self.free
+        self.rails.free
     }
 
     fn scales(&self) -> &[f64] {
-        &self.scales
+        &self.rails.scales
     }
 
     fn place(&self, start: &Start, _height_m: f64, y: &mut [f64]) {
+        let rails = &self.rails;
         for c in 0..6 {
-            if let Some(p) = self.place[c] {
-                y[p] = self.held[c];
+            if let Some(p) = rails.place[c] {
+                y[p] = rails.held[c];
                 if c < 3 {
-                    y[self.free + p] = start.velocity_m_per_s[c];
+                    y[rails.free + p] = start.velocity_m_per_s[c];
                 }
             }
         }
         // Angle rates that come nearest to the angular velocity asked for: exact where the free angles can have it.
-        let angles: Vec<usize> = (0..3).filter(|&a| self.place[3 + a].is_some()).collect();
+        let angles: Vec<usize> = (0..3).filter(|&a| rails.place[3 + a].is_some()).collect();
         if !angles.is_empty() {
-            let j = self.attitude(&y[..2 * self.free]).columns();
+            let j = self.turning.columns(rails, y);
             let columns = DMatrix::from_fn(3, angles.len(), |row, k| j[angles[k]][row]);
             let wanted = DVector::from_row_slice(&start.angular_velocity_rad_per_s);
             let normal = columns.transpose() * &columns;
             if let Some(rates) = normal.lu().solve(&(columns.transpose() * wanted)) {
                 for (k, &a) in angles.iter().enumerate() {
                     // OK because only angles with a place are listed.
-                    y[self.free + self.place[3 + a].unwrap_or(0)] = rates[k];
+                    y[rails.free + rails.place[3 + a].unwrap_or(0)] = rates[k];
                 }
             }
         }
     }
 
     fn gaps(&self, y: &[f64], w: &mut Workspace) {
-        let at = self.attitude(y);
-        let r = at.rows();
-        let spin = at.spin();
-        w.spin = spin;
-        w.rotation = r;
-        let world = r.map(|row| f64x2::splat(dot(row, spin)));
-        let rows = r.map(|row| row.map(f64x2::splat));
-        let position = [0, 1, 2].map(|c| f64x2::splat(self.coordinate(c, y)));
-        let velocity = [0, 1, 2].map(|c| f64x2::splat(self.rate(c, y)));
-        for (p, h) in w.pair.iter_mut().zip(&self.handle) {
-            let arm = rows.map(|row| row[0] * h[0] + row[1] * h[1] + row[2] * h[2]);
-            let arm_rate = [
-                world[1] * arm[2] - world[2] * arm[1],
-                world[2] * arm[0] - world[0] * arm[2],
-                world[0] * arm[1] - world[1] * arm[0],
-            ];
-            for a in 0..3 {
-                p.arm[a] = arm[a];
-                p.gap[a] = p.base[a] - position[a] - arm[a];
-                p.gap_rate[a] = p.base_rate[a] - velocity[a] - arm_rate[a];
-            }
-        }
+        let rails = &self.rails;
+        let position = [0, 1, 2].map(|c| rails.coordinate(c, y));
+        let velocity = [0, 1, 2].map(|c| rails.rate(c, y));
+        self.turning.gaps(rails, y, [position, velocity], w);
     }
 
     fn accelerate(&self, y: &[f64], w: &mut Workspace, dy: &mut [f64]) {
-        let zero = f64x2::ZERO;
-        let (mut force, mut torque) = ([zero; 3], [zero; 3]);
-        for p in &w.pair {
-            let ([fx, fy], fz, [ax, ay, az]) = (p.tangential, p.normal, p.arm);
-            force[0] += fx;
-            force[1] += fy;
-            force[2] += fz;
-            torque[0] += ay * fz - az * fy;
-            torque[1] += az * fx - ax * fz;
-            torque[2] += ax * fy - ay * fx;
-        }
-        let n = self.free;
-        dy[..n].copy_from_slice(&y[n..2 * n]);
-        for c in 0..3 {
-            if let Some(p) = self.place[c] {
-                dy[n + p] = sum(force[c]) / self.mass + self.gravity[c];
+        let (rails, n) = (&self.rails, self.rails.free);
+        let [force, torque] = pull(&w.pair);
+        for c in 0..6 {
+            if let Some(p) = rails.place[c] {
+                dy[p] = y[n + p];
+                if c < 3 {
+                    dy[n + p] = force[c] / rails.mass + rails.gravity[c];
+                }
             }
         }
-        let angles = [3, 4, 5].map(|c| self.place[c]);
-        if angles == [None; 3] {
-            return;
-        }
-        let (t, r) = (torque.map(sum), &w.rotation);
-        let at = self.attitude(y);
-        let (j, spin) = (at.columns(), w.spin);
-        let gyro = cross(spin, times(&self.inertia, spin));
-        let drag = times(&self.inertia, at.drag());
-        let left = [0, 1, 2].map(|a| {
-            let in_body = r[0][a] * t[0] + r[1][a] * t[1] + r[2][a] * t[2] + w.body_torque[a];
-            in_body - gyro[a] - drag[a]
-        });
-        let mut free = (0..3).filter_map(|a| angles[a].map(|p| (j[a], p)));
-        // One or two free angles: three are `Pinned` or `Six`.
-        match (free.next(), free.next()) {
-            (Some((a, p)), None) => dy[n + p] = dot(a, left) / dot(a, times(&self.inertia, a)),
-            (Some((a, pa)), Some((b, pb))) => {
-                let (ia, ib) = (times(&self.inertia, a), times(&self.inertia, b));
-                let (aa, ab, bb) = (dot(a, ia), dot(a, ib), dot(b, ib));
-                let (la, lb) = (dot(a, left), dot(b, left));
-                let scale = 1.0 / (aa * bb - ab * ab);
-                dy[n + pa] = (bb * la - ab * lb) * scale;
-                dy[n + pb] = (aa * lb - ab * la) * scale;
-            }
-            _ => {}
-        }
+        self.turning.accelerate(rails, torque, y, w, dy);
     }
 
     fn acceleration(&self, y: &[f64], dy: &[f64]) -> [[f64; 3]; 2] {
-        let at = self.attitude(y);
-        let (j, drag) = (at.columns(), at.drag());
-        let second = |c: usize| self.place[c].map_or(0.0, |p| dy[self.free + p]);
-        let angular = [0, 1, 2]
-            .map(|a| j[0][a] * second(3) + j[1][a] * second(4) + j[2][a] * second(5) + drag[a]);
-        [[0, 1, 2].map(second), angular]
+        let (along, drag) = (
+            self.through_columns(y, dy),
+            self.turning.drag(&self.rails, y),
+        );
+        [
+            [0, 1, 2].map(|c| self.rails.rate(c, dy)),
+            [0, 1, 2].map(|a| along[a] + drag[a]),
+        ]
     }
 
     fn pose(&self, y: &[f64]) -> Pose {
-        let [roll, tilt, yaw] = [3, 4, 5].map(|c| self.coordinate(c, y));
+        let rails = &self.rails;
+        let [roll, tilt, yaw] = [3, 4, 5].map(|c| rails.coordinate(c, y));
         let q = UnitQuaternion::from_euler_angles(roll, tilt, yaw);
         Pose {
-            position_m: [0, 1, 2].map(|c| self.coordinate(c, y)),
+            position_m: [0, 1, 2].map(|c| rails.coordinate(c, y)),
             orientation: [q.i, q.j, q.k, q.w],
-            velocity_m_per_s: [0, 1, 2].map(|c| self.rate(c, y)),
-            spin_rad_per_s: self.attitude(y).spin(),
+            velocity_m_per_s: [0, 1, 2].map(|c| rails.rate(c, y)),
+            spin_rad_per_s: self.through_columns(y, y),
         }
     }
 
     fn project(&self, _y: &mut [f64]) {}
 
     fn drift(&self, h_s: f64, y: &mut [f64]) {
-        for p in 0..self.free {
-            y[p] += h_s * y[self.free + p];
+        for p in 0..self.rails.free {
+            y[p] += h_s * y[self.rails.free + p];
         }
     }
 
     fn energy_j(&self, y: &[f64]) -> [f64; 2] {
-        let pose = self.pose(y);
+        let (rails, pose) = (&self.rails, self.pose(y));
         let (v, spin) = (
             Vector3::from(pose.velocity_m_per_s),
             Vector3::from(pose.spin_rad_per_s),
         );
-        let kinetic = 0.5 * (self.mass * v.norm_squared() + spin.dot(&(self.inertia * spin)));
-        [kinetic, -self.mass * dot(self.gravity, pose.position_m)]
+        let kinetic = 0.5 * (rails.mass * v.norm_squared() + spin.dot(&(rails.inertia * spin)));
+        [kinetic, -rails.mass * dot(rails.gravity, pose.position_m)]
     }
+}
+
+/// Of one angle, in one lane: half the instructions of libm's.
+#[inline(always)]
+pub(super) fn sin_cos(x: f64) -> (f64, f64) {
+    let (s, c) = crate::lanes::sin_cos(f64x2::splat(x));
+    (s.to_array()[0], c.to_array()[0])
+}
+
+#[inline(always)]
+pub(super) fn dot(a: [f64; 3], b: [f64; 3]) -> f64 {
+    a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
+}
+
+#[inline(always)]
+pub(super) fn cross(a: [f64; 3], b: [f64; 3]) -> [f64; 3] {
+    [
+        a[1] * b[2] - a[2] * b[1],
+        a[2] * b[0] - a[0] * b[2],
+        a[0] * b[1] - a[1] * b[0],
+    ]
 }

@@ -1,0 +1,116 @@
+//! One free angle, or none: the body turns about an axis that stands still, in the body and in the world.
+//!
+//! ```text
+//! ω = θ̇ j        R p = a + b cos θ + c sin θ,   a = n (n·P),  b = P − a,  c = n × P,  P = R₀ p        (jᵀIj) θ̈ = n · Σ_i (R p_i) × F_i + j · τ
+//! ```
+//! θ the free angle (rad), R₀ the rotation with θ = 0 and the other two held; j its axis in the body, n = R₀ j in the world, both of unit length and
+//! constant; τ torque beside that of the handle forces (N·m, body). ω × Iω has no part along j and J̇ = 0, so neither appears. Without a free angle
+//! j = 0 and R p = P. Source: rotation about an axis, Rodrigues; equation: see [`super::reduced`].
+
+use super::reduced::{Rails, Turning, cross, dot, sin_cos};
+use super::{place_handles, times};
+use crate::lanes::f64x2;
+use crate::model::Workspace;
+use nalgebra::{Rotation3, Vector3};
+
+pub(super) struct Hinge {
+    /// Place of θ in the state.
+    place: Option<usize>,
+    /// j
+    in_body: [f64; 3],
+    /// n
+    in_world: [f64; 3],
+    /// 1/(jᵀIj)
+    inverse_moment: f64,
+    /// a, b and c of each pair of handles.
+    handles: Vec<[[f64x2; 3]; 3]>,
+    /// a, b and c of the body's axes: rows of the rotation.
+    rotation: [[[f64; 3]; 3]; 3],
+}
+
+impl Turning for Hinge {
+    fn new(rails: &Rails, handles: Vec<[f64x2; 3]>) -> Self {
+        let free = (0..3).find(|a| rails.place[3 + a].is_some());
+        let mut angles = [rails.held[3], rails.held[4], rails.held[5]];
+        if let Some(a) = free {
+            angles[a] = 0.0;
+        }
+        let ([roll, tilt, yaw], (st, ct)) = (angles, angles[1].sin_cos());
+        let (sr, cr) = roll.sin_cos();
+        let columns = [[1.0, 0.0, 0.0], [0.0, cr, -sr], [-st, ct * sr, ct * cr]];
+        let in_body = free.map_or([0.0; 3], |a| columns[a]);
+        let start = Rotation3::from_euler_angles(roll, tilt, yaw);
+        let in_world: [f64; 3] = (start * Vector3::from(in_body)).into();
+        let parts = |p: [f64; 3]| {
+            let p: [f64; 3] = (start * Vector3::from(p)).into();
+            let along = in_world.map(|n| n * dot(in_world, p));
+            [
+                along,
+                [0, 1, 2].map(|a| p[a] - along[a]),
+                cross(in_world, p),
+            ]
+        };
+        let axes = [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]].map(parts);
+        let handles = handles.into_iter().map(|h| {
+            let lane = |l: usize| parts(h.map(|x| x.as_array()[l]));
+            let (first, second) = (lane(0), lane(1));
+            [0, 1, 2].map(|k| [0, 1, 2].map(|a| f64x2::new([first[k][a], second[k][a]])))
+        });
+        Self {
+            place: free.and_then(|a| rails.place[3 + a]),
+            in_body,
+            in_world,
+            inverse_moment: free.map_or(0.0, |_| {
+                1.0 / dot(in_body, times(&rails.inertia, in_body))
+            }),
+            handles: handles.collect(),
+            rotation: [0, 1, 2].map(|k| [0, 1, 2].map(|row| axes.map(|axis| axis[k][row]))),
+        }
+    }
+
+    #[inline(always)]
+    fn gaps(&self, rails: &Rails, y: &[f64], motion: [[f64; 3]; 2], w: &mut Workspace) {
+        let ((sin, cos), rate) = match self.place {
+            Some(p) => (sin_cos(y[p]), y[rails.free + p]),
+            None => ((0.0, 1.0), 0.0),
+        };
+        w.spin = self.in_body.map(|j| j * rate);
+        let [a, b, c] = &self.rotation;
+        for row in 0..3 {
+            for column in 0..3 {
+                w.rotation[row][column] =
+                    a[row][column] + b[row][column] * cos + c[row][column] * sin;
+            }
+        }
+        let [sin, cos, rate] = [sin, cos, rate].map(f64x2::splat);
+        place_handles(&mut w.pair, &self.handles, motion, |[a, b, c]| {
+            [
+                [0, 1, 2].map(|k| a[k] + b[k] * cos + c[k] * sin),
+                [0, 1, 2].map(|k| (c[k] * cos - b[k] * sin) * rate),
+            ]
+        });
+    }
+
+    #[inline(always)]
+    fn accelerate(
+        &self,
+        rails: &Rails,
+        torque: [f64; 3],
+        _y: &[f64],
+        w: &Workspace,
+        dy: &mut [f64],
+    ) {
+        if let Some(p) = self.place {
+            let turned = dot(self.in_world, torque) + dot(self.in_body, w.body_torque);
+            dy[rails.free + p] = turned * self.inverse_moment;
+        }
+    }
+
+    fn columns(&self, _rails: &Rails, _y: &[f64]) -> [[f64; 3]; 3] {
+        [self.in_body; 3]
+    }
+
+    fn drag(&self, _rails: &Rails, _y: &[f64]) -> [f64; 3] {
+        [0.0; 3]
+    }
+}
