@@ -1,37 +1,86 @@
 #!/bin/sh
-# Instructions per right-hand side and per simulated second, effect by effect: the tables of docs/effects.md.
-# Needs valgrind and `cargo build --release -p sim --example cost`. Usage: docs/effects.sh [PATH OF cost]
-COST=${1:-target/release/examples/cost}
-count() { # instructions of the run alone
-    valgrind --tool=callgrind --callgrind-out-file=/dev/null --toggle-collect='cost::counted' "$COST" "$@" 2>&1 |
+# What each effect costs, in instructions: the tables of docs/effects.md. Needs valgrind and GNU sed; run it from the
+# workspace's root. It takes a while: one build for every effect.
+#   docs/effects.sh            every table
+#   docs/effects.sh costs      what an effect costs where it is on
+#   docs/effects.sh absent     what it costs where it is off, against a build in which its file does not exist
+#   docs/effects.sh freedoms   fewer freedoms
+set -eu
+WHAT=${1:-all}
+TARGET=${CARGO_TARGET_DIR:-target}
+ON_IN_MUSIC="frequency_spread music noise gait lift contact sling pole_friction"
+OFF_IN_MUSIC="coupling hold friction feedback path flexure imu drum"
+
+cargo build --quiet --release -p sim --bin sim --example cost
+COST=$TARGET/release/examples/cost
+TMP=$(mktemp -d)
+trap 'rm -r "$TMP"' EXIT
+
+count() { # COST SCENE [KEY=VALUE]...: instructions of the run alone
+    valgrind --tool=callgrind --callgrind-out-file=/dev/null --toggle-collect='cost::counted' "$@" 2>&1 |
         sed -n 's/.*Collected : *\([0-9]*\).*/\1/p'
 }
-steps() { "$COST" "$@" | sed -n 's/.* \([0-9]*\) evaluations.*/\1/p'; }
-FIXED="solver.method=rk4 solver.step_s=0.004 duration_s=10.0"
-base=$(count detuned-beat effects.lift.gain=1.2 $FIXED); calls=$(steps detuned-beat effects.lift.gain=1.2 $FIXED)
-echo "detuned-beat with lift, rk4 at 4 ms, 10 s: $base instructions, $calls evaluations, $((base / calls)) each"
-for e in frequency_spread music noise lift contact hold pole_friction; do
-    less=$(count detuned-beat effects.lift.gain=1.2 $FIXED effects.$e=false)
-    echo "$e | $(( (base - less) / calls ))"
-done
-less=$(count detuned-beat effects.lift.gain=1.2 $FIXED effects.gait=false effects.lift=false); lift=$(count detuned-beat effects.lift.gain=1.2 $FIXED effects.lift=false)
-echo "gait | $(( (lift - less) / calls ))"
-for e in coupling.strength_rad_per_s=0.0 friction.coefficient=0.5 feedback.strength_rad_per_s=0.0 path.turn_deg=1.0 \
-    flexure.frequency_hz=20.0 imu.rate_hz=200.0 drum.level=0.5; do
-    more=$(count detuned-beat effects.lift.gain=1.2 $FIXED effects.$e)
-    echo "${e%%.*} | $(( (more - base) / calls ))"
-done
-more=$(count detuned-beat effects.lift.gain=1.2 $FIXED effects.hold=false effects.friction.law=bristle); less=$(count detuned-beat effects.lift.gain=1.2 $FIXED effects.hold=false)
-echo "friction, bristle | $(( (more - less) / calls ))"
-full=$(count detuned-beat effects.lift.gain=1.2 duration_s=20.0)
-echo "detuned-beat with lift, auto, 20 s: $((full / 20)) a simulated second"
-two=$(count detuned-beat effects.lift.gain=1.2 duration_s=20.0 'freedom=["height","roll"]')
-echo "height and roll: $((two / 20)) a simulated second, $((100 * two / full)) % of six freedoms"
-for n in 1 2 4 5 6; do
-    case $n in
-    1) f='["roll"]' ;; 2) f='["height","roll"]' ;; 4) f='["y","height","roll","tilt"]' ;;
-    5) f='["y","height","roll","tilt","yaw"]' ;; 6) f='["x","y","height","roll","tilt","yaw"]' ;;
-    esac
-    c=$(count detuned-beat effects.lift.gain=1.2 $FIXED "freedom=$f")
-    echo "freedom = $f | $((c / calls))"
-done
+evaluations() { "$COST" "$@" | sed -n 's/.* \([0-9]*\) evaluations.*/\1/p'; }
+without() { # the settings that take an effect out of `music`: lift is about the gait
+    if [ "$1" = gait ]; then echo effects.gait=false effects.lift=false; else echo "effects.$1=false"; fi
+}
+percent() { awk "BEGIN { printf \"%.2f\", 100 * $1 / $2 }"; }
+
+costs() {
+    fixed="solver.method=rk4 solver.step_s=0.004 duration_s=10.0"
+    base=$(count "$COST" music $fixed)
+    calls=$(evaluations music $fixed)
+    echo "music, rk4 at 4 ms, 10 s: $base instructions, $calls evaluations, $((base / calls)) each"
+    for e in frequency_spread music noise lift contact sling pole_friction; do
+        echo "$e | $(((base - $(count "$COST" music $fixed effects.$e=false)) / calls))"
+    done
+    still=$(count "$COST" music $fixed effects.lift=false)
+    echo "gait | $(((still - $(count "$COST" music $fixed effects.lift=false effects.gait=false)) / calls))"
+    for e in coupling.strength_rad_per_s=0.0 hold.stiffness_n_per_m=0.0 friction.coefficient=0.5 feedback.strength_rad_per_s=0.0 \
+        path.turn_deg=1.0 flexure.frequency_hz=20.0 imu.rate_hz=200.0 drum.level=0.5; do
+        echo "${e%%.*} | $((($(count "$COST" music $fixed effects.$e) - base) / calls))"
+    done
+    bare=$(count "$COST" music $fixed effects.sling=false)
+    echo "friction, bristle | $((($(count "$COST" music $fixed effects.sling=false effects.friction.law=bristle) - bare) / calls))"
+}
+
+absent() {
+    for e in $ON_IN_MUSIC $OFF_IN_MUSIC; do
+        # A workspace in which the effect is not: its file, its lines in mod.rs, and what other effects ask about it.
+        copy=$TARGET/without/workspace
+        rm -rf "$copy"
+        mkdir -p "$copy"
+        cp -r Cargo.toml Cargo.lock crates schemas tests "$copy"
+        effects=$copy/crates/sim/src/effects
+        rm "$effects/$e.rs"
+        sed -i "/^pub mod $e;/d; /^    pub $e: Option</d" "$effects/mod.rs"
+        sed -i -z "s/    entry!(\s*$e,\s*\"[^\"]*\"\s*),\n//" "$effects/mod.rs"
+        sed -i "s/scene\.effects\.$e\.is_some()/false/; s/scene\.effects\.$e\.is_none()/true/" "$effects"/*.rs
+        (cd "$copy" && cargo build --quiet --release -p sim --example cost --target-dir ../target 2>"$TMP/build.log") ||
+            { cat "$TMP/build.log"; exit 1; }
+        set -- $(without "$e")
+        "$TARGET/release/sim" scenes music --set duration_s=20.0 $(printf -- '--set %s ' "$@") >"$TMP/scene.toml"
+        here=$(count "$COST" "$TMP/scene.toml")
+        there=$(count "$TARGET/without/target/release/examples/cost" "$TMP/scene.toml")
+        echo "$e | $((here / 20)) | $((there / 20)) | $(percent $((here - there)) "$there") %"
+    done
+}
+
+freedoms() {
+    for s in baseline music strict-contact eight-carriers detuned-beat; do
+        six=$(count "$COST" $s)
+        two=$(count "$COST" $s 'freedom=["height","roll"]')
+        echo "$s | $((six / 60)) | $((two / 60)) | $(percent "$two" "$six") %"
+    done
+    fixed="solver.method=rk4 solver.step_s=0.004 duration_s=10.0"
+    for f in '["height"]' '["height","roll"]' '["height","roll","tilt"]' '["y","height","roll","tilt"]' '["y","height","roll","tilt","yaw"]' \
+        '["x","y","height","roll","tilt","yaw"]'; do
+        echo "$f | $(($(count "$COST" music $fixed "freedom=$f") / $(evaluations music $fixed "freedom=$f")))"
+    done
+}
+
+case $WHAT in
+all) costs && absent && freedoms ;;
+costs | absent | freedoms) $WHAT ;;
+*) sed -n 's/^# //p' "$0" >&2 && exit 2 ;;
+esac

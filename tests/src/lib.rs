@@ -104,3 +104,23 @@ pub fn on_path(names: &[&str]) -> Option<PathBuf> {
         .flat_map(candidates)
         .find(|file| file.is_file())
 }
+
+/// A Python that can import these modules: `PYTHON`, a virtual environment in the workspace or beside it, or the one on PATH.
+pub fn python_with(modules: &[&str]) -> Option<PathBuf> {
+    let named = std::env::var_os("PYTHON").map(PathBuf::from);
+    let beside = [".venv", "venv", "../.venv", "../venv"]
+        .map(|folder| Path::new(ROOT).join(folder).join("bin/python"));
+    let imports = format!("import {}", modules.join(", "));
+    let can_import = |python: &PathBuf| {
+        let mut try_it = Command::new(python);
+        try_it
+            .args(["-c", &imports])
+            .output()
+            .is_ok_and(|o| o.status.success())
+    };
+    named
+        .into_iter()
+        .chain(beside)
+        .chain(on_path(&["python3", "python"]))
+        .find(can_import)
+}

@@ -2,6 +2,7 @@
 //! [`solve::Method`] integrates into samples.
 
 pub mod accuracy;
+pub mod beat;
 pub mod body;
 pub mod effects;
 pub mod energy;

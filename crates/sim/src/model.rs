@@ -10,10 +10,9 @@
 //! Between events the right-hand side is smooth: whether a handle is in contact, which noise cell it is and whether the
 //! music has begun are fixed for a *segment* and change only between two of them.
 
+use crate::beat::Beat;
 use crate::body::Body;
 use crate::effects;
-use crate::effects::flexure::Bending;
-pub use crate::effects::music::Beat;
 use crate::freedoms::{Freedoms, Six, choose};
 use crate::lanes::{self, LANES, f64x2, pack, pairs};
 use crate::random::{Stream, normal};
@@ -36,6 +35,8 @@ pub enum Stage {
     Shoulders,
     /// Moves the party as a whole, shoulders and all.
     Party,
+    /// Moves the handles against the rigid body.
+    Bends,
     /// Sets forces at the handles.
     Handles,
     /// Adds torque on the body.
@@ -186,13 +187,12 @@ pub struct Model {
     natural_rad_per_s: Vec<f64>,
     initial_phases: Vec<f64>,
     has_phases: bool,
-    terms: [Vec<Box<dyn Term>>; 5],
+    terms: [Vec<Box<dyn Term>>; 6],
     /// Whose each term is, in the same order.
-    owners: [Vec<&'static str>; 5],
+    owners: [Vec<&'static str>; 6],
     building: &'static str,
     /// Names and first values of the effects' own states.
     extra: Vec<(String, f64)>,
-    flexure: Option<Bending>,
     switches: Vec<Box<dyn Switch>>,
     accounts: Vec<(&'static str, Box<dyn Account>)>,
     beat: Option<Beat>,
@@ -210,10 +210,7 @@ impl Model {
     /// # Panics
     /// When the scene does not pass [`crate::scene::check`].
     pub fn new(scene: &Scene) -> Self {
-        let mut body = Body::new(&scene.body).expect("a checked scene has a possible inertia");
-        if let Some(path) = &scene.effects.path {
-            body.gravity_m_per_s2 = path.lean(scene.body.gravity_m_per_s2).into();
-        }
+        let body = Body::new(&scene.body).expect("a checked scene has a possible inertia");
         let n = scene.carriers.count();
         let freedoms = Box::new(Six::new(&body, &scene.carriers.handles_m));
         let mut model = Self {
@@ -248,7 +245,6 @@ impl Model {
             contact_stiffness: Vec::new(),
             contact_exponent: 1.0,
             extra: Vec::new(),
-            flexure: None,
             watches_contact: false,
             sensor_clocks: Vec::new(),
             imus: Vec::new(),
@@ -261,20 +257,19 @@ impl Model {
         if !scene.solver.energy {
             model.accounts.clear();
         }
-        if scene.freedom.len() < 6 {
-            let height_m = scene
-                .start
-                .height_m
-                .unwrap_or_else(|| model.resting_height_m());
-            model.freedoms = choose(
-                &model.body,
-                &scene.carriers.handles_m,
-                &scene.freedom,
-                &scene.start,
-                height_m,
-            );
-            model.layout.body = model.freedoms.size();
-        }
+        // Only now, when every effect has said what it does to gravity and to the springs that the body rests on.
+        let height_m = scene
+            .start
+            .height_m
+            .unwrap_or_else(|| model.resting_height_m());
+        model.freedoms = choose(
+            &model.body,
+            &scene.carriers.handles_m,
+            &scene.freedom,
+            &scene.start,
+            height_m,
+        );
+        model.layout.body = model.freedoms.size();
         model.layout.phases = if model.has_phases { n } else { 0 };
         model.layout.extra = model.extra.len();
         model.layout.ledger = 2 * model.accounts.len();
@@ -296,8 +291,9 @@ impl Model {
         first
     }
 
-    pub(crate) fn set_flexure(&mut self, poles: Bending) {
-        self.flexure = Some(poles);
+    /// Gives gravity another direction, m/s².
+    pub(crate) fn lean(&mut self, gravity_m_per_s2: [f64; 3]) {
+        self.body.gravity_m_per_s2 = gravity_m_per_s2.into();
     }
 
     /// Adds moments at which the right-hand side may jump.
@@ -580,8 +576,8 @@ impl Model {
             self.party(t_s, w);
         }
         self.freedoms.gaps(y, w);
-        if let Some(poles) = &self.flexure {
-            poles.bend(w);
+        for term in &self.terms[Stage::Bends as usize] {
+            term.apply(t_s, w);
         }
         for term in &self.terms[Stage::Handles as usize] {
             term.apply(t_s, w);

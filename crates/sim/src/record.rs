@@ -1,6 +1,6 @@
 //! Samples → a recording: every topic of the contract, from one sample at a time.
 
-use crate::effects::music::Stroke;
+use crate::beat::Stroke;
 use crate::model::Model;
 use crate::run::{Listener, Sample};
 use crate::scene::{Scene, to_toml};

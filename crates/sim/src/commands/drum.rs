@@ -25,12 +25,16 @@ pub struct Args {
 /// Writes the sound; the file appears whole or not at all.
 pub fn run(args: &Args) -> Result<()> {
     let mut scene = load(&args.scene, &args.set)?;
+    if scene.effects.music.is_none() {
+        return Err(anyhow!(
+            "the scene `{}` has no effects.music, so there is no drum to hear",
+            scene.name
+        ));
+    }
     scene.effects.drum.get_or_insert_default();
     sim::scene::check(&scene).map_err(|p| anyhow!("{}: {}", p.key, p.message))?;
     let model = Model::new(&scene);
-    let track = model
-        .track()
-        .ok_or_else(|| anyhow!("the scene `{}` has no music", scene.name))?;
+    let track = model.track().context("a scene with a drum has a track")?;
     let wav = track.wav().map_err(|e| anyhow!(e))?;
     let unfinished = args.out.with_extension("wav.part");
     let written =

@@ -3,11 +3,11 @@
 use anyhow::Result;
 use clap::ValueEnum;
 use serde_json::{Value, json};
-use sim::effects::TABLE;
+use sim::effects::{Entry, TABLE};
 use sim::model::Model;
 use sim::run::Sample;
 use sim::scene::{Freedom, Scene, load};
-use std::io::Write;
+use std::fmt::Write;
 use std::time::Instant;
 
 /// Arguments of `sim explain`.
@@ -36,8 +36,11 @@ const EXAMPLES: &str = "Examples:
   sim explain eight-carriers --format json
   sim explain music --set 'freedom=[\"height\", \"roll\"]'";
 
-/// Longest stretch that the trials of `freedoms` simulate, s.
+/// Longest stretch that a trial simulates, s, and how long one should take at most, s.
 const TRIAL_S: f64 = 20.0;
+const TRIAL_WALL_S: f64 = 1.0;
+/// A freedom whose absence changes less than this is named as one that could be held: rad and m.
+const LITTLE: (f64, f64) = (0.017_453, 0.005);
 
 struct Effect {
     name: &'static str,
@@ -45,6 +48,19 @@ struct Effect {
     on: bool,
     adds_state: usize,
     cost_ns: Option<f64>,
+    /// Cost of a simulated second of the scene without it, ms.
+    without_ms: Option<f64>,
+}
+
+/// What the trials of one scene found.
+struct Findings {
+    scene: Scene,
+    model: Model,
+    effects: Vec<Effect>,
+    freedoms: Vec<Trial>,
+    rhs_ns: f64,
+    ms_per_s: f64,
+    trial_s: f64,
 }
 
 struct Trial {
@@ -57,72 +73,108 @@ struct Trial {
 
 /// Explains a scene.
 pub fn run(args: &Args) -> Result<()> {
-    let scene = load(&args.scene, &args.set)?;
+    let found = explore(load(&args.scene, &args.set)?);
+    super::print(&match args.format {
+        Format::Json => format!("{:#}\n", as_json(&found)),
+        Format::Table => as_table(&found),
+    })
+}
+
+fn explore(scene: Scene) -> Findings {
     let model = Model::new(&scene);
-    let rhs_ns = cost_ns(&model);
-    let effects: Vec<Effect> = TABLE
+    // A second tells how long a trial may be.
+    let mut trial = scene.clone();
+    trial.duration_s = scene.duration_s.min(1.0);
+    let pace = ms_per_s(&trial) / 1e3;
+    trial.duration_s = scene
+        .duration_s
+        .min((TRIAL_WALL_S / pace).clamp(1.0, TRIAL_S));
+    let ms = ms_per_s(&trial);
+    let effects = TABLE
         .iter()
         .map(|e| {
-            let on = (e.is_on)(&scene.effects);
-            let (mut adds_state, mut cost) = (0, None);
-            if on {
-                let mut without = scene.clone();
-                (e.switch_off)(&mut without.effects);
-                // An effect that another one needs cannot be taken out alone.
-                if sim::scene::check(&without).is_ok() {
-                    let smaller = Model::new(&without);
-                    adds_state = model
-                        .layout()
-                        .size()
-                        .saturating_sub(smaller.layout().size());
-                    cost = Some(rhs_ns - cost_ns(&smaller));
-                }
-            }
-            Effect {
+            let mut effect = Effect {
                 name: e.name,
                 about: e.about,
-                on,
-                adds_state,
-                cost_ns: cost,
+                on: (e.is_on)(&scene.effects),
+                adds_state: 0,
+                cost_ns: None,
+                without_ms: None,
+            };
+            if let Some((with, without)) = pair_about(e, &trial).filter(|_| effect.on) {
+                let (a, b) = (Model::new(&with), Model::new(&without));
+                effect.adds_state = a.layout().size() - b.layout().size();
+                let [a, b] = cost_ns([&a, &b]);
+                effect.cost_ns = Some(a - b);
+                effect.without_ms = Some(ms - ms_per_s(&with) + ms_per_s(&without));
             }
+            effect
         })
         .collect();
-    let (trials, ms_per_s) = try_freedoms(&scene);
-    let mut out = std::io::stdout().lock();
-    match args.format {
-        Format::Json => {
-            serde_json::to_writer_pretty(
-                &mut out,
-                &as_json(&scene, &model, &effects, &trials, rhs_ns, ms_per_s),
-            )?;
-            writeln!(out)?;
-        }
-        Format::Table => print(
-            &mut out, &scene, &model, &effects, &trials, rhs_ns, ms_per_s,
-        )?,
+    Findings {
+        rhs_ns: cost_ns([&model])[0],
+        freedoms: try_freedoms(&trial),
+        trial_s: trial.duration_s,
+        ms_per_s: ms,
+        effects,
+        model,
+        scene,
     }
-    Ok(())
 }
 
-/// Cost of one right-hand side at the scene's start, ns: the least of several means, which noise can only raise.
-fn cost_ns(model: &Model) -> f64 {
-    let (y, mut w) = (model.initial_state(), model.workspace());
-    model.begin_segment(0.0, &mut w);
-    let mut dy = vec![0.0; y.len()];
-    let calls = (400_000 / (y.len() + 20)).clamp(10, 5000);
-    (0..15)
-        .map(|_| {
+/// The scene with and without an effect; where another effect needs it, both without that other.
+fn pair_about(effect: &Entry, scene: &Scene) -> Option<(Scene, Scene)> {
+    let without = |scene: &Scene, e: &Entry| {
+        let mut fewer = scene.clone();
+        (e.switch_off)(&mut fewer.effects);
+        fewer
+    };
+    let legal = |scene: &Scene| sim::scene::check(scene).is_ok();
+    std::iter::once(scene.clone())
+        .chain(TABLE.iter().map(|other| without(scene, other)))
+        .map(|with| {
+            let fewer = without(&with, effect);
+            (with, fewer)
+        })
+        .find(|(with, fewer)| legal(with) && legal(fewer))
+}
+
+/// Cost of one right-hand side of each model, ns, in the middle of its scene, by turns: the least of several means, which noise can only raise.
+fn cost_ns<const N: usize>(models: [&Model; N]) -> [f64; N] {
+    let mut least = [f64::INFINITY; N];
+    let mut runs = models.map(|model| {
+        let t_s = 0.5 * model.scene.duration_s;
+        let (y, mut w) = (model.initial_state(), model.workspace());
+        model.begin_segment(t_s, &mut w);
+        let dy = vec![0.0; y.len()];
+        (model, t_s, y, dy, w)
+    });
+    for _ in 0..25 {
+        for ((model, t_s, y, dy, w), least) in runs.iter_mut().zip(&mut least) {
+            let calls = (400_000 / (y.len() + 20)).clamp(10, 3000);
             let began = Instant::now();
             for _ in 0..calls {
-                model.rhs(std::hint::black_box(0.0), &y, &mut dy, &mut w);
+                model.rhs(std::hint::black_box(*t_s), y, dy, w);
                 std::hint::black_box(&dy);
             }
-            began.elapsed().as_secs_f64() * 1e9 / calls as f64
-        })
-        .fold(f64::INFINITY, f64::min)
+            *least = least.min(began.elapsed().as_secs_f64() * 1e9 / calls as f64);
+        }
+    }
+    least
 }
 
-/// Roll and height of every sample, and the six coordinates.
+/// Cost of a simulated second with its instruments, ms: the better of two runs. NaN for a scene that fails.
+fn ms_per_s(scene: &Scene) -> f64 {
+    let once = || {
+        let began = Instant::now();
+        let outcome = sim::run::run(scene, &mut |_: &Sample| true);
+        let wall_s = began.elapsed().as_secs_f64();
+        outcome.map_or(f64::NAN, |_| wall_s * 1e3 / scene.duration_s)
+    };
+    once().min(once())
+}
+
+/// The six coordinates in every sample.
 fn motion(scene: &Scene) -> Result<Vec<[f64; 6]>, String> {
     let mut all = Vec::new();
     sim::run::run(scene, &mut |s: &Sample| {
@@ -141,72 +193,73 @@ fn motion(scene: &Scene) -> Result<Vec<[f64; 6]>, String> {
     Ok(all)
 }
 
-/// Runs the scene as it is, then with each freedom held; also the cost of a simulated second, ms.
-fn try_freedoms(scene: &Scene) -> (Vec<Trial>, f64) {
+/// Runs the scene as it is, then with each freedom held.
+fn try_freedoms(scene: &Scene) -> Vec<Trial> {
     let mut scene = scene.clone();
-    scene.duration_s = scene.duration_s.min(TRIAL_S);
-    scene.effects.imu = None;
-    let began = Instant::now();
+    // Instruments watch a motion and change none.
+    for effect in TABLE.iter().filter(|e| ["imu", "drum"].contains(&e.name)) {
+        (effect.switch_off)(&mut scene.effects);
+    }
     let Ok(full) = motion(&scene) else {
-        return (Vec::new(), f64::NAN);
+        return Vec::new();
     };
-    let ms_per_s = began.elapsed().as_secs_f64() * 1e3 / scene.duration_s;
-    let trials = Freedom::ALL
+    Freedom::ALL
         .iter()
         .enumerate()
         .filter(|(_, f)| scene.freedom.contains(f))
         .map(|(i, f)| {
-            let mean = full.iter().map(|s| s[i]).sum::<f64>() / full.len() as f64;
-            let excursion = (full.iter().map(|s| (s[i] - mean).powi(2)).sum::<f64>()
-                / full.len() as f64)
-                .sqrt();
+            let count = full.len() as f64;
+            let mean = full.iter().map(|s| s[i]).sum::<f64>() / count;
+            let square = full.iter().map(|s| (s[i] - mean).powi(2)).sum::<f64>();
             let mut fewer = scene.clone();
             fewer.freedom.retain(|g| g != f);
             let held = sim::scene::check(&fewer)
                 .map_err(|p| p.message)
                 .and_then(|()| motion(&fewer))
                 .map(|held| {
-                    let worst = |c: usize| {
+                    let worst = |apart: &dyn Fn(&[f64; 6], &[f64; 6]) -> f64| {
                         full.iter()
                             .zip(&held)
-                            .map(|(a, b)| (a[c] - b[c]).abs())
+                            .map(|(a, b)| apart(a, b).abs())
                             .fold(0.0, f64::max)
                     };
-                    (worst(3), worst(2))
+                    // Angles a turn apart are the same.
+                    let turn = std::f64::consts::TAU;
+                    let roll = |a: &[f64; 6], b: &[f64; 6]| {
+                        let apart = a[3] - b[3];
+                        apart - turn * (apart / turn).round()
+                    };
+                    (worst(&roll), worst(&|a, b| a[2] - b[2]))
                 });
             Trial {
                 name: format!("{f:?}").to_lowercase(),
-                excursion,
+                excursion: (square / count).sqrt(),
                 held,
             }
-        });
-    (trials.collect(), ms_per_s)
+        })
+        .collect()
 }
 
 fn number(x: f64) -> Value {
     if x.is_finite() { json!(x) } else { Value::Null }
 }
 
-fn as_json(
-    scene: &Scene,
-    model: &Model,
-    effects: &[Effect],
-    trials: &[Trial],
-    rhs_ns: f64,
-    ms_per_s: f64,
-) -> Value {
+fn as_json(found: &Findings) -> Value {
     json!({
-        "scene": scene.name,
-        "state": { "size": model.layout().size(), "names": model.state_names() },
-        "effects": effects.iter().map(|e| json!({
+        "scene": found.scene.name,
+        "state": { "size": found.model.layout().size(), "names": found.model.state_names() },
+        "effects": found.effects.iter().map(|e| json!({
             "name": e.name,
             "on": e.on,
             "adds_state": e.adds_state,
             "cost_ns": e.cost_ns.map_or(Value::Null, number),
+            "share": e.cost_ns.map_or(Value::Null, |c| number(c / found.rhs_ns)),
+            "without_ms_per_simulated_s": e.without_ms.map_or(Value::Null, number),
         })).collect::<Vec<_>>(),
-        "rhs_ns": number(rhs_ns),
-        "ms_per_simulated_s": number(ms_per_s),
-        "freedoms": trials.iter().map(|t| json!({
+        "rhs_ns": number(found.rhs_ns),
+        "ms_per_simulated_s": number(found.ms_per_s),
+        "trial_s": number(found.trial_s),
+        "freedoms": found.freedoms.iter().map(|t| json!({
             "name": t.name,
             "rms": number(t.excursion),
             "held_error_roll_rad": t.held.as_ref().map_or(Value::Null, |h| number(h.0)),
@@ -216,50 +269,54 @@ fn as_json(
     })
 }
 
-fn print(
-    out: &mut impl Write,
-    scene: &Scene,
-    model: &Model,
-    effects: &[Effect],
-    trials: &[Trial],
-    rhs_ns: f64,
-    ms_per_s: f64,
-) -> std::io::Result<()> {
-    writeln!(out, "{}: {}", scene.name, scene.about)?;
+fn as_table(found: &Findings) -> String {
+    let mut out = format!("{}: {}\n\n", found.scene.name, found.scene.about);
+    // Writing to a string cannot fail.
+    let _ = write_effects(&mut out, found).and_then(|()| write_freedoms(&mut out, found));
+    out
+}
+
+fn write_effects(out: &mut String, found: &Findings) -> std::fmt::Result {
     writeln!(
         out,
-        "\n{:<18} {:<4} {:>6} {:>9}  what it is",
-        "effect", "", "states", "cost, ns"
+        "{:<17} {:<3} {:>6} {:>8} {:>6} {:>11}  what it is",
+        "effect", "", "states", "cost, ns", "share", "without, ms"
     )?;
-    for e in effects {
-        let cost = e.cost_ns.map_or(String::new(), |c| format!("{c:.0}"));
-        let states = if e.on {
-            e.adds_state.to_string()
-        } else {
-            String::new()
-        };
+    for e in found.effects.iter().filter(|e| e.on) {
+        // What costs nothing can be measured as a little less than nothing.
+        let cost = e
+            .cost_ns
+            .map_or(String::new(), |c| format!("{:.0}", c.max(0.0)));
+        let share = e.cost_ns.map_or(String::new(), |c| {
+            format!("{:.0} %", 100.0 * c.max(0.0) / found.rhs_ns)
+        });
+        let without = e.without_ms.map_or(String::new(), |ms| format!("{ms:.3}"));
         writeln!(
             out,
-            "{:<18} {:<4} {states:>6} {cost:>9}  {}",
-            e.name,
-            if e.on { "on" } else { "-" },
-            e.about
+            "{:<17} on  {:>6} {cost:>8} {share:>6} {without:>11}  {}",
+            e.name, e.adds_state, e.about
         )?;
+    }
+    for e in found.effects.iter().filter(|e| !e.on) {
+        writeln!(out, "{:<17} -   {:36}{}", e.name, "", e.about)?;
     }
     writeln!(
         out,
-        "\none right-hand side: {rhs_ns:.0} ns; a simulated second: {ms_per_s:.3} ms (one core)"
+        "\ncost: one right-hand side takes {:.0} ns, so much of it is the effect's; a simulated second takes {:.3} ms on one core,\n\
+         'without' what it takes without the effect (the motion is another then)",
+        found.rhs_ns, found.ms_per_s
     )?;
-    let names = model.state_names();
-    writeln!(out, "state, {}: {}", names.len(), shortened(&names))?;
+    let names = found.model.state_names();
+    writeln!(out, "state, {}: {}", names.len(), shortened(&names))
+}
+
+fn write_freedoms(out: &mut String, found: &Findings) -> std::fmt::Result {
     writeln!(
         out,
         "\n{:<8} {:>12}  held instead: worst error within {:.0} s",
-        "freedom",
-        "RMS",
-        scene.duration_s.min(TRIAL_S)
+        "freedom", "RMS", found.trial_s
     )?;
-    for (i, t) in trials.iter().enumerate() {
+    for t in &found.freedoms {
         let linear = ["x", "y", "height"].contains(&t.name.as_str());
         let excursion = if linear {
             format!("{:.4} m", t.excursion)
@@ -270,9 +327,25 @@ fn print(
             Ok((roll, z)) => format!("roll {:.3} deg, height {:.5} m", roll.to_degrees(), z),
             Err(reason) => reason.clone(),
         };
-        writeln!(out, "{:<8} {excursion:>12}  {held}", trials[i].name)?;
+        writeln!(out, "{:<8} {excursion:>12}  {held}", t.name)?;
     }
-    Ok(())
+    let idle: Vec<&str> = found
+        .freedoms
+        .iter()
+        .filter(|t| matches!(t.held, Ok((roll, z)) if roll < LITTLE.0 && z < LITTLE.1))
+        .map(|t| t.name.as_str())
+        .collect();
+    if idle.is_empty() {
+        return writeln!(
+            out,
+            "none could be held with less than 1 deg and 5 mm of error"
+        );
+    }
+    writeln!(
+        out,
+        "each could be held alone with less than 1 deg and 5 mm of error: {}",
+        idle.join(", ")
+    )
 }
 
 fn shortened(names: &[String]) -> String {

@@ -6,6 +6,7 @@ mod record;
 mod scenes;
 
 use clap::Subcommand;
+use std::io::Write;
 use std::process::ExitCode;
 
 /// What `sim` can do.
@@ -35,5 +36,13 @@ pub fn run(command: Command) -> ExitCode {
             eprintln!("sim: {error:#}");
             ExitCode::from(1)
         }
+    }
+}
+
+/// Prints a result; a pipe that was closed early (`sim scenes | head -1`) is no error of ours.
+fn print(text: &str) -> anyhow::Result<()> {
+    match std::io::stdout().lock().write_all(text.as_bytes()) {
+        Err(e) if e.kind() != std::io::ErrorKind::BrokenPipe => Err(e.into()),
+        _ => Ok(()),
     }
 }

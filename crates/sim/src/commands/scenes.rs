@@ -1,17 +1,22 @@
 //! `sim scenes`: what comes with the program.
 
 use anyhow::{Result, anyhow};
-use sim::scene::{BUILTIN, SceneError, builtin, json_schema, load, parse};
-use std::io::Write;
+use sim::scene::{BUILTIN, SceneError, builtin, json_schema, load, parse, to_toml};
 
 /// Arguments of `sim scenes`.
 #[derive(clap::Args)]
-#[command(
-    after_help = "Examples:\n  sim scenes\n  sim scenes music\n  sim scenes music > mine.toml && sim record mine.toml"
-)]
+#[command(after_help = "Examples:
+  sim scenes
+  sim scenes music
+  sim scenes music > mine.toml && sim record mine.toml
+  sim scenes music --set effects.music.beat_hz=2.3 > faster.toml
+  sim scenes --schema > scene.schema.json")]
 pub struct Args {
     /// Print this scene as TOML.
     name: Option<String>,
+    /// Change a value of the scene, which is then printed with every default; may be repeated.
+    #[arg(long, value_name = "KEY=VALUE", requires = "name")]
+    set: Vec<String>,
     /// Print the JSON Schema of scenes, for editors that check TOML.
     #[arg(long, conflicts_with = "name")]
     schema: bool,
@@ -21,6 +26,7 @@ pub struct Args {
 pub fn run(args: &Args) -> Result<()> {
     let mut text = String::new();
     match &args.name {
+        Some(name) if !args.set.is_empty() => text += &to_toml(&load(name, &args.set)?),
         Some(name) => match builtin(name) {
             Some(toml) => text += toml,
             // `load` knows how to say that there is no such scene, and which is near.
@@ -46,9 +52,5 @@ pub fn run(args: &Args) -> Result<()> {
             }
         }
     }
-    // A closed pipe (`sim scenes | head -1`) is no error of ours.
-    match std::io::stdout().lock().write_all(text.as_bytes()) {
-        Err(e) if e.kind() != std::io::ErrorKind::BrokenPipe => Err(e.into()),
-        _ => Ok(()),
-    }
+    super::print(&text)
 }

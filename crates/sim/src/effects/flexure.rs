@@ -83,7 +83,7 @@ impl Flexure {
             stiffness: self.modal_mass_kg * w * w,
             damping: 2.0 * self.damping_ratio * self.modal_mass_kg * w,
         };
-        model.set_flexure(law.clone());
+        model.add(Stage::Bends, Bent(law.clone()));
         model.add(Stage::Body, law.clone());
         model.add_account("flexure", law);
     }
@@ -98,16 +98,19 @@ struct Pole {
 
 /// Every pole of a scene.
 #[derive(Clone, Debug)]
-pub(crate) struct Bending {
+struct Bending {
     poles: Vec<Pole>,
     mass: f64,
     stiffness: f64,
     damping: f64,
 }
 
-impl Bending {
-    /// Moves the handles by the deflection.
-    pub(crate) fn bend(&self, w: &mut Workspace) {
+/// What the deflection does to the handles.
+#[derive(Debug)]
+struct Bent(Bending);
+
+impl Term for Bent {
+    fn apply(&self, _t_s: f64, w: &mut Workspace) {
         let r = w.rotation;
         let [ux, uy, uz] = r.map(|row| row[2]);
         let [wx, wy, wz] =
@@ -117,7 +120,7 @@ impl Bending {
             [ux, uy, uz],
             [wy * uz - wz * uy, wz * ux - wx * uz, wx * uy - wy * ux],
         );
-        for pole in &self.poles {
+        for pole in &self.0.poles {
             let (q, rate) = (w.extra[pole.first], w.extra[pole.first + 1]);
             for (p, shape) in w.pair.iter_mut().zip(&pole.shape) {
                 for axis in 0..3 {
@@ -130,6 +133,7 @@ impl Bending {
     }
 }
 
+/// What the forces do to the deflection.
 impl Term for Bending {
     fn apply(&self, _t_s: f64, w: &mut Workspace) {
         let [ux, uy, uz] = w.rotation.map(|row| row[2]);

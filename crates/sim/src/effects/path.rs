@@ -67,10 +67,7 @@ impl Path {
     }
 
     /// Gravity as the sloping ground sees it.
-    pub(crate) fn lean(&self, gravity: [f64; 3]) -> [f64; 3] {
-        if self.slope_deg == 0.0 && self.bank_deg == 0.0 {
-            return gravity;
-        }
+    fn lean(&self, gravity: [f64; 3]) -> [f64; 3] {
         let size = gravity.iter().map(|g| g * g).sum::<f64>().sqrt();
         let (s, b) = (self.slope_deg.to_radians(), self.bank_deg.to_radians());
         [
@@ -81,6 +78,9 @@ impl Path {
     }
 
     pub(super) fn build(&self, scene: &Scene, model: &mut Model) {
+        if self.slope_deg != 0.0 || self.bank_deg != 0.0 {
+            model.lean(self.lean(scene.body.gravity_m_per_s2));
+        }
         if self.turn_deg == 0.0 {
             return;
         }

@@ -60,9 +60,8 @@ impl Turning for Hinge {
             place: free.and_then(|a| rails.place[3 + a]),
             in_body,
             in_world,
-            inverse_moment: free.map_or(0.0, |_| {
-                1.0 / dot(in_body, times(&rails.inertia, in_body))
-            }),
+            inverse_moment: free
+                .map_or(0.0, |_| 1.0 / dot(in_body, times(&rails.inertia, in_body))),
             handles: handles.collect(),
             rotation: [0, 1, 2].map(|k| [0, 1, 2].map(|row| axes.map(|axis| axis[k][row]))),
         }

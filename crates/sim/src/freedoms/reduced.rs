@@ -171,14 +171,7 @@ pub(super) trait Turning: Send + Sync {
     /// Fills `rotation` and `spin` of the workspace and places the handles; `motion` of the centre of mass as in [`super::place_handles`].
     fn gaps(&self, rails: &Rails, y: &[f64], motion: [[f64; 3]; 2], w: &mut Workspace);
     /// Writes the second derivatives of the free angles; `torque` of the handle forces in the world (N·m).
-    fn accelerate(
-        &self,
-        rails: &Rails,
-        torque: [f64; 3],
-        y: &[f64],
-        w: &Workspace,
-        dy: &mut [f64],
-    );
+    fn accelerate(&self, rails: &Rails, torque: [f64; 3], y: &[f64], w: &Workspace, dy: &mut [f64]);
     /// Columns of J: what one rad/s of roll, of tilt, of yaw adds to ω; those of held angles are not read.
     fn columns(&self, rails: &Rails, y: &[f64]) -> [[f64; 3]; 3];
     /// J̇ (φ̇, θ̇, ψ̇)

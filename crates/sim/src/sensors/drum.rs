@@ -8,7 +8,7 @@
 //! The recorder's own clock: sample k is taken at k/(rate (1 + drift)) true time and stamped offset + k/rate. Source: the usual model of a
 //! membrane struck once, Fletcher & Rossing, *The Physics of Musical Instruments* (1998), ch. 18.
 
-use crate::effects::music::Stroke;
+use crate::beat::Stroke;
 use crate::random::{Stream, normal_pair};
 use std::f64::consts::TAU;
 
