@@ -113,12 +113,13 @@ def music(axis):
 
 
 def noise(axis):
-    for seed in range(1, 13):
-        t, phase = phases("duration_s = 60.0\n" + ONE + "[effects.noise]\n", f"seed={seed}")
-        axis.plot(t, phase - TAU * 2 * t, color=BLUE, lw=0.7)
-    for sign in (1, -1):
-        axis.plot(t, sign * 0.01 * np.sqrt(t), color=RED, label="±σ√t, σ = 0.01 rad/√s" if sign > 0 else None)
-    axis.set(xlabel="time (s)", ylabel="φ − ωt (rad), 12 seeds")
+    text = "duration_s = 60.0\n[carriers]\n[carriers.along_poles]\ncount = 1000\n[effects.noise]\n"
+    t, phase = phases(text, of=lambda m: np.array(m.phase_rad))
+    wander = phase - TAU * 2 * t[:, None]
+    axis.plot(t, wander[:, :15], color=BLUE, lw=0.5)
+    axis.plot(t, wander.std(axis=1), color="black", lw=2, label="standard deviation of 1000 carriers")
+    axis.plot(t, 0.01 * np.sqrt(t), color=RED, lw=1, label="σ√t, σ = 0.01 rad/√s")
+    axis.set(xlabel="time (s)", ylabel="φ − ωt (rad)", ylim=(-0.22, 0.28))
 
 
 def feedback(axis):
@@ -149,7 +150,7 @@ def gait(axis):
     shake = "effects.gait.harmonics=[{ order = 4, amplitude_m = [0.0, 0.0, 0.012] }]"
     t, z = shoulder(text, shake)
     axis.plot(t, z, color=ORANGE, label="and a shake of order 4, 12 mm")
-    axis.set(xlabel="time (s)", ylabel="shoulder (m)")
+    axis.set(xlabel="time (s)", ylabel="shoulder (m)", ylim=(0.92, 1.1))
 
 
 def lift(axis):
@@ -179,12 +180,12 @@ turn_time_s = 20.0
     axis.plot(p[:, 0], p[:, 1], color=BLUE, lw=0.8, label="centre of mass")
     for x, y, yaw in p[::150]:
         dx, dy = 2.45 * np.cos(yaw), 2.45 * np.sin(yaw)
-        axis.plot([x - dx, x + dx], [y - dy, y + dy], color=ORANGE, lw=2)
+        axis.plot([x - dx, x + dx], [y - dy, y + dy], color=ORANGE, lw=3, alpha=0.6)
     axis.set(xlabel="x (m)", ylabel="y (m)", aspect="equal")
 
 
 def contact(axis):
-    text = "duration_s = 3.0\nlog_rate_hz = 2000.0\n[start]\nheight_m = 1.1\n[effects.contact]\n"
+    text = "duration_s = 0.55\nlog_rate_hz = 4000.0\n[start]\nheight_m = 1.0\n[effects.contact]\n"
     laws = (
         ("spring–damper", BLUE, []),
         ("bilateral", GREY, ["effects.contact.bilateral=true"]),
@@ -194,7 +195,7 @@ def contact(axis):
         _, p = forces(text, *settings, of=lambda m: (m.compression_m[0], m.normal_n[0]))
         axis.plot(1e3 * p[:, 0], p[:, 1], color=colour, lw=1, label=label)
     axis.axhline(0, color="black", lw=0.5)
-    axis.set(xlabel="compression δ (mm)", ylabel="N of one handle (N)")
+    axis.set(xlabel="compression δ (mm): dropped from −100", ylabel="N of one handle (N)")
 
 
 def hold(axis):
@@ -215,15 +216,16 @@ def sling(axis):
 
 
 def friction(axis):
-    text = "duration_s = 6.0\nlog_rate_hz = 200.0\nfreedom = [\"x\"]\n[start]\nheight_m = 0.9\nvelocity_m_per_s = [1.0, 0.0, 0.0]\n[effects.contact]\n[effects.friction]\n[effects.path]\nslope_deg = 10.0\n"
+    text = "duration_s = 6.0\nlog_rate_hz = 200.0\nfreedom = [\"x\"]\n[start]\nheight_m = 0.8\nvelocity_m_per_s = [1.0, 0.0, 0.0]\n[effects.contact]\n[effects.friction]\n[effects.path]\nslope_deg = 5.0\n"
     for law, colour in (("regularised", BLUE), ("bristle", GREEN)):
         t, x = state(text, f'effects.friction.law="{law}"', of=lambda m: m.position_m.x)
         axis.plot(t, 1e3 * x, color=colour, label=law)
-    axis.set(xlabel="time (s)", ylabel="body along a slope of 10° (mm)")
+    axis.set(xlabel="time (s)", ylabel="body up a slope of 5° (mm)")
+    axis.set_ylim(bottom=0)
 
 
 def pole_friction(axis):
-    text = "duration_s = 20.0\nfreedom = [\"roll\"]\n[start]\nheight_m = 0.9\n[effects.contact]\n[effects.sling]\n[effects.pole_friction]\n"
+    text = "duration_s = 20.0\nfreedom = [\"roll\"]\n[effects.contact]\n[effects.sling]\n[effects.pole_friction]\n"
     for start, colour in ((1.0, GREEN), (10.0, BLUE), (40.0, ORANGE)):
         t, roll = state(text, f"start.roll_pitch_yaw_deg=[{start}, 0.0, 0.0]", of=lambda m: m.roll_rad)
         axis.plot(t, np.degrees(roll) / start, color=colour, lw=1, label=f"from {start:g}°")
@@ -251,10 +253,12 @@ def allan(x, rate, sizes):
 
 def imu_noise(axis):
     text = "duration_s = 3600.0\nlog_rate_hz = 0.01\n[effects.contact]\n[effects.imu]\nrate_hz = 50.0\nsensors = [{ on = \"rath\" }]\n"
-    _, f = column(record(text, topics=["/imu/rath"])["/imu/rath"], lambda m: (m.linear_acceleration.x, m.linear_acceleration.y))
-    sizes = np.unique(np.geomspace(1, 20000, 40).astype(int))
+    sensed = record(text, topics=["/imu/rath"])["/imu/rath"]
+    _, f = column(sensed, lambda m: (m.linear_acceleration.x, m.linear_acceleration.y, m.linear_acceleration.z))
+    sizes = np.unique(np.geomspace(1, 5000, 40).astype(int))
+    seen = np.sqrt(np.mean([allan(f[:, a], 50.0, sizes) ** 2 for a in range(3)], axis=0))
     tau = sizes / 50.0
-    axis.loglog(tau, allan(f[:, 0], 50.0, sizes), color=BLUE, label="accelerometer, 1 h at rest")
+    axis.loglog(tau, seen, color=BLUE, label="accelerometer, 1 h at rest")
     axis.loglog(tau, 2.0e-3 / np.sqrt(tau), color=RED, lw=1, label="$D/\\sqrt{τ}$")
     axis.loglog(tau, 3.0e-3 * np.sqrt(tau / 3), color=ORANGE, lw=1, label="$W\\sqrt{τ/3}$")
     axis.set(xlabel="averaging time τ (s)", ylabel="Allan deviation (m/s²)", ylim=(8e-4, 0.1))

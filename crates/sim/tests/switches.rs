@@ -3,7 +3,7 @@
 mod common;
 
 use common::scene;
-use sim::effects::TABLE;
+use sim::effects::{Entry, TABLE};
 use sim::model::{Model, Workspace};
 use sim::scene::Scene;
 
@@ -47,6 +47,18 @@ fn everything() -> Scene {
     )
 }
 
+/// The scene without an effect, and without what cannot be without it.
+fn without(scene: &Scene, effect: &Entry) -> Scene {
+    let mut fewer = scene.clone();
+    (effect.switch_off)(&mut fewer.effects);
+    match effect.name {
+        "gait" => fewer.effects.lift = None,
+        "music" => fewer.effects.drum = None,
+        _ => {}
+    }
+    fewer
+}
+
 /// Every number that a term can write.
 fn written(model: &Model, w: &Workspace) -> Vec<(String, u64)> {
     let mut out: Vec<(String, u64)> = Vec::new();
@@ -80,14 +92,7 @@ fn switching_one_effect_off_leaves_the_others_as_they_are() {
             if by_definition.contains(&(kept.name, other.name)) {
                 continue;
             }
-            let mut without = full.clone();
-            (other.switch_off)(&mut without.effects);
-            if other.name == "gait" {
-                without.effects.lift = None;
-            }
-            if other.name == "music" {
-                without.effects.drum = None;
-            }
+            let without = without(&full, other);
             let (a, b) = (Model::new(&full), Model::new(&without));
             let evaluated = |m: &Model| {
                 let (y, mut w) = (m.initial_state(), m.workspace());
@@ -140,6 +145,42 @@ fn switching_one_effect_off_leaves_the_others_as_they_are() {
                     );
                 }
             }
+        }
+    }
+}
+
+/// What is fixed for a segment, natural frequency and noise, is the business of those two effects alone.
+#[test]
+fn what_a_segment_fixes_depends_on_no_other_effect() {
+    let full = everything();
+    let fixed = |scene: &Scene, t_s: f64| -> [f64; 3] {
+        let model = Model::new(scene);
+        let mut w = model.workspace();
+        model.begin_segment(t_s, &mut w);
+        [0, 1, 2].map(|i| w.of(i, |p| p.constant_rate))
+    };
+    let entry = |name: &str| TABLE.iter().find(|e| e.name == name).unwrap();
+    let (spread, noise) = (entry("frequency_spread"), entry("noise"));
+    for t_s in [0.0, 0.7, 12.3] {
+        for other in TABLE
+            .iter()
+            .filter(|o| ![spread.name, noise.name].contains(&o.name))
+        {
+            assert_eq!(
+                fixed(&full, t_s).map(f64::to_bits),
+                fixed(&without(&full, other), t_s).map(f64::to_bits),
+                "with and without `{}`",
+                other.name
+            );
+        }
+        // Those two are a sum, so what one adds is the same to rounding.
+        let steady = without(&full, noise);
+        let (even, bare) = (without(&full, spread), without(&steady, spread));
+        let [all, steady, even, bare] = [&full, &steady, &even, &bare].map(|s| fixed(s, t_s));
+        for i in 0..3 {
+            let apart = (all[i] - steady[i]) - (even[i] - bare[i]);
+            assert!(apart.abs() < 1e-13, "{apart:e}");
+            assert!(all[i] != steady[i] && all[i] != even[i]);
         }
     }
 }

@@ -96,6 +96,9 @@ impl Freedoms for Pinned {
     fn energy_j(&self, y: &[f64]) -> [f64; 2] {
         self.six.energy_j(y)
     }
+    fn rotation(&self) -> Option<[usize; 2]> {
+        self.six.rotation()
+    }
     fn scales(&self) -> &[f64] {
         self.six.scales()
     }
