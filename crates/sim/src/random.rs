@@ -15,6 +15,8 @@ pub enum Stream {
     PhaseNoise = 3,
     /// Sensor noise.
     Sensor = 4,
+    /// Points of a study's design.
+    Design = 5,
 }
 
 /// One block of Philox4x32 with ten rounds.

@@ -1,12 +1,16 @@
 //! One scene under many seeds: runs in parallel, results in the order of the seeds.
 
+use crate::pool::in_order;
 use crate::statistics::correlation;
 use analyze::inputs::{Inputs, Window};
 use analyze::metrics::metrics_of;
-use rayon::prelude::*;
-use sim::run::{Sample, run};
+use sim::model::Model;
+use sim::run::{Listener, Sample, run_model, settings};
 use sim::scene::Scene;
-use sim::solve::{Stats, Stopped};
+use sim::sensors::Reading;
+use sim::solve::{Stats, Stopped, method};
+use std::convert::Infallible;
+use std::sync::atomic::AtomicBool;
 
 /// The metrics that an ensemble keeps of each run.
 pub const KEPT: &[&str] = &[
@@ -88,6 +92,43 @@ impl Columns {
         for (column, p) in i.phase_rad.iter_mut().zip(&s.phase_rad) {
             column.push(*p);
         }
+        if !s.phase_rad.is_empty() {
+            i.beat_phase_rad.push(s.beat_phase_rad.unwrap_or(f64::NAN));
+        }
+    }
+}
+
+/// Runs a scene and collects what the analyzer takes; `also` sees every sample too and may stop the run.
+pub fn observe(
+    scene: &Scene,
+    most_evaluations: Option<u64>,
+    also: &mut dyn Listener,
+) -> (Inputs, Stats, Result<(), Stopped>) {
+    let model = Model::new(scene);
+    let method = method(&scene.solver.method).expect("a checked scene names a method");
+    let mut settings = settings(scene);
+    settings.most_evaluations = most_evaluations.unwrap_or(settings.most_evaluations);
+    let mut both = Both {
+        columns: Columns::new(scene),
+        also,
+    };
+    let (stats, outcome) = run_model(&model, method, &settings, &mut both);
+    (both.columns.inputs, stats, outcome)
+}
+
+struct Both<'a> {
+    columns: Columns,
+    also: &'a mut dyn Listener,
+}
+
+impl Listener for Both<'_> {
+    fn sample(&mut self, sample: &Sample) -> bool {
+        self.columns.push(sample);
+        self.also.sample(sample)
+    }
+
+    fn reading(&mut self, reading: &Reading<'_>) {
+        self.also.reading(reading);
     }
 }
 
@@ -96,14 +137,10 @@ impl Columns {
 /// # Errors
 /// [`Stopped`] when the run does not reach its end.
 pub fn run_one(scene: &Scene) -> Result<Run, Stopped> {
-    let mut columns = Columns::new(scene);
-    let stats = run(scene, &mut |s: &Sample| {
-        columns.push(s);
-        true
-    })?;
-    let inputs = &columns.inputs;
+    let (inputs, stats, outcome) = observe(scene, None, &mut |_: &Sample| true);
+    outcome?;
     let window = Window::from(scene.analysis_start_s);
-    let found = metrics_of(inputs, window, |name| KEPT.contains(&name));
+    let found = metrics_of(&inputs, window, |name| KEPT.contains(&name));
     let metrics = KEPT
         .iter()
         .map(|name| {
@@ -124,31 +161,20 @@ pub fn run_one(scene: &Scene) -> Result<Run, Stopped> {
     })
 }
 
-/// Runs `scene` once for every seed, on `jobs` threads (0: one per core). `done` is called after each run, in any order;
-/// returning `false` from it skips the runs that have not begun. The results are in the order of the seeds.
-///
-/// # Errors
-/// When the threads cannot be had.
+/// Runs every scene on `jobs` threads (0: one per core); the results are in their order. `done` is called after each run;
+/// when `stop` is set the rest is left out.
 pub fn run_all(
     scenes: &[Scene],
     jobs: usize,
-    done: impl Fn() -> bool + Sync,
-) -> Result<Vec<Option<Result<Run, Stopped>>>, rayon::ThreadPoolBuildError> {
-    let pool = rayon::ThreadPoolBuilder::new().num_threads(jobs).build()?;
-    let going = std::sync::atomic::AtomicBool::new(true);
-    let relaxed = std::sync::atomic::Ordering::Relaxed;
-    Ok(pool.install(|| {
-        scenes
-            .par_iter()
-            .map(|scene| {
-                going.load(relaxed).then(|| {
-                    let result = run_one(scene);
-                    if !done() {
-                        going.store(false, relaxed);
-                    }
-                    result
-                })
-            })
-            .collect()
-    }))
+    stop: &AtomicBool,
+    mut done: impl FnMut(),
+) -> Vec<Result<Run, Stopped>> {
+    let mut out = Vec::with_capacity(scenes.len());
+    let work = |k: u64| run_one(&scenes[k as usize]);
+    let Ok(()) = in_order::<_, Infallible>(scenes.len() as u64, jobs, stop, work, |_, run| {
+        out.push(run);
+        done();
+        Ok(())
+    });
+    out
 }

@@ -2,4 +2,6 @@
 
 pub mod ensemble;
 pub mod paper;
+pub mod pool;
 pub mod statistics;
+pub mod sweep;

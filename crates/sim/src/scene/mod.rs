@@ -10,7 +10,9 @@ mod parse;
 pub use builtin::{BUILTIN, builtin};
 pub(crate) use check::{Checker, problem};
 pub use check::{Problem, check};
-pub use parse::{SceneError, json_schema, load, nearest, parse, to_toml};
+pub use parse::{
+    SceneError, Template, from_toml, json_schema, load, nearest, parse, setting_value, to_toml,
+};
 
 use crate::effects::Effects;
 use schemars::JsonSchema;

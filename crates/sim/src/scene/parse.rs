@@ -65,8 +65,7 @@ pub fn load(name_or_path: &str, settings: &[String]) -> Result<Scene, SceneError
 /// # Errors
 /// As [`load`].
 pub fn parse(origin: &str, text: &str, settings: &[String]) -> Result<Scene, SceneError> {
-    let scene: Scene = toml::from_str(text)
-        .map_err(|e| located(origin, text, e.span(), &readable(e.message())))?;
+    let scene: Scene = from_toml(origin, text)?;
     let mut scene = if settings.is_empty() {
         scene
     } else {
@@ -97,6 +96,17 @@ pub fn parse(origin: &str, text: &str, settings: &[String]) -> Result<Scene, Sce
     Ok(scene)
 }
 
+/// Reads anything from TOML with errors as readable as a scene's: line and column, and the nearest name after a slip.
+///
+/// # Errors
+/// [`SceneError::At`].
+pub fn from_toml<T: serde::de::DeserializeOwned>(
+    origin: &str,
+    text: &str,
+) -> Result<T, SceneError> {
+    toml::from_str(text).map_err(|e| located(origin, text, e.span(), &readable(e.message())))
+}
+
 /// The scene as TOML, complete with every default.
 pub fn to_toml(scene: &Scene) -> String {
     // OK because every field of a scene is a TOML value and keys are strings.
@@ -117,6 +127,89 @@ pub fn nearest<'a>(word: &str, names: impl Iterator<Item = &'a str>) -> Option<&
         .map(|(_, n)| n)
 }
 
+/// A scene that is about to be changed many times: its keys are looked up in a table that is made once.
+#[derive(Clone, Debug)]
+pub struct Template {
+    origin: String,
+    text: String,
+    table: toml::Table,
+}
+
+impl Template {
+    /// Reads a built-in scene or a file and changes it by `settings`, as [`load`] does.
+    ///
+    /// # Errors
+    /// As [`load`].
+    pub fn load(name_or_path: &str, settings: &[String]) -> Result<Self, SceneError> {
+        let scene = load(name_or_path, settings)?;
+        Ok(Self::of(name_or_path, &scene))
+    }
+
+    /// A template of a scene; `origin` names it in errors.
+    pub fn of(origin: &str, scene: &Scene) -> Self {
+        let text = to_toml(scene);
+        Self {
+            origin: origin.into(),
+            // OK because the text was made from a table a moment ago.
+            table: toml::from_str(&text).expect("TOML that was just written is TOML"),
+            text,
+        }
+    }
+
+    /// The scene that this is a template of, as TOML with every default.
+    pub fn text(&self) -> &str {
+        &self.text
+    }
+
+    /// What stands at a dotted key.
+    pub fn value(&self, key: &str) -> Option<&toml::Value> {
+        let mut parts = key.split('.');
+        let first = self.table.get(parts.next()?)?;
+        parts.try_fold(first, |value, part| match value {
+            toml::Value::Table(inner) => inner.get(part),
+            toml::Value::Array(items) => items.get(part.parse::<usize>().ok()?),
+            _ => None,
+        })
+    }
+
+    /// The scene with other values at some dotted keys, checked.
+    ///
+    /// # Errors
+    /// As [`load`]: unknown key, wrong type, a value that a scene may not have.
+    pub fn with<'a>(
+        &self,
+        values: impl IntoIterator<Item = (&'a str, toml::Value)>,
+    ) -> Result<Scene, SceneError> {
+        let fail = |message: String| SceneError::Value {
+            origin: self.origin.clone(),
+            message,
+        };
+        let mut table = self.table.clone();
+        let mut keys: Vec<&str> = Vec::new();
+        for (key, value) in values {
+            let path: Vec<&str> = key.split('.').collect();
+            set_key(&mut table, &path, value).map_err(|m| fail(format!("{key}: {m}")))?;
+            keys.push(key);
+        }
+        let mut scene: Scene = table.try_into().map_err(|e: toml::de::Error| {
+            fail(format!("{}: {}", keys.join(", "), readable(e.message())))
+        })?;
+        scene
+            .expand()
+            .and_then(|()| check(&scene))
+            .map_err(|problem| fail(format!("{}: {}", problem.key, problem.message)))?;
+        Ok(scene)
+    }
+}
+
+/// The value of a setting: TOML, or a string where it is not.
+pub fn setting_value(text: &str) -> toml::Value {
+    toml::from_str::<toml::Table>(&format!("x = {text}"))
+        .ok()
+        .and_then(|mut t| t.remove("x"))
+        .unwrap_or_else(|| toml::Value::String(text.into()))
+}
+
 /// Applies `a.b.c=value` settings; the value is TOML, or a string where it is not.
 fn apply(scene: Scene, settings: &[String]) -> Result<Scene, SceneError> {
     let fail = |message: String| SceneError::Value {
@@ -132,12 +225,9 @@ fn apply(scene: Scene, settings: &[String]) -> Result<Scene, SceneError> {
             )));
         };
         let (key, value) = (key.trim(), value.trim());
-        let parsed = toml::from_str::<toml::Table>(&format!("x = {value}"))
-            .ok()
-            .and_then(|mut t| t.remove("x"))
-            .unwrap_or_else(|| toml::Value::String(value.into()));
         let path: Vec<&str> = key.split('.').collect();
-        set_key(&mut table, &path, parsed).map_err(|m| fail(format!("{key}: {m}")))?;
+        set_key(&mut table, &path, setting_value(value))
+            .map_err(|m| fail(format!("{key}: {m}")))?;
         // One setting at a time, so that the message names the setting at fault.
         let _: Scene = toml::Table::try_into(table.clone())
             .map_err(|e: toml::de::Error| fail(format!("{setting}: {}", readable(e.message()))))?;

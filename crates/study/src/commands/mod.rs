@@ -1,30 +1,51 @@
-//! What `study` can do.
+//! What `study` can do: one file per subcommand.
 
+mod merge;
 mod paper;
+mod status;
+mod submit;
+mod sweep;
 
-use clap::Parser;
-use std::path::PathBuf;
+use anyhow::{Context, Result};
+use clap::{CommandFactory, Parser, Subcommand};
+use indicatif::{ProgressBar, ProgressStyle};
+use std::ffi::OsString;
+use std::io::Write;
+use std::path::Path;
 use std::process::ExitCode;
+use std::sync::atomic::{AtomicBool, Ordering};
 
 /// Runs many scenes and puts them into one table.
 #[derive(Parser)]
 #[command(name = "study", version, after_help = EXAMPLES)]
-pub struct Args {
-    /// The study: `paper`.
-    name: String,
-    /// Seeds per condition, from 1001 on.
-    #[arg(long, value_name = "N")]
-    seeds: Option<u64>,
-    /// Threads; 0 is one per core. The result does not depend on it.
-    #[arg(long, value_name = "N", default_value_t = 0)]
-    jobs: usize,
-    /// A folder for the result's files (paper.json, paper.txt, runs.csv).
-    #[arg(long, value_name = "DIR")]
-    out: Option<PathBuf>,
-    /// What to print.
-    #[arg(long, value_enum, default_value_t = Format::Table)]
-    format: Format,
+struct Args {
+    #[command(subcommand)]
+    command: Command,
 }
+
+#[derive(Subcommand)]
+enum Command {
+    /// Table 1 of the paper: both conditions, thirty seeds each.
+    Paper(paper::Args),
+    /// Run a study file: `study FILE.toml` is short for it.
+    Run(sweep::Args),
+    /// Say how far a study is.
+    Status(status::Args),
+    /// Put the parts of a study together.
+    Merge(merge::Args),
+    /// Hand a study to a scheduler.
+    Submit(submit::Args),
+}
+
+const EXAMPLES: &str = "Examples:
+  study paper                              Table 1 of the paper, beside the paper's own
+  study tongue.toml                        a sweep of your own: results in the folder `tongue`
+  study tongue.toml --resume               go on where it stopped
+  study tongue.toml --shard 3/8            the third eighth of it, on any machine
+  study status tongue
+  study merge tongue                       all parts into tongue/runs.parquet
+  study submit tongue.toml --tasks 8       the same on Slurm
+docs/studies.md says what a study file may hold.";
 
 /// What stdout gets.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, clap::ValueEnum)]
@@ -35,24 +56,23 @@ pub enum Format {
     Json,
 }
 
-const EXAMPLES: &str = "Examples:
-  study paper                       Table 1 of the paper, beside the paper's own
-  study paper --format json --jobs 1
-  study paper --seeds 5 --out results";
-
-/// Runs the command.
+/// Runs the command; errors go to stderr, one sentence first, then the causes.
 pub fn run() -> ExitCode {
-    let args = Args::parse();
-    let outcome = match args.name.as_str() {
-        "paper" => paper::run(&args),
-        other => {
-            let hint = sim::scene::nearest(other, ["paper"].into_iter())
-                .map(|n| format!(" Did you mean `{n}`?"));
-            Err(anyhow::anyhow!(
-                "there is no study `{other}`.{} There is: paper",
-                hint.unwrap_or_default()
-            ))
+    let mut words: Vec<OsString> = std::env::args_os().collect();
+    if let Some(first) = words.get(1).map(|w| w.to_string_lossy().into_owned()) {
+        if is_file(&first) {
+            words.insert(1, "run".into());
+        } else if let Some(message) = unknown(&first) {
+            eprintln!("study: {message}");
+            return ExitCode::from(1);
         }
+    }
+    let outcome = match Args::parse_from(words).command {
+        Command::Paper(args) => paper::run(&args),
+        Command::Run(args) => sweep::run(&args),
+        Command::Status(args) => status::run(&args),
+        Command::Merge(args) => merge::run(&args),
+        Command::Submit(args) => submit::run(&args),
     };
     match outcome {
         Ok(()) => ExitCode::SUCCESS,
@@ -61,4 +81,61 @@ pub fn run() -> ExitCode {
             ExitCode::from(1)
         }
     }
+}
+
+/// Whether a first word is meant as a study file.
+fn is_file(word: &str) -> bool {
+    let path = Path::new(word);
+    !word.starts_with('-')
+        && (path.extension().is_some() || word.contains(std::path::MAIN_SEPARATOR) || path.is_file())
+}
+
+/// What to say to a first word that is neither a file nor a command.
+fn unknown(word: &str) -> Option<String> {
+    let command = Args::command();
+    let names = || command.get_subcommands().map(clap::Command::get_name);
+    if word.starts_with('-') || word == "help" || names().any(|n| n == word) {
+        return None;
+    }
+    let hint = sim::scene::nearest(word, names())
+        .map_or(String::new(), |n| format!(" Did you mean `{n}`?"));
+    Some(format!(
+        "there is no study `{word}`.{hint} There are: {}; or give the path of a .toml file",
+        names().collect::<Vec<_>>().join(", ")
+    ))
+}
+
+/// A flag that ctrl-C sets; a second ctrl-C ends the program at once.
+fn watch_interrupts() -> Result<&'static AtomicBool> {
+    static INTERRUPTED: AtomicBool = AtomicBool::new(false);
+    ctrlc::set_handler(|| {
+        if INTERRUPTED.swap(true, Ordering::Relaxed) {
+            std::process::exit(1);
+        }
+    })
+    .context("ctrl-C cannot be watched")?;
+    Ok(&INTERRUPTED)
+}
+
+/// A bar on a terminal, nothing elsewhere.
+fn progress(runs: u64) -> Result<ProgressBar> {
+    let bar = ProgressBar::new(runs);
+    bar.set_style(ProgressStyle::with_template(
+        "{wide_bar} {pos}/{len} runs, {per_sec}, {eta} left",
+    )?);
+    Ok(bar)
+}
+
+/// Prints a result; a closed pipe is no error of ours.
+fn print(text: &str) -> Result<()> {
+    match std::io::stdout().lock().write_all(text.as_bytes()) {
+        Err(e) if e.kind() != std::io::ErrorKind::BrokenPipe => Err(e.into()),
+        _ => Ok(()),
+    }
+}
+
+/// Writes a file whole or not at all.
+fn write_whole(path: &Path, bytes: &[u8]) -> Result<()> {
+    study::sweep::parts::write_whole(path, |file| Ok(file.write_all(bytes)?))
+        .map_err(anyhow::Error::msg)
 }

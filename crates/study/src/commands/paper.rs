@@ -1,15 +1,35 @@
 //! `study paper`: Table 1.
 
-use super::{Args, Format};
+use super::{Format, print, write_whole};
 use anyhow::{Context, Result, bail};
-use indicatif::{ProgressBar, ProgressStyle};
 use sim::scene::{Scene, load};
-use std::io::Write;
-use std::path::Path;
-use std::sync::atomic::{AtomicBool, Ordering};
+use std::path::PathBuf;
 use std::time::Instant;
 use study::ensemble::{KEPT, Run, run_all};
 use study::paper::{CONDITIONS, Condition, FIRST_SEED, RUNS, table, to_json};
+
+/// Arguments of `study paper`.
+#[derive(clap::Args)]
+#[command(after_help = EXAMPLES)]
+pub struct Args {
+    /// Seeds per condition, from 1001 on.
+    #[arg(long, value_name = "N")]
+    seeds: Option<u64>,
+    /// Threads; 0 is one per core. The result does not depend on it.
+    #[arg(long, value_name = "N", default_value_t = 0)]
+    jobs: usize,
+    /// A folder for the result's files (paper.json, paper.txt, runs.csv).
+    #[arg(long, value_name = "DIR")]
+    out: Option<PathBuf>,
+    /// What to print.
+    #[arg(long, value_enum, default_value_t = Format::Table)]
+    format: Format,
+}
+
+const EXAMPLES: &str = "Examples:
+  study paper                       Table 1 of the paper, beside the paper's own
+  study paper --format json --jobs 1
+  study paper --seeds 5 --out results";
 
 /// Runs both conditions and prints them beside the paper's table.
 pub fn run(args: &Args) -> Result<()> {
@@ -28,30 +48,23 @@ pub fn run(args: &Args) -> Result<()> {
             )?);
         }
     }
-    static INTERRUPTED: AtomicBool = AtomicBool::new(false);
-    ctrlc::set_handler(|| INTERRUPTED.store(true, Ordering::Relaxed))
-        .context("ctrl-C cannot be watched")?;
-
-    let bar = ProgressBar::new(scenes.len() as u64);
-    bar.set_style(ProgressStyle::with_template(
-        "{wide_bar} {pos}/{len} runs, {eta} left",
-    )?);
-    let results = run_all(&scenes, args.jobs, || {
-        bar.inc(1);
-        !INTERRUPTED.load(Ordering::Relaxed)
-    })?;
+    let stop = super::watch_interrupts()?;
+    let bar = super::progress(scenes.len() as u64)?;
+    let results = run_all(&scenes, args.jobs, stop, || bar.inc(1));
     bar.finish_and_clear();
+    if results.len() < scenes.len() {
+        bail!(
+            "interrupted after {} of {} runs; nothing was written",
+            results.len(),
+            scenes.len()
+        );
+    }
 
     let mut runs = Vec::with_capacity(results.len());
     for (scene, result) in scenes.iter().zip(results) {
         match result {
-            Some(Ok(run)) => runs.push(run),
-            Some(Err(error)) => bail!("{} seed {}: {error}", scene.name, scene.seed),
-            None => bail!(
-                "interrupted after {} of {} runs; nothing was written",
-                runs.len(),
-                scenes.len()
-            ),
+            Ok(run) => runs.push(run),
+            Err(error) => bail!("{} seed {}: {error}", scene.name, scene.seed),
         }
     }
     let mut rest = runs.into_iter();
@@ -83,10 +96,7 @@ pub fn run(args: &Args) -> Result<()> {
         "{} runs in {wall_s:.2} s",
         conditions.iter().map(|c| c.runs.len()).sum::<usize>()
     );
-    match std::io::stdout().lock().write_all(result.as_bytes()) {
-        Err(e) if e.kind() != std::io::ErrorKind::BrokenPipe => Err(e.into()),
-        _ => Ok(()),
-    }
+    print(&result)
 }
 
 /// One line per run.
@@ -117,13 +127,4 @@ fn csv(conditions: &[Condition]) -> String {
         }
     }
     out
-}
-
-/// Writes a file whole or not at all.
-fn write_whole(path: &Path, bytes: &[u8]) -> Result<()> {
-    let part = path.with_extension("part");
-    std::fs::write(&part, bytes)
-        .and_then(|()| std::fs::rename(&part, path))
-        .inspect_err(|_| drop(std::fs::remove_file(&part)))
-        .with_context(|| format!("{}: cannot be written", path.display()))
 }

@@ -1,0 +1,205 @@
+//! `study FILE.toml`: a sweep, or a shard of one.
+
+use super::{Format, print, progress, watch_interrupts};
+use anyhow::{Result, anyhow, bail};
+use serde_json::json;
+use std::path::{Path, PathBuf};
+use std::sync::atomic::Ordering;
+use std::time::{Duration, Instant};
+use study::sweep::Plan;
+use study::sweep::parts::Store;
+use study::sweep::shard::Shard;
+use study::sweep::summary::Summary;
+
+/// Arguments of `study FILE.toml`.
+#[derive(clap::Args)]
+#[command(after_help = EXAMPLES)]
+pub struct Args {
+    /// The study file (docs/studies.md).
+    file: PathBuf,
+    /// Runs of every point, instead of the file's own `seeds`.
+    #[arg(long, value_name = "N")]
+    seeds: Option<u64>,
+    /// Threads; 0 is one per core. The result does not depend on it.
+    #[arg(long, value_name = "N", default_value_t = 0)]
+    jobs: usize,
+    /// The study's folder. Default: the file's name without `.toml`, here.
+    #[arg(long, value_name = "DIR")]
+    out: Option<PathBuf>,
+    /// Compute only part K of N, and leave what is there already; `merge` puts all parts together.
+    /// Slurm, AWS Batch and PBS say K and N by themselves, Kubernetes says K.
+    #[arg(long, value_name = "K/N")]
+    shard: Option<String>,
+    /// N of `--shard`, where the scheduler says only K.
+    #[arg(long, value_name = "N", conflicts_with = "shard")]
+    shards: Option<u64>,
+    /// Go on where an earlier run of the same study stopped.
+    #[arg(long)]
+    resume: bool,
+    /// What to print.
+    #[arg(long, value_enum, default_value_t = Format::Table)]
+    format: Format,
+}
+
+const EXAMPLES: &str = "Examples:
+  study tongue.toml
+  study tongue.toml --jobs 1 --out results
+  study tongue.toml --resume
+  study tongue.toml --shard 3/8 --out /shared/tongue";
+
+/// The folder of a study where none is named.
+pub fn folder(file: &Path, out: Option<&PathBuf>) -> PathBuf {
+    out.cloned().unwrap_or_else(|| {
+        let stem = PathBuf::from(file.file_stem().unwrap_or_default());
+        // A study that stands in its own folder goes on there.
+        match file.parent() {
+            Some(parent) if stem.as_os_str() == "study" && parent.join("parts").is_dir() => {
+                parent.into()
+            }
+            _ => stem,
+        }
+    })
+}
+
+/// Reads a plan; its errors are sentences already.
+pub fn plan(file: &Path) -> Result<Plan> {
+    Plan::load(file).map_err(anyhow::Error::msg)
+}
+
+/// Computes what is missing, and merges when all is there.
+pub fn run(args: &Args) -> Result<()> {
+    let mut plan = plan(&args.file)?;
+    if let Some(seeds) = args.seeds {
+        if seeds == 0 {
+            bail!("--seeds is 0; at least one run of every point is needed");
+        }
+        plan = plan.with_seeds(seeds).map_err(anyhow::Error::msg)?;
+    }
+    let out = folder(&args.file, args.out.as_ref());
+    let store = Store::new(&plan, &out);
+    let sentence = |e: String| anyhow!(e);
+
+    let told = Shard::of_environment(args.shards, |name| std::env::var(name).ok());
+    let shard = match &args.shard {
+        Some(text) => Some(Shard::parse(text).map_err(|e| anyhow!("--shard: {e}"))?),
+        None => told.map_err(sentence)?.map(|(shard, name)| {
+            eprintln!("shard {shard}, as {name} says");
+            shard
+        }),
+    };
+    let mine = shard.unwrap_or(Shard::WHOLE);
+    let there = store.progress(mine).map_err(sentence)?;
+    if there.runs > 0 && shard.is_none() && !args.resume {
+        bail!(
+            "{} holds {} of the {} runs of this study; --resume goes on, --out DIR begins elsewhere",
+            out.display(),
+            there.runs,
+            plan.runs()
+        );
+    }
+    store.create().map_err(sentence)?;
+
+    let began = Instant::now();
+    let size = |blocks: &[u64]| -> u64 {
+        blocks.iter().map(|b| plan.block(*b)).map(|r| r.end - r.start).sum()
+    };
+    let left = size(&there.missing);
+    let stop = watch_interrupts()?;
+    let bar = progress(left)?;
+    let (mut finished, mut said) = (0u64, Instant::now());
+    let written = store
+        .compute(&there.missing, args.jobs, stop, || {
+            bar.inc(1);
+            finished += 1;
+            // Where there is no terminal, a log gets a line a minute.
+            if bar.is_hidden() && said.elapsed() > Duration::from_secs(60) {
+                said = Instant::now();
+                let rate = finished as f64 / began.elapsed().as_secs_f64();
+                eprintln!(
+                    "{finished} of {left} runs, {rate:.1}/s, {:.0} s left",
+                    (left - finished) as f64 / rate
+                );
+            }
+        })
+        .map_err(sentence)?;
+    bar.finish_and_clear();
+    if stop.load(Ordering::Relaxed) && written.runs < left {
+        bail!(
+            "interrupted: {} of {} runs are kept in {}; `study {} --resume --out {}` goes on",
+            there.runs + written.runs,
+            there.runs + left,
+            out.display(),
+            args.file.display(),
+            out.display()
+        );
+    }
+    let wall_s = began.elapsed().as_secs_f64();
+    eprintln!(
+        "{} runs in {wall_s:.2} s ({:.1}/s), {} without a result{}",
+        written.runs,
+        written.runs as f64 / wall_s.max(1e-9),
+        written.failed,
+        match there.runs {
+            0 => String::new(),
+            n => format!("; {n} were there already"),
+        }
+    );
+    if shard.is_some() {
+        eprintln!("`study merge {}` puts the parts together when all are there", out.display());
+        return Ok(());
+    }
+    report(&plan, &store, args.format)
+}
+
+/// Merges and prints.
+pub fn report(plan: &Plan, store: &Store, format: Format) -> Result<()> {
+    let summary = store.merge().map_err(anyhow::Error::msg)?;
+    let table = store.table();
+    eprintln!("{}: {} rows; summary.csv beside it", table.display(), summary.runs);
+    let indices = study::sweep::sensitivity::indices(plan, &summary);
+    print(&match format {
+        Format::Table => {
+            let mut text = summary.table();
+            if let Some(indices) = &indices {
+                text += &study::sweep::sensitivity::table(indices);
+            }
+            text
+        }
+        Format::Json => format!("{:#}\n", json(plan, &summary, &table, indices.as_ref())),
+    })
+}
+
+fn json(
+    plan: &Plan,
+    summary: &Summary,
+    table: &Path,
+    indices: Option<&Vec<study::sweep::sensitivity::Index>>,
+) -> serde_json::Value {
+    let metrics: serde_json::Map<String, serde_json::Value> = summary
+        .metrics
+        .iter()
+        .enumerate()
+        .map(|(k, name)| {
+            let means: Vec<f64> = summary
+                .points
+                .iter()
+                .filter_map(|p| p.metrics[k].map(|s| s.mean))
+                .collect();
+            let of = |f: fn(f64, f64) -> f64| means.iter().copied().reduce(f);
+            let entry = json!({
+                "lowest": of(f64::min), "highest": of(f64::max), "points": means.len(),
+            });
+            (name.clone(), entry)
+        })
+        .collect();
+    json!({
+        "study": plan.spec.name,
+        "table": table.display().to_string(),
+        "points": plan.points(),
+        "runs": summary.runs,
+        "failed": summary.failures,
+        "reasons": summary.reasons,
+        "metrics": metrics,
+        "sensitivity": indices.map(|all| study::sweep::sensitivity::to_json(all)),
+    })
+}

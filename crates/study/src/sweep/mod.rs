@@ -1,0 +1,361 @@
+//! Sweeps: a study file becomes a plan, the plan's runs become rows.
+
+pub mod design;
+pub mod parts;
+pub mod sensitivity;
+pub mod shard;
+pub mod sobol;
+pub mod spec;
+pub mod summary;
+pub mod table;
+
+use crate::ensemble::observe;
+use analyze::inputs::Window;
+use analyze::metrics::{Metric, find, metrics_of};
+use design::Points;
+use recording::write::{RecordingWriter, WriterOptions};
+use sim::model::Model;
+use sim::record::{Recorder, VERSION};
+use sim::run::{Listener, Sample};
+use sim::scene::{Scene, Template};
+use sim::sensors::Reading;
+use sim::solve::Stats;
+use spec::{Spec, flatten, number};
+use std::ops::Range;
+use std::panic::AssertUnwindSafe;
+use std::path::Path;
+use table::{Cell, Column, Kind};
+
+/// Columns that every table of runs has, beside axes and metrics.
+pub const FIXED_COLUMNS: &[&str] = &[
+    "run",
+    "point",
+    "seed",
+    "steps",
+    "rejected",
+    "evaluations",
+    "events",
+    "failed",
+    "version",
+];
+
+/// Work after which a run is given up: a thousand times what a minute of the paper's scenes takes.
+const MOST_EVALUATIONS: u64 = 100_000_000;
+
+/// A study, ready to run: what run `k` is follows from `k` alone.
+pub struct Plan {
+    /// The file, as it was read.
+    pub spec: Spec,
+    points: Points,
+    template: Template,
+    /// What goes along with each axis: key and factor.
+    along: Vec<Vec<(String, f64)>>,
+    /// Axes whose key holds a whole number.
+    whole: Vec<bool>,
+    columns: Vec<Column>,
+    metrics: Vec<&'static Metric>,
+}
+
+impl Plan {
+    /// Reads a study file.
+    ///
+    /// # Errors
+    /// One sentence: the file, the place in it, what is wrong and what was expected.
+    pub fn load(path: &Path) -> Result<Self, String> {
+        let origin = path.display().to_string();
+        let text = std::fs::read_to_string(path)
+            .map_err(|e| format!("cannot read the study {origin}: {e}"))?;
+        let mut spec = spec::parse(&origin, &text)?;
+        if spec.name.is_empty() {
+            let stem = path.file_stem().unwrap_or_default();
+            spec.name = stem.to_string_lossy().into_owned();
+        }
+        let folder = path.parent().unwrap_or(Path::new(""));
+        Self::new(spec, folder).map_err(|e| format!("{origin}: {e}"))
+    }
+
+    /// The plan of a checked study; a scene's path is looked for in `folder`.
+    ///
+    /// # Errors
+    /// One sentence.
+    pub fn new(spec: Spec, folder: &Path) -> Result<Self, String> {
+        let mut set: Vec<String> = flatten(&spec.set)
+            .iter()
+            .map(|(key, value)| format!("{key}={value}"))
+            .collect();
+        // Nobody reads an energy account here; without it the motion is the same and costs less.
+        if !spec.recordings && !set.iter().any(|s| s.starts_with("solver.energy=")) {
+            set.push("solver.energy=false".into());
+        }
+        let scene = match sim::scene::builtin(&spec.scene) {
+            Some(_) => spec.scene.clone(),
+            None if folder.join(&spec.scene).exists() => {
+                folder.join(&spec.scene).display().to_string()
+            }
+            None => spec.scene.clone(),
+        };
+        let template = Template::load(&scene, &set)
+            .map_err(|e| format!("scene: {e}").replace("scene: --set: ", "set: "))?;
+        for axis in &spec.axes {
+            try_axis(axis, &template)?;
+        }
+        let whole = |axis: &spec::Axis| template.value(&axis.key).is_some_and(toml::Value::is_integer);
+        let metrics: Vec<&Metric> = spec.metrics.iter().filter_map(|m| find(m)).collect();
+        Ok(Self {
+            points: Points::new(&spec)?,
+            along: spec
+                .axes
+                .iter()
+                .map(|a| {
+                    let factor = |(key, value): (String, toml::Value)| Some((key, number(&value)?));
+                    flatten(&a.along).into_iter().filter_map(factor).collect()
+                })
+                .collect(),
+            whole: spec.axes.iter().map(whole).collect(),
+            columns: columns(&spec, &metrics),
+            metrics,
+            template,
+            spec,
+        })
+    }
+
+    /// The same with another number of runs for every point.
+    ///
+    /// # Errors
+    /// When that makes too many.
+    pub fn with_seeds(mut self, seeds: u64) -> Result<Self, String> {
+        self.spec.seeds = seeds;
+        self.points = Points::new(&self.spec)?;
+        Ok(self)
+    }
+
+    /// How many runs there are.
+    pub fn runs(&self) -> u64 {
+        self.points.len() * self.spec.seeds
+    }
+
+    /// How many points there are.
+    pub fn points(&self) -> u64 {
+        self.points.len()
+    }
+
+    /// The columns of the table.
+    pub fn columns(&self) -> &[Column] {
+        &self.columns
+    }
+
+    /// The study as a file that stands by itself beside [`Plan::scene_text`]: what tells one study from another.
+    pub fn text(&self) -> String {
+        let spec = Spec {
+            scene: "scene.toml".into(),
+            ..self.spec.clone()
+        };
+        // OK because every field is a TOML value.
+        toml::to_string(&spec).expect("a study is always expressible in TOML")
+    }
+
+    /// The base scene, complete, with what the study sets for all runs.
+    pub fn scene_text(&self) -> &str {
+        self.template.text()
+    }
+
+    /// Runs are kept and skipped in blocks of this many: at most 256 files up to a million runs, whoever computes them.
+    pub fn block_runs(&self) -> u64 {
+        self.runs().div_ceil(256).clamp(16, 4096)
+    }
+
+    /// How many blocks there are.
+    pub fn blocks(&self) -> u64 {
+        self.runs().div_ceil(self.block_runs())
+    }
+
+    /// The runs of a block.
+    pub fn block(&self, block: u64) -> Range<u64> {
+        let first = block * self.block_runs();
+        first..(first + self.block_runs()).min(self.runs())
+    }
+
+    /// The values of the axes at a point.
+    pub fn values(&self, point: u64) -> Vec<toml::Value> {
+        let mut values = self.points.values(point);
+        for (value, whole) in values.iter_mut().zip(&self.whole) {
+            if let (true, toml::Value::Float(x)) = (*whole, &*value) {
+                *value = toml::Value::Integer(x.round() as i64);
+            }
+        }
+        values
+    }
+
+    /// The scene of a run.
+    ///
+    /// # Errors
+    /// Why there is no such scene.
+    pub fn scene(&self, run: u64) -> Result<Scene, String> {
+        let values = self.values(run / self.spec.seeds);
+        let along = self.along.iter().zip(&values).flat_map(|(along, value)| {
+            let base = number(value);
+            along.iter().filter_map(move |(key, factor)| {
+                Some((key.as_str(), toml::Value::Float(base? * factor)))
+            })
+        });
+        let own = self.spec.axes.iter().zip(&values);
+        let own = own.map(|(axis, value)| (axis.key.as_str(), value.clone()));
+        let mut scene = self
+            .template
+            .with(own.chain(along))
+            .map_err(|e| e.to_string())?;
+        scene.seed = self.seed(run);
+        Ok(scene)
+    }
+
+    fn seed(&self, run: u64) -> u64 {
+        self.spec.first_seed + run % self.spec.seeds
+    }
+
+    /// Runs one run: its row, which says why where there is no result. A recording goes into `recordings` where one is named.
+    pub fn run(&self, run: u64, recordings: Option<&Path>) -> Vec<Cell> {
+        let outcome = std::panic::catch_unwind(AssertUnwindSafe(|| self.measure(run, recordings)));
+        let (metrics, stats, failed) = outcome.unwrap_or_else(|cause| {
+            let text = cause
+                .downcast_ref::<String>()
+                .map(String::as_str)
+                .or_else(|| cause.downcast_ref::<&str>().copied())
+                .unwrap_or("no message");
+            (Vec::new(), None, Some(format!("the program broke off: {text}")))
+        });
+        // OK because all these counts are far below 2^63.
+        let whole = |n: u64| Cell::Whole(n as i64);
+        let mut row = vec![whole(run), whole(run / self.spec.seeds)];
+        for (value, column) in self.values(run / self.spec.seeds).iter().zip(&self.columns[2..]) {
+            row.push(match column.kind {
+                Kind::Real => number(value).map_or(Cell::Empty, Cell::Real),
+                Kind::Truth => value.as_bool().map_or(Cell::Empty, Cell::Truth),
+                _ => Cell::Text(value.as_str().map_or_else(|| value.to_string(), str::to_owned)),
+            });
+        }
+        row.push(whole(self.seed(run)));
+        row.extend(metrics);
+        row.resize(3 + self.spec.axes.len() + self.metrics.len(), Cell::Empty);
+        let work = |of: fn(&Stats) -> u64| stats.as_ref().map_or(Cell::Empty, |s| whole(of(s)));
+        row.extend([
+            work(|s| s.steps),
+            work(|s| s.rejected),
+            work(|s| s.evaluations),
+            work(|s| s.events),
+        ]);
+        row.push(failed.map_or(Cell::Empty, Cell::Text));
+        row.push(Cell::Text(VERSION.into()));
+        row
+    }
+
+    fn measure(
+        &self,
+        run: u64,
+        recordings: Option<&Path>,
+    ) -> (Vec<Cell>, Option<Stats>, Option<String>) {
+        let scene = match self.scene(run) {
+            Ok(scene) => scene,
+            Err(reason) => return (Vec::new(), None, Some(reason)),
+        };
+        let model;
+        let mut keeper = Keeper(None);
+        if let Some(folder) = recordings {
+            model = Model::new(&scene);
+            let path = folder.join(format!("run-{run:09}.mcap"));
+            let recorder = RecordingWriter::create(&path, &WriterOptions::default())
+                .and_then(|writer| Recorder::new(&model, writer));
+            match recorder {
+                Ok(recorder) => keeper.0 = Some(recorder),
+                Err(error) => return (Vec::new(), None, Some(error.to_string())),
+            }
+        }
+        let (inputs, stats, outcome) = observe(&scene, Some(MOST_EVALUATIONS), &mut keeper);
+        // The writer knows best why it stopped a run.
+        let kept = keeper.0.map_or(Ok(()), |r| r.finish().map_err(|e| e.to_string()));
+        if let Err(reason) = kept.and(outcome.map_err(|e| e.to_string())) {
+            return (Vec::new(), Some(stats), Some(reason));
+        }
+        let wanted = |name: &str| self.metrics.iter().any(|m| m.name == name);
+        let found = metrics_of(&inputs, Window::from(scene.analysis_start_s), wanted);
+        let cell = |metric: &&Metric| {
+            found.get(metric.name).map_or(Cell::Empty, |value| {
+                let real = value.as_f64().map(Cell::Real);
+                real.or_else(|| value.as_bool().map(Cell::Truth))
+                    .or_else(|| value.as_word().map(|w| Cell::Text(w.into())))
+                    .unwrap_or(Cell::Empty)
+            })
+        };
+        (self.metrics.iter().map(cell).collect(), Some(stats), None)
+    }
+}
+
+struct Keeper<'m>(Option<Recorder<'m>>);
+
+impl Listener for Keeper<'_> {
+    fn sample(&mut self, sample: &Sample) -> bool {
+        self.0.as_mut().is_none_or(|r| r.sample(sample))
+    }
+
+    fn reading(&mut self, reading: &Reading<'_>) {
+        if let Some(recorder) = &mut self.0 {
+            recorder.reading(reading);
+        }
+    }
+}
+
+/// A key that no value can be given to is a slip; a value that a scene may not have is a row with its reason.
+fn try_axis(axis: &spec::Axis, template: &Template) -> Result<(), String> {
+    let ends = match axis.is_sampled() {
+        true => [axis.at(0.0).into(), axis.at(1.0).into()],
+        false => [axis.value(0), axis.value(axis.len() - 1)],
+    };
+    let whole = template.value(&axis.key).is_some_and(toml::Value::is_integer);
+    let mut why = Ok(());
+    for value in ends {
+        let value = match value {
+            toml::Value::Float(x) if whole => toml::Value::Integer(x.round() as i64),
+            other => other,
+        };
+        match template.with([(axis.key.as_str(), value)]) {
+            Ok(_) => return Ok(()),
+            Err(error) => why = why.and(Err(format!("axis `{}`: {error}", axis.key))),
+        }
+    }
+    why
+}
+
+fn columns(spec: &Spec, metrics: &[&Metric]) -> Vec<Column> {
+    let column = |name: &str, kind, unit: &str| Column {
+        name: name.into(),
+        kind,
+        unit: unit.into(),
+    };
+    let mut out = vec![
+        column("run", Kind::Whole, ""),
+        column("point", Kind::Whole, ""),
+    ];
+    for axis in &spec.axes {
+        let kind = match &axis.values {
+            values if values.iter().all(|v| number(v).is_some()) => Kind::Real,
+            values if values.iter().all(toml::Value::is_bool) => Kind::Truth,
+            _ => Kind::Text,
+        };
+        out.push(column(&axis.name, kind, ""));
+    }
+    out.push(column("seed", Kind::Whole, ""));
+    for metric in metrics {
+        let kind = match metric.unit {
+            "bool" => Kind::Truth,
+            "-" => Kind::Text,
+            _ => Kind::Real,
+        };
+        let unit = if kind == Kind::Real { metric.unit } else { "" };
+        out.push(column(metric.name, kind, unit));
+    }
+    for name in ["steps", "rejected", "evaluations", "events"] {
+        out.push(column(name, Kind::Whole, ""));
+    }
+    out.push(column("failed", Kind::Text, ""));
+    out.push(column("version", Kind::Text, ""));
+    out
+}

@@ -1,0 +1,264 @@
+//! The folder of a study: parts that appear whole, and the table that they make together.
+//!
+//! ```text
+//! DIR/study.toml, DIR/scene.toml     the study and its base scene, complete: `study DIR/study.toml` repeats it anywhere
+//! DIR/parts/000000000-000000016.parquet …   runs 0 … 15 …, written by whoever computed them
+//! DIR/runs.parquet                   all of them, by `merge`
+//! ```
+//! The blocks follow from the study alone, so the parts are the same files for any number of threads and any sharding.
+
+use super::Plan;
+use super::shard::Shard;
+use super::summary::Summary;
+use super::table::{Cell, Notes, Reader, Writer};
+use crate::pool::in_order;
+use parquet::errors::ParquetError;
+use sim::record::VERSION;
+use std::io::Write;
+use std::path::{Path, PathBuf};
+use std::sync::atomic::AtomicBool;
+
+/// Rows of a row group of the merged table.
+const GROUP_ROWS: usize = 16_384;
+
+/// A study's folder.
+pub struct Store<'p> {
+    plan: &'p Plan,
+    folder: PathBuf,
+}
+
+/// What there is of a study.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub struct Progress {
+    /// Blocks without a part.
+    pub missing: Vec<u64>,
+    /// Runs in parts.
+    pub runs: u64,
+    /// Of these, runs without a result.
+    pub failed: u64,
+}
+
+/// What writing a block's parts came to.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Written {
+    /// Parts.
+    pub parts: u64,
+    /// Runs in them.
+    pub runs: u64,
+    /// Of these, runs without a result.
+    pub failed: u64,
+}
+
+type Outcome<T> = Result<T, String>;
+
+impl<'p> Store<'p> {
+    /// The folder of `plan`; nothing is made yet.
+    pub fn new(plan: &'p Plan, folder: &Path) -> Self {
+        Self {
+            plan,
+            folder: folder.into(),
+        }
+    }
+
+    /// The merged table.
+    pub fn table(&self) -> PathBuf {
+        self.folder.join("runs.parquet")
+    }
+
+    fn part(&self, block: u64) -> PathBuf {
+        let range = self.plan.block(block);
+        let name = format!("{:09}-{:09}.parquet", range.start, range.end);
+        self.folder.join("parts").join(name)
+    }
+
+    fn notes(&self) -> Notes {
+        vec![
+            ("study".into(), self.plan.text()),
+            ("scene".into(), self.plan.scene_text().into()),
+            ("version".into(), VERSION.into()),
+        ]
+    }
+
+    /// Makes the folder and writes the study into it.
+    ///
+    /// # Errors
+    /// What the system says.
+    pub fn create(&self) -> Outcome<()> {
+        let parts = self.folder.join("parts");
+        std::fs::create_dir_all(&parts)
+            .map_err(|e| format!("{}: cannot be made: {e}", parts.display()))?;
+        for (name, text) in [
+            ("study.toml", self.plan.text()),
+            ("scene.toml", self.plan.scene_text().to_owned()),
+        ] {
+            let path = self.folder.join(name);
+            write_whole(&path, |file| Ok(file.write_all(text.as_bytes())?))?;
+        }
+        if self.plan.spec.recordings {
+            let kept = self.folder.join("recordings");
+            std::fs::create_dir_all(&kept)
+                .map_err(|e| format!("{}: cannot be made: {e}", kept.display()))?;
+        }
+        Ok(())
+    }
+
+    /// Which blocks of a shard are there.
+    ///
+    /// # Errors
+    /// A part that cannot be read, or that another study or another version of the program wrote.
+    pub fn progress(&self, shard: Shard) -> Outcome<Progress> {
+        let mut found = Progress::default();
+        let notes = self.notes();
+        for block in shard.of(self.plan.blocks()) {
+            let path = self.part(block);
+            if !path.exists() {
+                found.missing.push(block);
+                continue;
+            }
+            let say = |what: &str| format!("{}: {what}; choose another --out, or delete it", path.display());
+            let reader = Reader::open(&path).map_err(|e| say(&format!("is no part of a study: {e}")))?;
+            for (name, expected) in &notes {
+                if reader.note(name) != Some(expected) {
+                    return Err(say(match name.as_str() {
+                        "version" => "was written by another version of this program",
+                        "scene" => "is of the same study of another scene",
+                        _ => "is of another study",
+                    }));
+                }
+            }
+            let range = self.plan.block(block);
+            if reader.rows != range.end - range.start {
+                return Err(say(&format!("has {} of {} rows", reader.rows, range.end - range.start)));
+            }
+            found.runs += reader.rows;
+            found.failed += reader.note("failed").and_then(|n| n.parse().ok()).unwrap_or(0);
+        }
+        Ok(found)
+    }
+
+    /// Computes the blocks named; `done` is called after every run. When `stop` is set, whole parts stay and the rest is dropped.
+    ///
+    /// # Errors
+    /// A part that cannot be written.
+    pub fn compute(
+        &self,
+        blocks: &[u64],
+        jobs: usize,
+        stop: &AtomicBool,
+        mut done: impl FnMut(),
+    ) -> Outcome<Written> {
+        let recordings = self.folder.join("recordings");
+        let recordings = self.plan.spec.recordings.then_some(&*recordings);
+        let size = self.plan.block_runs();
+        // All blocks but the very last are of one size.
+        let runs: u64 = blocks.iter().map(|b| self.plan.block(*b)).map(|r| r.end - r.start).sum();
+        let mut written = Written::default();
+        let mut rows = Vec::new();
+        in_order(
+            runs,
+            jobs,
+            stop,
+            |k| {
+                let block = blocks[(k / size) as usize];
+                self.plan.run(self.plan.block(block).start + k % size, recordings)
+            },
+            |k, row| {
+                rows.push(row);
+                done();
+                let block = blocks[(k / size) as usize];
+                let range = self.plan.block(block);
+                if rows.len() as u64 == range.end - range.start {
+                    written.failed += self.write_part(block, &rows)?;
+                    written.parts += 1;
+                    written.runs += rows.len() as u64;
+                    rows.clear();
+                }
+                Ok::<(), String>(())
+            },
+        )?;
+        Ok(written)
+    }
+
+    fn write_part(&self, block: u64, rows: &[Vec<Cell>]) -> Outcome<u64> {
+        let place = self.plan.columns().len() - 2;
+        let failed = rows.iter().filter(|r| r[place] != Cell::Empty).count() as u64;
+        let mut notes = self.notes();
+        notes.push(("failed".into(), failed.to_string()));
+        write_whole(&self.part(block), |file| {
+            let mut writer = Writer::new(file, self.plan.columns(), &notes)?;
+            writer.group(rows)?;
+            writer.close()
+        })?;
+        Ok(failed)
+    }
+
+    /// Puts all parts together, in order, and summarises them on the way.
+    ///
+    /// # Errors
+    /// Missing or unreadable parts; a table that cannot be written.
+    pub fn merge(&self) -> Outcome<Summary> {
+        let progress = self.progress(Shard::WHOLE)?;
+        if let Some(first) = progress.missing.first() {
+            return Err(format!(
+                "{}: {} of {} parts are missing, the first is that of runs {:?}; `study {} --resume` computes them",
+                self.folder.display(),
+                progress.missing.len(),
+                self.plan.blocks(),
+                self.plan.block(*first),
+                self.folder.join("study.toml").display(),
+            ));
+        }
+        let mut summary = Summary::new(self.plan);
+        write_whole(&self.table(), |file| {
+            let mut writer = Writer::new(file, self.plan.columns(), &self.notes())?;
+            let mut rows: Vec<Vec<Cell>> = Vec::new();
+            for block in 0..self.plan.blocks() {
+                let part = Reader::open(&self.part(block))?;
+                for group in 0..part.groups() {
+                    for row in part.group(group)? {
+                        summary.row(&row);
+                        rows.push(row);
+                        if rows.len() == GROUP_ROWS {
+                            writer.group(&rows)?;
+                            rows.clear();
+                        }
+                    }
+                }
+            }
+            if !rows.is_empty() {
+                writer.group(&rows)?;
+            }
+            writer.close()
+        })?;
+        let csv = summary.csv();
+        let path = self.folder.join("summary.csv");
+        write_whole(&path, |file| Ok(file.write_all(csv.as_bytes())?))?;
+        Ok(summary)
+    }
+}
+
+/// [`analyze::whole::write_whole`] with its errors as sentences.
+///
+/// # Errors
+/// What the system or the table's library says.
+pub fn write_whole(
+    path: &Path,
+    fill: impl FnOnce(&mut std::fs::File) -> Result<(), ParquetError>,
+) -> Outcome<()> {
+    enum Trouble {
+        Io(std::io::Error),
+        Table(ParquetError),
+    }
+    impl From<std::io::Error> for Trouble {
+        fn from(e: std::io::Error) -> Self {
+            Self::Io(e)
+        }
+    }
+    analyze::whole::write_whole(path, |file| fill(file).map_err(Trouble::Table)).map_err(|t| {
+        let why = match t {
+            Trouble::Io(e) => e.to_string(),
+            Trouble::Table(e) => e.to_string(),
+        };
+        format!("{}: cannot be written: {why}", path.display())
+    })
+}
