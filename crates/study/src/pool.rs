@@ -32,7 +32,9 @@ pub fn in_order<T: Send, E>(
     let over = AtomicBool::new(false);
     let taken = Mutex::new(0u64);
     let moved = Condvar::new();
-    let jobs = threads(jobs).min(usize::try_from(count).unwrap_or(usize::MAX)).max(1);
+    let jobs = threads(jobs)
+        .min(usize::try_from(count).unwrap_or(usize::MAX))
+        .max(1);
     let window = AHEAD * jobs as u64;
     let ended = || over.load(Ordering::Relaxed) || stop.load(Ordering::Relaxed);
     std::thread::scope(|scope| {
@@ -106,7 +108,11 @@ mod tests {
                 },
             )
             .unwrap();
-            assert!(seen.iter().enumerate().all(|(k, (i, x))| *i == k as u64 && *x == i * i));
+            assert!(
+                seen.iter()
+                    .enumerate()
+                    .all(|(k, (i, x))| *i == k as u64 && *x == i * i)
+            );
             assert_eq!(seen.len(), 3000);
         }
     }
@@ -115,19 +121,31 @@ mod tests {
     fn a_stop_and_an_error_end_it() {
         let stop = AtomicBool::new(false);
         let mut seen = 0;
-        let ended = in_order(100_000, 2, &stop, |i| i, |i, _| {
-            seen += 1;
-            if i == 10 { Err("full") } else { Ok(()) }
-        });
+        let ended = in_order(
+            100_000,
+            2,
+            &stop,
+            |i| i,
+            |i, _| {
+                seen += 1;
+                if i == 10 { Err("full") } else { Ok(()) }
+            },
+        );
         assert_eq!((ended, seen), (Err("full"), 11));
         let mut seen = 0;
-        in_order::<_, Infallible>(100_000, 2, &stop, |i| i, |i, _| {
-            seen += 1;
-            if i == 10 {
-                stop.store(true, Ordering::Relaxed);
-            }
-            Ok(())
-        })
+        in_order::<_, Infallible>(
+            100_000,
+            2,
+            &stop,
+            |i| i,
+            |i, _| {
+                seen += 1;
+                if i == 10 {
+                    stop.store(true, Ordering::Relaxed);
+                }
+                Ok(())
+            },
+        )
         .unwrap();
         assert!((11..100_000).contains(&seen), "{seen}");
     }

@@ -141,15 +141,14 @@ impl Template {
     /// # Errors
     /// As [`load`].
     pub fn load(name_or_path: &str, settings: &[String]) -> Result<Self, SceneError> {
-        let scene = load(name_or_path, settings)?;
-        Ok(Self::of(name_or_path, &scene))
+        load(name_or_path, settings).map(|scene| Self::of(&scene))
     }
 
-    /// A template of a scene; `origin` names it in errors.
-    pub fn of(origin: &str, scene: &Scene) -> Self {
+    /// A template of a scene, whose name stands in errors: where it was read from does not matter to a run.
+    pub fn of(scene: &Scene) -> Self {
         let text = to_toml(scene);
         Self {
-            origin: origin.into(),
+            origin: scene.name.clone(),
             // OK because the text was made from a table a moment ago.
             table: toml::from_str(&text).expect("TOML that was just written is TOML"),
             text,

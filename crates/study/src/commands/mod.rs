@@ -2,6 +2,7 @@
 
 mod merge;
 mod paper;
+mod predictions;
 mod status;
 mod submit;
 mod sweep;
@@ -27,6 +28,8 @@ struct Args {
 enum Command {
     /// Table 1 of the paper: both conditions, thirty seeds each.
     Paper(paper::Args),
+    /// The paper's predictions, tried: statistics, figures, verdicts.
+    Predictions(predictions::Args),
     /// Run a study file: `study FILE.toml` is short for it.
     Run(sweep::Args),
     /// Say how far a study is.
@@ -39,6 +42,7 @@ enum Command {
 
 const EXAMPLES: &str = "Examples:
   study paper                              Table 1 of the paper, beside the paper's own
+  study predictions                        what the paper predicts, tried
   study tongue.toml                        a sweep of your own: results in the folder `tongue`
   study tongue.toml --resume               go on where it stopped
   study tongue.toml --shard 3/8            the third eighth of it, on any machine
@@ -69,6 +73,7 @@ pub fn run() -> ExitCode {
     }
     let outcome = match Args::parse_from(words).command {
         Command::Paper(args) => paper::run(&args),
+        Command::Predictions(args) => predictions::run(&args),
         Command::Run(args) => sweep::run(&args),
         Command::Status(args) => status::run(&args),
         Command::Merge(args) => merge::run(&args),
@@ -87,7 +92,9 @@ pub fn run() -> ExitCode {
 fn is_file(word: &str) -> bool {
     let path = Path::new(word);
     !word.starts_with('-')
-        && (path.extension().is_some() || word.contains(std::path::MAIN_SEPARATOR) || path.is_file())
+        && (path.extension().is_some()
+            || word.contains(std::path::MAIN_SEPARATOR)
+            || path.is_file())
 }
 
 /// What to say to a first word that is neither a file nor a command.

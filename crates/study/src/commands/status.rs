@@ -59,7 +59,10 @@ pub fn run(args: &Args) -> Result<()> {
                 text += &format!("  and {} more stretches\n", gaps.len() - 10);
             }
             if gaps.is_empty() && !merged {
-                text += &format!("  complete; `study merge {}` makes the table\n", args.folder.display());
+                text += &format!(
+                    "  complete; `study merge {}` makes the table\n",
+                    args.folder.display()
+                );
             } else if merged {
                 text += &format!("  merged: {}\n", store.table().display());
             }

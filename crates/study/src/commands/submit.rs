@@ -58,11 +58,18 @@ pub fn run(args: &Args) -> Result<()> {
             plan.blocks()
         );
     }
-    Store::new(&plan, &out).create().map_err(anyhow::Error::msg)?;
+    Store::new(&plan, &out)
+        .create()
+        .map_err(anyhow::Error::msg)?;
     let out = std::path::absolute(&out)?;
     let study = std::env::current_exe().context("this program's own path is not known")?;
     let job = out.join("job.sh");
-    let name: String = plan.spec.name.chars().map(|c| if c.is_ascii_alphanumeric() { c } else { '-' }).collect();
+    let name: String = plan
+        .spec
+        .name
+        .chars()
+        .map(|c| if c.is_ascii_alphanumeric() { c } else { '-' })
+        .collect();
     // The study's own copy of itself: what is run is what was submitted, whatever becomes of the file.
     let script = format!(
         "#!/bin/sh\n\
@@ -86,7 +93,9 @@ pub fn run(args: &Args) -> Result<()> {
     command.arg("--parsable").args(&args.options).arg(&job);
     if args.dry_run {
         eprintln!("{} is written; nothing was submitted", job.display());
-        return print(&format!("sbatch {} {}\n", args.options.join(" "), job.display()).replace("  ", " "));
+        return print(
+            &format!("sbatch {} {}\n", args.options.join(" "), job.display()).replace("  ", " "),
+        );
     }
     match command.output() {
         Ok(done) if done.status.success() => {

@@ -101,7 +101,11 @@ pub fn run(args: &Args) -> Result<()> {
 
     let began = Instant::now();
     let size = |blocks: &[u64]| -> u64 {
-        blocks.iter().map(|b| plan.block(*b)).map(|r| r.end - r.start).sum()
+        blocks
+            .iter()
+            .map(|b| plan.block(*b))
+            .map(|r| r.end - r.start)
+            .sum()
     };
     let left = size(&there.missing);
     let stop = watch_interrupts()?;
@@ -145,7 +149,10 @@ pub fn run(args: &Args) -> Result<()> {
         }
     );
     if shard.is_some() {
-        eprintln!("`study merge {}` puts the parts together when all are there", out.display());
+        eprintln!(
+            "`study merge {}` puts the parts together when all are there",
+            out.display()
+        );
         return Ok(());
     }
     report(&plan, &store, args.format)
@@ -155,7 +162,11 @@ pub fn run(args: &Args) -> Result<()> {
 pub fn report(plan: &Plan, store: &Store, format: Format) -> Result<()> {
     let summary = store.merge().map_err(anyhow::Error::msg)?;
     let table = store.table();
-    eprintln!("{}: {} rows; summary.csv beside it", table.display(), summary.runs);
+    eprintln!(
+        "{}: {} rows; summary.csv beside it",
+        table.display(),
+        summary.runs
+    );
     let indices = study::sweep::sensitivity::indices(plan, &summary);
     print(&match format {
         Format::Table => {

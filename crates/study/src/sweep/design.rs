@@ -25,10 +25,9 @@ impl Points {
         let sample = match &spec.design {
             None => Sample::None,
             Some(d) => match d.kind {
-                DesignKind::LatinHypercube => Sample::Latin(
-                    (0..sampled).map(|axis| shuffled(d, axis)).collect(),
-                    d.seed,
-                ),
+                DesignKind::LatinHypercube => {
+                    Sample::Latin((0..sampled).map(|axis| shuffled(d, axis)).collect(), d.seed)
+                }
                 DesignKind::Sobol => Sample::Sobol(Sobol::new(sampled)),
                 // Past the origin, where both halves of the coordinates are equal, by a power of two: balanced again.
                 DesignKind::Sensitivity => Sample::Sensitivity(
@@ -143,7 +142,13 @@ mod tests {
 
     fn all(points: &Points) -> Vec<Vec<f64>> {
         (0..points.len())
-            .map(|k| points.values(k).iter().map(|v| number(v).unwrap()).collect())
+            .map(|k| {
+                points
+                    .values(k)
+                    .iter()
+                    .map(|v| number(v).unwrap())
+                    .collect()
+            })
             .collect()
     }
 
@@ -152,7 +157,14 @@ mod tests {
         let p = points(
             "axes = [{ key = \"a\", values = [1, 2] }, { key = \"b\", from = 1.0, to = 100.0, count = 3, spacing = \"log\" }]",
         );
-        let expected = [[1.0, 1.0], [1.0, 10.0], [1.0, 100.0], [2.0, 1.0], [2.0, 10.0], [2.0, 100.0]];
+        let expected = [
+            [1.0, 1.0],
+            [1.0, 10.0],
+            [1.0, 100.0],
+            [2.0, 1.0],
+            [2.0, 10.0],
+            [2.0, 100.0],
+        ];
         for (found, expected) in all(&p).iter().zip(expected) {
             for (f, e) in found.iter().zip(expected) {
                 assert!((f / e - 1.0).abs() < 1e-15, "{found:?}");
@@ -165,7 +177,9 @@ mod tests {
     #[test]
     fn a_latin_hypercube_has_one_point_in_every_slice() {
         let axes = "axes = [{ key = \"a\", from = 0, to = 1 }, { key = \"b\", from = 0, to = 1 }]";
-        let p = points(&format!("{axes}\ndesign = {{ kind = \"latin-hypercube\", points = 50, seed = 3 }}"));
+        let p = points(&format!(
+            "{axes}\ndesign = {{ kind = \"latin-hypercube\", points = 50, seed = 3 }}"
+        ));
         let all = all(&p);
         for axis in 0..2 {
             let mut slices: Vec<u64> = all.iter().map(|x| (x[axis] * 50.0) as u64).collect();
@@ -174,7 +188,10 @@ mod tests {
         }
         let mean = all.iter().map(|x| (x[0] - 0.5) * (x[1] - 0.5)).sum::<f64>() / 50.0;
         // Four standard errors of 1/12/√50.
-        assert!(mean.abs() < 4.0 / 12.0 / 50f64.sqrt(), "axes are tied: {mean}");
+        assert!(
+            mean.abs() < 4.0 / 12.0 / 50f64.sqrt(),
+            "axes are tied: {mean}"
+        );
     }
 
     #[test]
@@ -184,7 +201,16 @@ mod tests {
         );
         assert_eq!(
             all(&p),
-            [[7.0, 10.0], [7.0, 15.0], [7.0, 17.5], [7.0, 12.5], [8.0, 10.0], [8.0, 15.0], [8.0, 17.5], [8.0, 12.5]]
+            [
+                [7.0, 10.0],
+                [7.0, 15.0],
+                [7.0, 17.5],
+                [7.0, 12.5],
+                [8.0, 10.0],
+                [8.0, 15.0],
+                [8.0, 17.5],
+                [8.0, 12.5]
+            ]
         );
     }
 

@@ -99,7 +99,11 @@ impl Plan {
         for axis in &spec.axes {
             try_axis(axis, &template)?;
         }
-        let whole = |axis: &spec::Axis| template.value(&axis.key).is_some_and(toml::Value::is_integer);
+        let whole = |axis: &spec::Axis| {
+            template
+                .value(&axis.key)
+                .is_some_and(toml::Value::is_integer)
+        };
         let metrics: Vec<&Metric> = spec.metrics.iter().filter_map(|m| find(m)).collect();
         Ok(Self {
             points: Points::new(&spec)?,
@@ -221,16 +225,28 @@ impl Plan {
                 .map(String::as_str)
                 .or_else(|| cause.downcast_ref::<&str>().copied())
                 .unwrap_or("no message");
-            (Vec::new(), None, Some(format!("the program broke off: {text}")))
+            (
+                Vec::new(),
+                None,
+                Some(format!("the program broke off: {text}")),
+            )
         });
         // OK because all these counts are far below 2^63.
         let whole = |n: u64| Cell::Whole(n as i64);
         let mut row = vec![whole(run), whole(run / self.spec.seeds)];
-        for (value, column) in self.values(run / self.spec.seeds).iter().zip(&self.columns[2..]) {
+        for (value, column) in self
+            .values(run / self.spec.seeds)
+            .iter()
+            .zip(&self.columns[2..])
+        {
             row.push(match column.kind {
                 Kind::Real => number(value).map_or(Cell::Empty, Cell::Real),
                 Kind::Truth => value.as_bool().map_or(Cell::Empty, Cell::Truth),
-                _ => Cell::Text(value.as_str().map_or_else(|| value.to_string(), str::to_owned)),
+                _ => Cell::Text(
+                    value
+                        .as_str()
+                        .map_or_else(|| value.to_string(), str::to_owned),
+                ),
             });
         }
         row.push(whole(self.seed(run)));
@@ -271,7 +287,9 @@ impl Plan {
         }
         let (inputs, stats, outcome) = observe(&scene, Some(MOST_EVALUATIONS), &mut keeper);
         // The writer knows best why it stopped a run.
-        let kept = keeper.0.map_or(Ok(()), |r| r.finish().map_err(|e| e.to_string()));
+        let kept = keeper
+            .0
+            .map_or(Ok(()), |r| r.finish().map_err(|e| e.to_string()));
         if let Err(reason) = kept.and(outcome.map_err(|e| e.to_string())) {
             return (Vec::new(), Some(stats), Some(reason));
         }
@@ -309,7 +327,9 @@ fn try_axis(axis: &spec::Axis, template: &Template) -> Result<(), String> {
         true => [axis.at(0.0).into(), axis.at(1.0).into()],
         false => [axis.value(0), axis.value(axis.len() - 1)],
     };
-    let whole = template.value(&axis.key).is_some_and(toml::Value::is_integer);
+    let whole = template
+        .value(&axis.key)
+        .is_some_and(toml::Value::is_integer);
     let mut why = Ok(());
     for value in ends {
         let value = match value {

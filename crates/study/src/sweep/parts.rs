@@ -115,8 +115,14 @@ impl<'p> Store<'p> {
                 found.missing.push(block);
                 continue;
             }
-            let say = |what: &str| format!("{}: {what}; choose another --out, or delete it", path.display());
-            let reader = Reader::open(&path).map_err(|e| say(&format!("is no part of a study: {e}")))?;
+            let say = |what: &str| {
+                format!(
+                    "{}: {what}; choose another --out, or delete it",
+                    path.display()
+                )
+            };
+            let reader =
+                Reader::open(&path).map_err(|e| say(&format!("is no part of a study: {e}")))?;
             for (name, expected) in &notes {
                 if reader.note(name) != Some(expected) {
                     return Err(say(match name.as_str() {
@@ -128,10 +134,17 @@ impl<'p> Store<'p> {
             }
             let range = self.plan.block(block);
             if reader.rows != range.end - range.start {
-                return Err(say(&format!("has {} of {} rows", reader.rows, range.end - range.start)));
+                return Err(say(&format!(
+                    "has {} of {} rows",
+                    reader.rows,
+                    range.end - range.start
+                )));
             }
             found.runs += reader.rows;
-            found.failed += reader.note("failed").and_then(|n| n.parse().ok()).unwrap_or(0);
+            found.failed += reader
+                .note("failed")
+                .and_then(|n| n.parse().ok())
+                .unwrap_or(0);
         }
         Ok(found)
     }
@@ -151,7 +164,11 @@ impl<'p> Store<'p> {
         let recordings = self.plan.spec.recordings.then_some(&*recordings);
         let size = self.plan.block_runs();
         // All blocks but the very last are of one size.
-        let runs: u64 = blocks.iter().map(|b| self.plan.block(*b)).map(|r| r.end - r.start).sum();
+        let runs: u64 = blocks
+            .iter()
+            .map(|b| self.plan.block(*b))
+            .map(|r| r.end - r.start)
+            .sum();
         let mut written = Written::default();
         let mut rows = Vec::new();
         in_order(
@@ -160,7 +177,8 @@ impl<'p> Store<'p> {
             stop,
             |k| {
                 let block = blocks[(k / size) as usize];
-                self.plan.run(self.plan.block(block).start + k % size, recordings)
+                self.plan
+                    .run(self.plan.block(block).start + k % size, recordings)
             },
             |k, row| {
                 rows.push(row);

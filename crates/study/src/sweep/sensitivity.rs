@@ -95,8 +95,12 @@ pub fn estimate(rows: &[Vec<f64>], axis: usize) -> Option<(Estimate, Estimate)> 
         }
         let variance = squares / (2 * n) as f64;
         let rounding = 1e-24 * mean * mean;
-        (variance > rounding)
-            .then(|| (first / n as f64 / variance, total / (2 * n) as f64 / variance))
+        (variance > rounding).then(|| {
+            (
+                first / n as f64 / variance,
+                total / (2 * n) as f64 / variance,
+            )
+        })
     };
     let (first, total) = of(&|k| k)?;
     let (mut firsts, mut totals) = (Vec::new(), Vec::new());
@@ -182,8 +186,14 @@ mod tests {
         let known = [(0.3139, 0.5576), (0.4424, 0.4424), (0.0, 0.2437)];
         for (axis, (first, total)) in known.into_iter().enumerate() {
             let (s, t) = estimate(&rows, axis).unwrap();
-            assert!((s.value - first).abs() < 0.01, "S{axis}: {s:?}, known {first}");
-            assert!((t.value - total).abs() < 0.01, "T{axis}: {t:?}, known {total}");
+            assert!(
+                (s.value - first).abs() < 0.01,
+                "S{axis}: {s:?}, known {first}"
+            );
+            assert!(
+                (t.value - total).abs() < 0.01,
+                "T{axis}: {t:?}, known {total}"
+            );
             assert!(s.interval[0] < first && first < s.interval[1], "{s:?}");
         }
         assert_eq!(estimate(&vec![vec![1.0; 5]; 10], 0), None);

@@ -60,7 +60,10 @@ impl Shard {
             n.trim().parse().map_err(|_| wrong())?,
         );
         if (1..=n).contains(&k) {
-            Ok(Self { index: k - 1, count: n })
+            Ok(Self {
+                index: k - 1,
+                count: n,
+            })
         } else {
             Err(wrong())
         }
@@ -79,7 +82,8 @@ impl Shard {
                 continue;
             };
             let number = |name: &str, text: &str| {
-                text.parse::<u64>().map_err(|_| format!("{name} is `{text}`, expected a whole number"))
+                text.parse::<u64>()
+                    .map_err(|_| format!("{name} is `{text}`, expected a whole number"))
             };
             let index = number(s.index, &index)?;
             let first = match get(s.first.0) {
@@ -97,9 +101,15 @@ impl Shard {
                     ));
                 }
             };
-            let index = index.checked_sub(first).filter(|k| *k < count).ok_or_else(|| {
-                format!("{} is {index}, which is not one of {count} tasks from {first} on", s.index)
-            })?;
+            let index = index
+                .checked_sub(first)
+                .filter(|k| *k < count)
+                .ok_or_else(|| {
+                    format!(
+                        "{} is {index}, which is not one of {count} tasks from {first} on",
+                        s.index
+                    )
+                })?;
             return Ok(Some((Self { index, count }, s.index)));
         }
         Ok(None)
@@ -154,9 +164,16 @@ mod tests {
         let found = Shard::of_environment(None, slurm).unwrap().unwrap();
         assert_eq!(found, (Shard { index: 2, count: 4 }, "SLURM_ARRAY_TASK_ID"));
         let kubernetes = |name: &str| (name == "JOB_COMPLETION_INDEX").then(|| "1".into());
-        assert!(Shard::of_environment(None, kubernetes).unwrap_err().contains("--shards"));
+        assert!(
+            Shard::of_environment(None, kubernetes)
+                .unwrap_err()
+                .contains("--shards")
+        );
         assert_eq!(
-            Shard::of_environment(Some(3), kubernetes).unwrap().unwrap().0,
+            Shard::of_environment(Some(3), kubernetes)
+                .unwrap()
+                .unwrap()
+                .0,
             Shard { index: 1, count: 3 }
         );
         assert!(Shard::of_environment(Some(1), kubernetes).is_err());

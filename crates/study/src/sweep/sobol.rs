@@ -40,7 +40,12 @@ impl Sobol {
             // OK because m_k is odd and below 2^(k+1).
             std::array::from_fn(|k| (m[k] << (BITS - 1 - k)) as u32)
         });
-        Self(std::iter::once(first).chain(others).take(dimensions).collect())
+        Self(
+            std::iter::once(first)
+                .chain(others)
+                .take(dimensions)
+                .collect(),
+        )
     }
 
     /// Coordinate `dimension` of point `n`, in [0, 1).
@@ -136,7 +141,11 @@ mod tests {
             let n: u32 = cells.next().unwrap().parse().unwrap();
             for (dimension, cell) in cells.enumerate() {
                 let theirs: f64 = cell.parse().unwrap();
-                assert_eq!(sobol.at(n, dimension), theirs, "point {n}, dimension {dimension}");
+                assert_eq!(
+                    sobol.at(n, dimension),
+                    theirs,
+                    "point {n}, dimension {dimension}"
+                );
             }
             rows += 1;
         }

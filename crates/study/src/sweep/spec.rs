@@ -59,7 +59,11 @@ pub struct Axis {
     #[serde(default)]
     pub spacing: Spacing,
     /// Other keys that go along: value times this factor.
-    #[serde(default, rename = "with", skip_serializing_if = "toml::Table::is_empty")]
+    #[serde(
+        default,
+        rename = "with",
+        skip_serializing_if = "toml::Table::is_empty"
+    )]
     pub along: toml::Table,
 }
 
@@ -176,8 +180,12 @@ fn check(spec: &mut Spec) -> Result<(), String> {
         Some(d) if d.kind == DesignKind::LatinHypercube && d.points > 1 << 24 => {
             Err("a Latin hypercube has at most 2^24 points; take `sobol`".into())
         }
-        Some(d) if sampled > MOST_SAMPLED || dimensions(d, sampled) > super::sobol::MOST_DIMENSIONS => {
-            Err(format!("{sampled} sampled axes are too many: at most {MOST_SAMPLED}"))
+        Some(d)
+            if sampled > MOST_SAMPLED || dimensions(d, sampled) > super::sobol::MOST_DIMENSIONS =>
+        {
+            Err(format!(
+                "{sampled} sampled axes are too many: at most {MOST_SAMPLED}"
+            ))
         }
         _ => Ok(()),
     }

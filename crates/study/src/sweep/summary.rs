@@ -81,7 +81,10 @@ impl Summary {
             .collect();
         Self {
             axes: plan.spec.axes.iter().map(|a| a.name.clone()).collect(),
-            metrics: places.iter().map(|k| plan.columns()[*k].name.clone()).collect(),
+            metrics: places
+                .iter()
+                .map(|k| plan.columns()[*k].name.clone())
+                .collect(),
             values: vec![Vec::new(); places.len()],
             places,
             seeds: plan.spec.seeds,

@@ -1,6 +1,8 @@
 //! Rows to Parquet and back, a row group at a time.
 
-use parquet::basic::{Compression, ConvertedType, LogicalType, Repetition, Type as Physical, ZstdLevel};
+use parquet::basic::{
+    Compression, ConvertedType, LogicalType, Repetition, Type as Physical, ZstdLevel,
+};
 use parquet::column::reader::ColumnReader;
 use parquet::column::writer::ColumnWriter;
 use parquet::data_type::{BoolType, ByteArray, ByteArrayType, DataType, DoubleType, Int64Type};
@@ -79,7 +81,9 @@ impl<W: Write + Send> Writer<W> {
     /// What the library says.
     pub fn new(out: W, columns: &[Column], notes: &Notes) -> Result<Self, ParquetError> {
         let fields = columns.iter().map(field).collect::<Result<Vec<_>, _>>()?;
-        let schema = Type::group_type_builder("runs").with_fields(fields).build()?;
+        let schema = Type::group_type_builder("runs")
+            .with_fields(fields)
+            .build()?;
         let mut notes: Vec<KeyValue> = notes
             .iter()
             .map(|(k, v)| KeyValue::new(k.clone(), v.clone()))
@@ -112,7 +116,10 @@ impl<W: Write + Send> Writer<W> {
             let Some(mut column) = group.next_column()? else {
                 break;
             };
-            let levels: Vec<i16> = rows.iter().map(|r| i16::from(r[k] != Cell::Empty)).collect();
+            let levels: Vec<i16> = rows
+                .iter()
+                .map(|r| i16::from(r[k] != Cell::Empty))
+                .collect();
             let cells = rows.iter().map(|r| &r[k]);
             macro_rules! put {
                 ($writer:expr, $pattern:pat => $value:expr) => {{
@@ -156,8 +163,8 @@ fn field(column: &Column) -> Result<Arc<Type>, ParquetError> {
         Kind::Truth => Physical::BOOLEAN,
         Kind::Text => Physical::BYTE_ARRAY,
     };
-    let builder = Type::primitive_type_builder(&column.name, physical)
-        .with_repetition(Repetition::OPTIONAL);
+    let builder =
+        Type::primitive_type_builder(&column.name, physical).with_repetition(Repetition::OPTIONAL);
     let builder = match column.kind {
         Kind::Text => builder
             .with_logical_type(Some(LogicalType::String))
@@ -231,7 +238,10 @@ impl Reader {
 
     /// A fact by name.
     pub fn note(&self, name: &str) -> Option<&str> {
-        self.notes.iter().find(|(k, _)| k == name).map(|(_, v)| v.as_str())
+        self.notes
+            .iter()
+            .find(|(k, _)| k == name)
+            .map(|(_, v)| v.as_str())
     }
 
     /// How many row groups there are.
@@ -253,11 +263,9 @@ impl Reader {
                 ColumnReader::DoubleColumnReader(r) => cells::<DoubleType>(r, rows, Cell::Real)?,
                 ColumnReader::Int64ColumnReader(r) => cells::<Int64Type>(r, rows, Cell::Whole)?,
                 ColumnReader::BoolColumnReader(r) => cells::<BoolType>(r, rows, Cell::Truth)?,
-                ColumnReader::ByteArrayColumnReader(r) => {
-                    cells::<ByteArrayType>(r, rows, |b| {
-                        Cell::Text(String::from_utf8_lossy(b.data()).into_owned())
-                    })?
-                }
+                ColumnReader::ByteArrayColumnReader(r) => cells::<ByteArrayType>(r, rows, |b| {
+                    Cell::Text(String::from_utf8_lossy(b.data()).into_owned())
+                })?,
                 _ => return Err(ParquetError::General("a column of an unknown type".into())),
             };
             if cells.len() != rows {
@@ -267,7 +275,9 @@ impl Reader {
                     cells.len()
                 )));
             }
-            out.iter_mut().zip(cells).for_each(|(row, cell)| row.push(cell));
+            out.iter_mut()
+                .zip(cells)
+                .for_each(|(row, cell)| row.push(cell));
         }
         Ok(out)
     }
@@ -315,8 +325,18 @@ mod tests {
         ];
         let rows: Vec<Vec<Cell>> = (0..5000i64)
             .map(|i| match i % 3 {
-                0 => vec![Cell::Real(i as f64 / 7.0), Cell::Whole(i), Cell::Truth(i % 2 == 0), Cell::Empty],
-                1 => vec![Cell::Empty, Cell::Whole(-i), Cell::Empty, Cell::Text(format!("because {i}, ü"))],
+                0 => vec![
+                    Cell::Real(i as f64 / 7.0),
+                    Cell::Whole(i),
+                    Cell::Truth(i % 2 == 0),
+                    Cell::Empty,
+                ],
+                1 => vec![
+                    Cell::Empty,
+                    Cell::Whole(-i),
+                    Cell::Empty,
+                    Cell::Text(format!("because {i}, ü")),
+                ],
                 _ => vec![Cell::Empty, Cell::Empty, Cell::Empty, Cell::Empty],
             })
             .collect();

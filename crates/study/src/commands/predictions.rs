@@ -1,0 +1,108 @@
+//! `study predictions`: what the paper predicts, tried.
+
+use super::{Format, print, watch_interrupts, write_whole};
+use anyhow::{Context, Result, bail};
+use indicatif::{ProgressBar, ProgressStyle};
+use std::path::PathBuf;
+use std::time::Instant;
+use study::predictions::{EXPERIMENTS, Finding, Lab, page, to_json};
+
+/// Arguments of `study predictions`.
+#[derive(clap::Args)]
+#[command(after_help = EXAMPLES)]
+pub struct Args {
+    /// Only these experiments: locking, coherence, lever, harmonics, onsets, stability.
+    names: Vec<String>,
+    /// Seeds of every ensemble, from 1001 on.
+    #[arg(long, value_name = "N", default_value_t = 12, value_parser = clap::value_parser!(u64).range(2..=100_000))]
+    seeds: u64,
+    /// Threads; 0 is one per core. The result does not depend on it.
+    #[arg(long, value_name = "N", default_value_t = 0)]
+    jobs: usize,
+    /// A folder for predictions.md, predictions.json and the pictures (predictions/*.png).
+    #[arg(long, value_name = "DIR")]
+    out: Option<PathBuf>,
+    /// What to print.
+    #[arg(long, value_enum, default_value_t = Format::Table)]
+    format: Format,
+}
+
+const EXAMPLES: &str = "Examples:
+  study predictions                        all of them
+  study predictions locking stability --out results
+  study predictions --seeds 5 --format json";
+
+/// Runs the experiments.
+pub fn run(args: &Args) -> Result<()> {
+    let names = || EXPERIMENTS.iter().map(|e| e.name);
+    for name in &args.names {
+        if !names().any(|n| n == name) {
+            let hint = sim::scene::nearest(name, names())
+                .map_or(String::new(), |n| format!(" Did you mean `{n}`?"));
+            bail!(
+                "there is no experiment `{name}`.{hint} There are: {}",
+                names().collect::<Vec<_>>().join(", ")
+            );
+        }
+    }
+    let stop = watch_interrupts()?;
+    let began = Instant::now();
+    let mut findings: Vec<(&str, Finding)> = Vec::new();
+    for e in EXPERIMENTS {
+        if !args.names.is_empty() && !args.names.iter().any(|n| n == e.name) {
+            continue;
+        }
+        let bar = ProgressBar::new_spinner();
+        bar.set_style(ProgressStyle::with_template(
+            "{msg}: {pos} pieces of work, {elapsed}",
+        )?);
+        bar.set_message(e.name);
+        let lab = Lab {
+            jobs: args.jobs,
+            seeds: args.seeds,
+            stop,
+            done: &|| bar.inc(1),
+        };
+        let finding = (e.run)(&lab).map_err(|why| anyhow::anyhow!("{}: {why}", e.name))?;
+        bar.finish_and_clear();
+        eprintln!(
+            "{}: {} ({} pieces of work, {:.0} s so far)",
+            e.name,
+            finding.verdict.map_or("done", |v| v.word()),
+            bar.position(),
+            began.elapsed().as_secs_f64()
+        );
+        findings.push((e.name, finding));
+    }
+    let json = format!("{:#}\n", to_json(&findings));
+    if let Some(folder) = &args.out {
+        let pictures = folder.join("predictions");
+        std::fs::create_dir_all(&pictures)
+            .with_context(|| format!("{}: cannot be made", pictures.display()))?;
+        for (_, finding) in &findings {
+            for (stem, _, figure) in &finding.pictures {
+                figure.write(&pictures, stem).map_err(anyhow::Error::msg)?;
+            }
+        }
+        // One page for all; a part of them has no page.
+        if args.names.is_empty() {
+            let text = page(&findings, "predictions", args.seeds);
+            write_whole(&folder.join("predictions.md"), text.as_bytes())?;
+        }
+        write_whole(&folder.join("predictions.json"), json.as_bytes())?;
+    }
+    match args.format {
+        Format::Json => print(&json),
+        Format::Table => {
+            let mut text = String::new();
+            for (_, f) in &findings {
+                text += &format!("{}: {}\n", f.title, f.verdict.map_or("", |v| v.word()));
+                for n in &f.numbers {
+                    text += &format!("  {:<72}{:>10.*} {}\n", n.label, n.digits, n.value, n.unit);
+                }
+                text += &format!("  {}\n\n", f.because);
+            }
+            print(&text)
+        }
+    }
+}

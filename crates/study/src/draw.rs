@@ -1,0 +1,259 @@
+//! Figures of studies: maps with curves over them, curves with bands, as PNG in one look.
+
+use crate::sweep::parts::write_whole;
+use analyze::report::plots::COLOURS;
+use kuva::backend::raster::RasterBackend;
+use kuva::plot::legend::LegendPosition;
+use kuva::plot::{BandPlot, ColorMap, Heatmap, LinePlot, ScatterPlot};
+use kuva::render::layout::Layout;
+use kuva::render::plots::Plot;
+use kuva::render::render::render_multiple;
+use std::io::Write;
+use std::path::Path;
+
+/// A figure.
+#[derive(Clone, Debug, Default)]
+pub struct Figure {
+    /// Title.
+    pub title: String,
+    /// Horizontal axis with its unit.
+    pub x_label: String,
+    /// Vertical axis with its unit.
+    pub y_label: String,
+    /// What is drawn, the first at the bottom.
+    pub layers: Vec<Layer>,
+    /// Range of the abscissa, where not that of the data.
+    pub x_range: Option<(f64, f64)>,
+    /// Range of the ordinate, where not that of the data.
+    pub y_range: Option<(f64, f64)>,
+}
+
+/// Something in a figure. Colours are indices into [`COLOURS`].
+#[derive(Clone, Debug)]
+pub enum Layer {
+    /// A map: `values[row][column]`, rows from the bottom, cells between the ends of the ranges.
+    Map {
+        /// What the colour means, with its unit.
+        label: String,
+        /// The cells.
+        values: Vec<Vec<f64>>,
+        /// Ends of the abscissa.
+        x: (f64, f64),
+        /// Ends of the ordinate.
+        y: (f64, f64),
+    },
+    /// A curve.
+    Line {
+        /// Name in the legend; empty for none.
+        name: String,
+        /// Its points.
+        points: Vec<(f64, f64)>,
+        /// Its colour, or [`WHITE`].
+        colour: usize,
+        /// Whether it is broken.
+        dashed: bool,
+    },
+    /// Single points.
+    Points {
+        /// Name in the legend; empty for none.
+        name: String,
+        /// The points.
+        points: Vec<(f64, f64)>,
+        /// Their colour, or [`WHITE`].
+        colour: usize,
+    },
+    /// What lies between two curves.
+    Band {
+        /// Abscissa, lower and upper end.
+        points: Vec<(f64, f64, f64)>,
+        /// Its colour.
+        colour: usize,
+    },
+}
+
+/// The colour of curves over maps.
+pub const WHITE: usize = usize::MAX;
+
+fn colour(index: usize) -> &'static str {
+    match index {
+        WHITE => "#FFFFFF",
+        k => COLOURS[k % COLOURS.len()],
+    }
+}
+
+impl Layer {
+    /// A whole curve.
+    pub fn line(name: &str, points: Vec<(f64, f64)>, colour: usize) -> Self {
+        Self::Line {
+            name: name.into(),
+            points,
+            colour,
+            dashed: false,
+        }
+    }
+
+    /// A broken curve.
+    pub fn dashed(name: &str, points: Vec<(f64, f64)>, colour: usize) -> Self {
+        Self::Line {
+            name: name.into(),
+            points,
+            colour,
+            dashed: true,
+        }
+    }
+
+    /// Single points.
+    pub fn points(name: &str, points: Vec<(f64, f64)>, colour: usize) -> Self {
+        Self::Points {
+            name: name.into(),
+            points,
+            colour,
+        }
+    }
+
+    fn corners(&self) -> Vec<(f64, f64)> {
+        match self {
+            Self::Map { x, y, .. } => vec![(x.0, y.0), (x.1, y.1)],
+            Self::Line { points, .. } | Self::Points { points, .. } => points.clone(),
+            Self::Band { points, .. } => points
+                .iter()
+                .flat_map(|(x, low, high)| [(*x, *low), (*x, *high)])
+                .collect(),
+        }
+    }
+
+    fn name(&self) -> &str {
+        match self {
+            Self::Line { name, .. } | Self::Points { name, .. } => name,
+            _ => "",
+        }
+    }
+}
+
+impl Figure {
+    fn range(&self) -> ((f64, f64), (f64, f64)) {
+        let corners = self.layers.iter().flat_map(Layer::corners);
+        let inside = |x: f64| self.x_range.is_none_or(|(a, b)| (a..=b).contains(&x));
+        let start = (f64::INFINITY, f64::NEG_INFINITY);
+        let (x, y) = corners
+            .filter(|c| inside(c.0))
+            .fold((start, start), |(x, y), c| {
+                ((x.0.min(c.0), x.1.max(c.0)), (y.0.min(c.1), y.1.max(c.1)))
+            });
+        let wide = |(a, b): (f64, f64)| if b > a { (a, b) } else { (a - 1.0, a + 1.0) };
+        let (x, mut y) = (wide(x), wide(y));
+        if !self.layers.iter().any(|l| matches!(l, Layer::Map { .. })) {
+            let room = 0.05 * (y.1 - y.0);
+            y = (y.0 - room, y.1 + room);
+        }
+        (self.x_range.unwrap_or(x), self.y_range.unwrap_or(y))
+    }
+
+    fn scene(&self) -> kuva::render::render::Scene {
+        let (x, y) = self.range();
+        let marks: Vec<Plot> = self.layers.iter().map(|l| mark(l, x, y)).collect();
+        let named = self.layers.iter().filter(|l| !l.name().is_empty()).count();
+        let is_map = self.layers.iter().any(|l| matches!(l, Layer::Map { .. }));
+        let layout = match is_map {
+            true => Layout::auto_from_plots(&marks),
+            false => Layout::new(x, y),
+        };
+        let mut layout = layout
+            .with_title(self.title.clone())
+            .with_x_label(self.x_label.clone())
+            .with_y_label(self.y_label.clone())
+            .with_width(900.0)
+            .with_height(460.0)
+            .with_title_size(16)
+            .with_label_size(13)
+            .with_tick_size(11)
+            .with_x_axis_min(x.0)
+            .with_x_axis_max(x.1)
+            .with_y_axis_min(y.0)
+            .with_y_axis_max(y.1);
+        layout.show_legend = named > 0 && !is_map;
+        if layout.show_legend {
+            layout = layout.with_legend_position(LegendPosition::OutsideRightTop);
+        }
+        render_multiple(marks, layout)
+    }
+
+    /// Writes `FOLDER/STEM.png`, whole or not at all.
+    ///
+    /// # Errors
+    /// What the library or the system says.
+    pub fn write(&self, folder: &Path, stem: &str) -> Result<(), String> {
+        let scene = self.scene();
+        let png = RasterBackend::new()
+            .with_scale(1.5)
+            .render_scene(&scene)
+            .map_err(|e| format!("{stem}: cannot be drawn: {e}"))?;
+        write_whole(&folder.join(format!("{stem}.png")), |f| {
+            Ok(f.write_all(&png)?)
+        })
+    }
+}
+
+/// The part of a curve inside the frame: what leaves it is cut off there.
+fn clipped(points: &[(f64, f64)], x: (f64, f64), y: (f64, f64)) -> Vec<(f64, f64)> {
+    let inside = |p: &&(f64, f64)| (x.0..=x.1).contains(&p.0) && (y.0..=y.1).contains(&p.1);
+    points.iter().filter(inside).copied().collect()
+}
+
+fn mark(layer: &Layer, x: (f64, f64), y: (f64, f64)) -> Plot {
+    match layer {
+        Layer::Map {
+            label,
+            values,
+            x,
+            y,
+        } => Heatmap::new()
+            .with_data(values.clone())
+            .with_color_map(ColorMap::Cividis)
+            .with_x_range(x.0, x.1)
+            .with_y_range(y.0, y.1)
+            .with_cell_size(1.0)
+            .with_legend(label.clone())
+            .into(),
+        Layer::Line {
+            name,
+            points,
+            colour: c,
+            dashed,
+        } => {
+            let mut line = LinePlot::new()
+                .with_data(clipped(points, x, y))
+                .with_color(colour(*c))
+                .with_stroke_width(if *c == WHITE { 2.0 } else { 1.5 });
+            if *dashed {
+                line = line.with_dashed();
+            }
+            if !name.is_empty() {
+                line = line.with_legend(name.clone());
+            }
+            line.into()
+        }
+        Layer::Points {
+            name,
+            points,
+            colour: c,
+        } => {
+            let mut cloud = ScatterPlot::new()
+                .with_data(clipped(points, x, y))
+                .with_color(colour(*c))
+                .with_size(3.0);
+            if !name.is_empty() {
+                cloud = cloud.with_legend(name.clone());
+            }
+            cloud.into()
+        }
+        Layer::Band { points, colour: c } => BandPlot::new(
+            points.iter().map(|p| p.0),
+            points.iter().map(|p| p.1),
+            points.iter().map(|p| p.2),
+        )
+        .with_color(colour(*c))
+        .with_opacity(0.2)
+        .into(),
+    }
+}
