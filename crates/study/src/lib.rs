@@ -2,6 +2,7 @@
 
 pub mod draw;
 pub mod ensemble;
+pub mod fit;
 pub mod paper;
 pub mod pool;
 pub mod predictions;

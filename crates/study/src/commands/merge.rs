@@ -11,6 +11,9 @@ use study::sweep::parts::Store;
 pub struct Args {
     /// The study's folder.
     folder: PathBuf,
+    /// Draw every metric into figures/ of the study's folder.
+    #[arg(long)]
+    figures: bool,
     /// What to print.
     #[arg(long, value_enum, default_value_t = Format::Table)]
     format: Format,
@@ -19,5 +22,6 @@ pub struct Args {
 /// Merges the parts.
 pub fn run(args: &Args) -> Result<()> {
     let plan = sweep::plan(&args.folder.join("study.toml"))?;
-    sweep::report(&plan, &Store::new(&plan, &args.folder), args.format)
+    let store = Store::new(&plan, &args.folder);
+    sweep::report(&plan, &store, &args.folder, args.figures, args.format)
 }

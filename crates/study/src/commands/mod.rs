@@ -1,5 +1,6 @@
 //! What `study` can do: one file per subcommand.
 
+mod fit;
 mod merge;
 mod paper;
 mod predictions;
@@ -32,6 +33,8 @@ enum Command {
     Predictions(predictions::Args),
     /// Run a study file: `study FILE.toml` is short for it.
     Run(sweep::Args),
+    /// Estimate the model's parameters from recordings, with intervals.
+    Fit(fit::Args),
     /// Say how far a study is.
     Status(status::Args),
     /// Put the parts of a study together.
@@ -49,6 +52,7 @@ const EXAMPLES: &str = "Examples:
   study status tongue
   study merge tongue                       all parts into tongue/runs.parquet
   study submit tongue.toml --tasks 8       the same on Slurm
+  study fit music-1001.mcap                beat, pull, contact and roll, with intervals
 docs/studies.md says what a study file may hold.";
 
 /// What stdout gets.
@@ -75,6 +79,7 @@ pub fn run() -> ExitCode {
         Command::Paper(args) => paper::run(&args),
         Command::Predictions(args) => predictions::run(&args),
         Command::Run(args) => sweep::run(&args),
+        Command::Fit(args) => fit::run(&args),
         Command::Status(args) => status::run(&args),
         Command::Merge(args) => merge::run(&args),
         Command::Submit(args) => submit::run(&args),

@@ -9,7 +9,7 @@ use std::time::{Duration, Instant};
 use study::sweep::Plan;
 use study::sweep::parts::Store;
 use study::sweep::shard::Shard;
-use study::sweep::summary::Summary;
+use study::sweep::summary::Found;
 
 /// Arguments of `study FILE.toml`.
 #[derive(clap::Args)]
@@ -36,6 +36,9 @@ pub struct Args {
     /// Go on where an earlier run of the same study stopped.
     #[arg(long)]
     resume: bool,
+    /// Draw every metric into figures/ of the study's folder: over one axis, over two, or its distribution.
+    #[arg(long)]
+    figures: bool,
     /// What to print.
     #[arg(long, value_enum, default_value_t = Format::Table)]
     format: Format,
@@ -155,12 +158,18 @@ pub fn run(args: &Args) -> Result<()> {
         );
         return Ok(());
     }
-    report(&plan, &store, args.format)
+    report(&plan, &store, &out, args.figures, args.format)
 }
 
-/// Merges and prints.
-pub fn report(plan: &Plan, store: &Store, format: Format) -> Result<()> {
+/// Merges, draws and prints.
+pub fn report(plan: &Plan, store: &Store, out: &Path, figures: bool, format: Format) -> Result<()> {
     let summary = store.merge().map_err(anyhow::Error::msg)?;
+    if figures {
+        let folder = out.join("figures");
+        let drawn =
+            study::sweep::figures::draw(plan, store, &folder).map_err(anyhow::Error::msg)?;
+        eprintln!("{}: {drawn} figures", folder.display());
+    }
     let table = store.table();
     eprintln!(
         "{}: {} rows; summary.csv beside it",
@@ -182,23 +191,18 @@ pub fn report(plan: &Plan, store: &Store, format: Format) -> Result<()> {
 
 fn json(
     plan: &Plan,
-    summary: &Summary,
+    summary: &Found,
     table: &Path,
     indices: Option<&Vec<study::sweep::sensitivity::Index>>,
 ) -> serde_json::Value {
     let metrics: serde_json::Map<String, serde_json::Value> = summary
         .metrics
         .iter()
-        .enumerate()
-        .map(|(k, name)| {
-            let means: Vec<f64> = summary
-                .points
-                .iter()
-                .filter_map(|p| p.metrics[k].map(|s| s.mean))
-                .collect();
-            let of = |f: fn(f64, f64) -> f64| means.iter().copied().reduce(f);
+        .zip(&summary.ranges)
+        .map(|(name, range)| {
+            let of = |end: &Option<(f64, _)>| end.as_ref().map(|(x, _)| *x);
             let entry = json!({
-                "lowest": of(f64::min), "highest": of(f64::max), "points": means.len(),
+                "lowest": of(&range.lowest), "highest": of(&range.highest), "points": range.points,
             });
             (name.clone(), entry)
         })

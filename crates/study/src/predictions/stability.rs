@@ -128,8 +128,8 @@ pub fn run(lab: &Lab) -> Result<Finding, String> {
     let theory = Hanging::of(&scene(&drive, &[], 1)?)?;
     let [sway, roll] = theory.natural_hz();
 
-    let (nx, ny) = (49, 25);
-    let (x_range, y_range) = ((0.9, 2.5), (0.0, 1.2));
+    let (nx, ny) = (50, 30);
+    let (x_range, y_range) = ((0.9, 2.65), (0.0, 1.65));
     let center = |k: usize, n: usize, (a, b): (f64, f64)| a + (b - a) * (k as f64 + 0.5) / n as f64;
     let cells: Vec<(f64, f64)> = (0..nx * ny)
         .map(|k| (center(k % nx, nx, x_range), center(k / nx, ny, y_range)))

@@ -1,6 +1,7 @@
 //! Sweeps: a study file becomes a plan, the plan's runs become rows.
 
 pub mod design;
+pub mod figures;
 pub mod parts;
 pub mod sensitivity;
 pub mod shard;
@@ -20,7 +21,7 @@ use sim::run::{Listener, Sample};
 use sim::scene::{Scene, Template};
 use sim::sensors::Reading;
 use sim::solve::Stats;
-use spec::{Spec, flatten, number};
+use spec::{DesignKind, Spec, flatten, number};
 use std::ops::Range;
 use std::panic::AssertUnwindSafe;
 use std::path::Path;
@@ -136,6 +137,12 @@ impl Plan {
     /// How many runs there are.
     pub fn runs(&self) -> u64 {
         self.points.len() * self.spec.seeds
+    }
+
+    /// Whether it is a study of sensitivity.
+    pub fn is_sensitivity(&self) -> bool {
+        let design = self.spec.design.as_ref();
+        design.is_some_and(|d| d.kind == DesignKind::Sensitivity)
     }
 
     /// How many points there are.

@@ -9,12 +9,12 @@
 
 use super::Plan;
 use super::shard::Shard;
-use super::summary::Summary;
+use super::summary::{Found, Summary};
 use super::table::{Cell, Notes, Reader, Writer};
 use crate::pool::in_order;
 use parquet::errors::ParquetError;
 use sim::record::VERSION;
-use std::io::Write;
+use std::io::{BufWriter, Write};
 use std::path::{Path, PathBuf};
 use std::sync::atomic::AtomicBool;
 
@@ -214,7 +214,7 @@ impl<'p> Store<'p> {
     ///
     /// # Errors
     /// Missing or unreadable parts; a table that cannot be written.
-    pub fn merge(&self) -> Outcome<Summary> {
+    pub fn merge(&self) -> Outcome<Found> {
         let progress = self.progress(Shard::WHOLE)?;
         if let Some(first) = progress.missing.first() {
             return Err(format!(
@@ -226,32 +226,41 @@ impl<'p> Store<'p> {
                 self.folder.join("study.toml").display(),
             ));
         }
-        let mut summary = Summary::new(self.plan);
-        write_whole(&self.table(), |file| {
-            let mut writer = Writer::new(file, self.plan.columns(), &self.notes())?;
-            let mut rows: Vec<Vec<Cell>> = Vec::new();
-            for block in 0..self.plan.blocks() {
-                let part = Reader::open(&self.part(block))?;
-                for group in 0..part.groups() {
-                    for row in part.group(group)? {
-                        summary.row(&row);
-                        rows.push(row);
-                        if rows.len() == GROUP_ROWS {
-                            writer.group(&rows)?;
-                            rows.clear();
-                        }
+        let mut found = Err("nothing was merged".to_owned());
+        write_whole(&self.folder.join("summary.csv"), |csv| {
+            let mut summary = Summary::new(self.plan, BufWriter::new(csv))?;
+            write_whole(&self.table(), |file| self.merge_into(file, &mut summary))
+                .map_err(ParquetError::General)?;
+            found = Ok(summary.finish()?);
+            Ok(())
+        })?;
+        found
+    }
+
+    fn merge_into<W: Write>(
+        &self,
+        file: &mut std::fs::File,
+        summary: &mut Summary<W>,
+    ) -> Result<(), ParquetError> {
+        let mut writer = Writer::new(file, self.plan.columns(), &self.notes())?;
+        let mut rows: Vec<Vec<Cell>> = Vec::new();
+        for block in 0..self.plan.blocks() {
+            let part = Reader::open(&self.part(block))?;
+            for group in 0..part.groups() {
+                for row in part.group(group)? {
+                    summary.row(&row)?;
+                    rows.push(row);
+                    if rows.len() == GROUP_ROWS {
+                        writer.group(&rows)?;
+                        rows.clear();
                     }
                 }
             }
-            if !rows.is_empty() {
-                writer.group(&rows)?;
-            }
-            writer.close()
-        })?;
-        let csv = summary.csv();
-        let path = self.folder.join("summary.csv");
-        write_whole(&path, |file| Ok(file.write_all(csv.as_bytes())?))?;
-        Ok(summary)
+        }
+        if !rows.is_empty() {
+            writer.group(&rows)?;
+        }
+        writer.close()
     }
 }
 

@@ -10,8 +10,7 @@
 //! any run has no such metric is left out. Intervals: 95 %, from 500 bootstrap samples of the base points.
 
 use super::Plan;
-use super::spec::DesignKind;
-use super::summary::{Summary, quantile};
+use super::summary::{Found, quantile};
 use serde_json::{Value, json};
 use sim::random::{Stream, uniform_pair};
 
@@ -43,18 +42,17 @@ pub struct Index {
 const DRAWS: u64 = 500;
 
 /// The indices of every metric over every axis; `None` where the study is none of sensitivity.
-pub fn indices(plan: &Plan, summary: &Summary) -> Option<Vec<Index>> {
-    let design = plan.spec.design.as_ref()?;
-    if design.kind != DesignKind::Sensitivity {
+pub fn indices(plan: &Plan, found: &Found) -> Option<Vec<Index>> {
+    if !plan.is_sensitivity() {
         return None;
     }
     let axes = plan.spec.axes.len();
     let mut out = Vec::new();
-    for (k, metric) in summary.metrics.iter().enumerate() {
-        let rows: Vec<Vec<f64>> = summary
-            .points
+    for (k, metric) in found.metrics.iter().enumerate() {
+        let rows: Vec<Vec<f64>> = found
+            .means
             .chunks(axes + 2)
-            .filter_map(|rows| rows.iter().map(|p| p.metrics[k].map(|s| s.mean)).collect())
+            .filter_map(|rows| rows.iter().map(|means| means[k]).collect())
             .collect();
         for (axis, of) in plan.spec.axes.iter().enumerate() {
             if let Some((first, total)) = estimate(&rows, axis) {

@@ -2,7 +2,7 @@
 
 use super::Plan;
 use super::table::{Cell, Kind};
-use std::fmt::Write;
+use std::io::Write;
 
 /// Mean, spread and quantiles of one metric over some runs that have it.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -40,30 +40,56 @@ pub fn quantile(sorted: &[f64], q: f64) -> f64 {
     sorted[below] + (place - place.floor()) * (sorted[above] - sorted[below])
 }
 
-/// One point of the design.
-#[derive(Clone, Debug)]
-pub struct Point {
-    /// The axes' values.
-    pub axes: Vec<Cell>,
-    /// Runs without a result.
-    pub failed: u64,
-    /// One for each metric that is a number or a yes or no.
-    pub metrics: Vec<Option<Spread>>,
+/// What the means of one metric at the points range over.
+#[derive(Clone, Debug, Default)]
+pub struct Range {
+    /// Points that have it.
+    pub points: u64,
+    sum: f64,
+    /// Lowest mean and the values of the axes there.
+    pub lowest: Option<(f64, Vec<Cell>)>,
+    /// Highest mean and the values of the axes there.
+    pub highest: Option<(f64, Vec<Cell>)>,
 }
 
-/// The summary of a study.
-pub struct Summary {
-    axes: Vec<String>,
-    /// Names of the metrics that can be summarised.
-    pub metrics: Vec<String>,
+impl Range {
+    fn take(&mut self, mean: f64, axes: &[Cell]) {
+        self.points += 1;
+        self.sum += mean;
+        if self.lowest.as_ref().is_none_or(|(low, _)| mean < *low) {
+            self.lowest = Some((mean, axes.to_vec()));
+        }
+        if self.highest.as_ref().is_none_or(|(high, _)| mean > *high) {
+            self.highest = Some((mean, axes.to_vec()));
+        }
+    }
+}
+
+/// The summary of a study. Only the rows of one point are held at a time; a study of sensitivity keeps the means.
+pub struct Summary<W: Write> {
+    csv: W,
+    axes: usize,
     places: Vec<usize>,
     seeds: u64,
     values: Vec<Vec<f64>>,
     rows: u64,
     failed: u64,
-    /// Every point, in order.
-    pub points: Vec<Point>,
-    /// Rows so far.
+    keeps_means: bool,
+    found: Found,
+}
+
+/// What a summary came to.
+#[derive(Clone, Debug, Default)]
+pub struct Found {
+    /// Names of the metrics that can be summarised.
+    pub metrics: Vec<String>,
+    /// One for each of them.
+    pub ranges: Vec<Range>,
+    /// Means of every point, for a study of sensitivity.
+    pub means: Vec<Vec<Option<f64>>>,
+    /// Points.
+    pub points: u64,
+    /// Runs.
     pub runs: u64,
     /// Of these, without a result.
     pub failures: u64,
@@ -71,43 +97,65 @@ pub struct Summary {
     pub reasons: Vec<(String, u64)>,
 }
 
-impl Summary {
-    /// Of no rows yet.
-    pub fn new(plan: &Plan) -> Self {
+impl<W: Write> Summary<W> {
+    /// Of no rows yet. Into `csv` goes a row per point: its axes, runs, failures, then mean, SD, quantiles 5, 50 and 95 %
+    /// and number of every metric.
+    ///
+    /// # Errors
+    /// What the system says.
+    pub fn new(plan: &Plan, mut csv: W) -> std::io::Result<Self> {
         let axes = plan.spec.axes.len();
         let first = 3 + axes;
         let places: Vec<usize> = (first..first + plan.spec.metrics.len())
             .filter(|k| matches!(plan.columns()[*k].kind, Kind::Real | Kind::Truth))
             .collect();
-        Self {
-            axes: plan.spec.axes.iter().map(|a| a.name.clone()).collect(),
-            metrics: places
-                .iter()
-                .map(|k| plan.columns()[*k].name.clone())
-                .collect(),
+        let metrics: Vec<String> = places
+            .iter()
+            .map(|k| plan.columns()[*k].name.clone())
+            .collect();
+        write!(csv, "point")?;
+        for axis in &plan.spec.axes {
+            write!(csv, ",{}", quoted(&axis.name))?;
+        }
+        write!(csv, ",runs,failed")?;
+        for name in &metrics {
+            for part in ["mean", "sd", "q05", "q50", "q95", "n"] {
+                write!(csv, ",{name}_{part}")?;
+            }
+        }
+        writeln!(csv)?;
+        Ok(Self {
+            csv,
+            axes,
             values: vec![Vec::new(); places.len()],
             places,
             seeds: plan.spec.seeds,
             rows: 0,
             failed: 0,
-            points: Vec::new(),
-            runs: 0,
-            failures: 0,
-            reasons: Vec::new(),
-        }
+            keeps_means: plan.is_sensitivity(),
+            found: Found {
+                ranges: vec![Range::default(); metrics.len()],
+                metrics,
+                ..Found::default()
+            },
+        })
     }
 
     /// Takes the next row.
-    pub fn row(&mut self, row: &[Cell]) {
-        self.runs += 1;
+    ///
+    /// # Errors
+    /// What the system says.
+    pub fn row(&mut self, row: &[Cell]) -> std::io::Result<()> {
         self.rows += 1;
+        let found = &mut self.found;
+        found.runs += 1;
         if let Cell::Text(reason) = &row[row.len() - 2] {
-            self.failures += 1;
+            found.failures += 1;
             self.failed += 1;
-            match self.reasons.iter().position(|(r, _)| r == reason) {
-                Some(k) => self.reasons[k].1 += 1,
+            match found.reasons.iter().position(|(r, _)| r == reason) {
+                Some(k) => found.reasons[k].1 += 1,
                 // Enough to see what is wrong; a reason that names a time differs in every run.
-                None if self.reasons.len() < 20 => self.reasons.push((reason.clone(), 1)),
+                None if found.reasons.len() < 20 => found.reasons.push((reason.clone(), 1)),
                 None => {}
             }
         }
@@ -115,115 +163,98 @@ impl Summary {
             values.extend(row[*place].number());
         }
         if self.rows == self.seeds {
-            self.points.push(Point {
-                axes: row[2..2 + self.axes.len()].to_vec(),
-                failed: self.failed,
-                metrics: self.values.iter().map(|v| Spread::of(v)).collect(),
-            });
-            self.values.iter_mut().for_each(Vec::clear);
-            (self.rows, self.failed) = (0, 0);
+            self.point(&row[2..2 + self.axes])?;
         }
+        Ok(())
     }
 
-    /// A row per point: its axes, runs, failures, then mean, SD, quantiles 5, 50 and 95 % and number of every metric.
-    pub fn csv(&self) -> String {
-        let mut out = String::from("point");
-        for axis in &self.axes {
-            out += &format!(",{}", quoted(axis));
-        }
-        out += ",runs,failed";
-        for name in &self.metrics {
-            for part in ["mean", "sd", "q05", "q50", "q95", "n"] {
-                out += &format!(",{name}_{part}");
+    fn point(&mut self, axes: &[Cell]) -> std::io::Result<()> {
+        let out = &mut self.csv;
+        write!(out, "{}", self.found.points)?;
+        for cell in axes {
+            match cell {
+                Cell::Empty => write!(out, ",")?,
+                Cell::Real(x) => write!(out, ",{x}")?,
+                Cell::Whole(x) => write!(out, ",{x}")?,
+                Cell::Truth(x) => write!(out, ",{x}")?,
+                Cell::Text(x) => write!(out, ",{}", quoted(x))?,
             }
         }
-        out.push('\n');
-        for (k, point) in self.points.iter().enumerate() {
-            let _ = write!(out, "{k}");
-            for cell in &point.axes {
-                let text = match cell {
-                    Cell::Empty => String::new(),
-                    Cell::Real(x) => x.to_string(),
-                    Cell::Whole(x) => x.to_string(),
-                    Cell::Truth(x) => x.to_string(),
-                    Cell::Text(x) => quoted(x),
-                };
-                let _ = write!(out, ",{text}");
+        write!(out, ",{},{}", self.seeds, self.failed)?;
+        let mut means = Vec::new();
+        for (values, range) in self.values.iter_mut().zip(&mut self.found.ranges) {
+            let spread = Spread::of(values);
+            match &spread {
+                Some(s) => {
+                    let [low, middle, high] = s.quantiles;
+                    write!(out, ",{},{},{low},{middle},{high},{}", s.mean, s.sd, s.runs)?;
+                    range.take(s.mean, axes);
+                }
+                None => write!(out, ",,,,,,0")?,
             }
-            let _ = write!(out, ",{},{}", self.seeds, point.failed);
-            for metric in &point.metrics {
-                let _ = match metric {
-                    Some(s) => {
-                        let [low, middle, high] = s.quantiles;
-                        write!(out, ",{},{},{low},{middle},{high},{}", s.mean, s.sd, s.runs)
-                    }
-                    None => write!(out, ",,,,,,0"),
-                };
+            if self.keeps_means {
+                means.push(spread.map(|s| s.mean));
             }
-            out.push('\n');
+            values.clear();
         }
-        out
+        writeln!(out)?;
+        if self.keeps_means {
+            self.found.means.push(means);
+        }
+        self.found.points += 1;
+        (self.rows, self.failed) = (0, 0);
+        Ok(())
     }
 
+    /// What all rows came to.
+    ///
+    /// # Errors
+    /// What the system says.
+    pub fn finish(mut self) -> std::io::Result<Found> {
+        self.csv.flush()?;
+        Ok(self.found)
+    }
+}
+
+impl Found {
     /// For people: over all points, what each metric's mean at a point ranges over, and where it is lowest and highest.
     pub fn table(&self) -> String {
         let mut out = format!(
-            "{} points, {} runs, {} without a result\n",
-            self.points.len(),
-            self.runs,
-            self.failures
+            "{} points, {} runs, {} without a result\n\n{:<20}{:>11}{:>11}{:>11}  lowest at, highest at\n",
+            self.points, self.runs, self.failures, "mean at a point", "lowest", "mean", "highest"
         );
-        let _ = writeln!(
-            out,
-            "\n{:<20}{:>11}{:>11}{:>11}{:>11}  lowest at, highest at",
-            "mean at a point", "lowest", "median", "highest", "SD (median)"
-        );
-        for (k, name) in self.metrics.iter().enumerate() {
-            let mut found: Vec<(f64, f64, usize)> = self
-                .points
-                .iter()
-                .enumerate()
-                .filter_map(|(p, point)| point.metrics[k].map(|s| (s.mean, s.sd, p)))
-                .collect();
-            if found.is_empty() {
-                let _ = writeln!(out, "{name:<20}{:>11}", "–");
+        for (name, range) in self.metrics.iter().zip(&self.ranges) {
+            let (Some(low), Some(high)) = (&range.lowest, &range.highest) else {
+                out += &format!("{name:<20}{:>11}\n", "–");
                 continue;
-            }
-            found.sort_by(|a, b| a.0.total_cmp(&b.0));
-            let mut spreads: Vec<f64> = found.iter().map(|f| f.1).collect();
-            spreads.sort_by(f64::total_cmp);
-            let (low, high) = (found[0], found[found.len() - 1]);
-            let means: Vec<f64> = found.iter().map(|f| f.0).collect();
-            let _ = write!(
-                out,
-                "{name:<20}{:>11}{:>11}{:>11}{:>11}",
-                short(low.0),
-                short(quantile(&means, 0.5)),
-                short(high.0),
-                short(quantile(&spreads, 0.5))
-            );
-            let _ = match high.0 > low.0 {
-                true => writeln!(out, "  {}, {}", self.place(low.2), self.place(high.2)),
-                false => writeln!(out),
             };
+            out += &format!(
+                "{name:<20}{:>11}{:>11}{:>11}",
+                short(low.0),
+                short(range.sum / range.points as f64),
+                short(high.0)
+            );
+            if high.0 > low.0 && !low.1.is_empty() {
+                out += &format!("  {}, {}", place(&low.1), place(&high.1));
+            }
+            out.push('\n');
         }
         for (reason, count) in &self.reasons {
-            let _ = writeln!(out, "failed {count} times: {reason}");
+            out += &format!("failed {count} times: {reason}\n");
         }
         out
     }
+}
 
-    fn place(&self, point: usize) -> String {
-        let cells: Vec<String> = self.points[point]
-            .axes
-            .iter()
-            .map(|c| match c {
-                Cell::Text(x) => x.clone(),
-                other => other.number().map_or("–".into(), short),
-            })
-            .collect();
-        format!("({})", cells.join(", "))
-    }
+fn place(axes: &[Cell]) -> String {
+    let cells: Vec<String> = axes
+        .iter()
+        .map(|c| match c {
+            Cell::Text(x) => x.clone(),
+            other => other.number().map_or("–".into(), short),
+        })
+        .collect();
+    format!("({})", cells.join(", "))
 }
 
 /// Four significant digits.

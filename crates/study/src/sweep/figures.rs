@@ -1,0 +1,166 @@
+//! Figures of a sweep: bands over one axis, maps over two, distributions over any.
+
+use super::Plan;
+use super::parts::Store;
+use super::spec::{Spacing, number};
+use super::summary::Spread;
+use super::table::{Cell, Kind, Reader};
+use crate::draw::{Figure, Layer};
+use std::path::Path;
+
+/// What is drawn of a metric.
+enum Kinds {
+    /// Mean and the band of 90 % over one axis of numbers.
+    Band,
+    /// Mean over two evenly spaced axes.
+    Map,
+    /// Share of runs up to each value.
+    Distribution,
+}
+
+/// Draws every metric of a merged study into `folder`, as METRIC.png; gives how many.
+///
+/// # Errors
+/// What the system or a library says.
+pub fn draw(plan: &Plan, store: &Store, folder: &Path) -> Result<usize, String> {
+    let io = |e: std::io::Error| format!("{}: cannot be made: {e}", folder.display());
+    std::fs::create_dir_all(folder).map_err(io)?;
+    let axes = &plan.spec.axes;
+    let kind = match &axes[..] {
+        [x] if !x.is_sampled() && x.len() > 1 && number(&x.value(0)).is_some() => Kinds::Band,
+        [x, y]
+            if [x, y]
+                .iter()
+                .all(|a| a.count.is_some_and(|n| n > 1) && a.spacing == Spacing::Linear) =>
+        {
+            Kinds::Map
+        }
+        _ => Kinds::Distribution,
+    };
+    let table = store.table();
+    let say = |e: parquet::errors::ParquetError| format!("{}: {e}", table.display());
+    let reader = Reader::open(&table).map_err(say)?;
+    let first = 3 + axes.len();
+    let mut drawn = 0;
+    for (k, name) in plan.spec.metrics.iter().enumerate() {
+        let place = first + k;
+        if !matches!(reader.columns[place].kind, Kind::Real | Kind::Truth) {
+            continue;
+        }
+        // One metric at a time: values of every run, by point.
+        let mut points: Vec<(Vec<Cell>, Vec<f64>)> = Vec::new();
+        let mut runs = 0;
+        for group in 0..reader.groups() {
+            for row in reader.group(group).map_err(say)? {
+                if runs % plan.spec.seeds == 0 {
+                    points.push((row[2..2 + axes.len()].to_vec(), Vec::new()));
+                }
+                runs += 1;
+                if let Some((_, values)) = points.last_mut() {
+                    values.extend(row[place].number());
+                }
+            }
+        }
+        let unit = match reader.columns[place].unit.as_str() {
+            "" | "1" => String::new(),
+            unit => format!(", {unit}"),
+        };
+        let label = format!("{name}{unit}");
+        let figure = match kind {
+            Kinds::Band => band(&axes[0].name, &label, &points),
+            Kinds::Map => map(plan, &label, &points),
+            Kinds::Distribution => distribution(
+                &label,
+                points.iter().flat_map(|(_, v)| v.iter().copied()).collect(),
+            ),
+        };
+        if let Some(figure) = figure {
+            figure.write(folder, name)?;
+            drawn += 1;
+        }
+    }
+    Ok(drawn)
+}
+
+fn band(x_label: &str, label: &str, points: &[(Vec<Cell>, Vec<f64>)]) -> Option<Figure> {
+    let mut found: Vec<(f64, Spread)> = points
+        .iter()
+        .filter_map(|(axes, values)| Some((axes[0].number()?, Spread::of(values)?)))
+        .collect();
+    found.sort_by(|a, b| a.0.total_cmp(&b.0));
+    (found.len() > 1).then(|| Figure {
+        title: label.into(),
+        x_label: x_label.into(),
+        y_label: label.into(),
+        layers: vec![
+            Layer::Band {
+                points: found
+                    .iter()
+                    .map(|(x, s)| (*x, s.quantiles[0], s.quantiles[2]))
+                    .collect(),
+                colour: 0,
+            },
+            Layer::line("mean", found.iter().map(|(x, s)| (*x, s.mean)).collect(), 0),
+            Layer::dashed(
+                "median",
+                found.iter().map(|(x, s)| (*x, s.quantiles[1])).collect(),
+                1,
+            ),
+        ],
+        ..Figure::default()
+    })
+}
+
+fn map(plan: &Plan, label: &str, points: &[(Vec<Cell>, Vec<f64>)]) -> Option<Figure> {
+    let [y, x] = &plan.spec.axes[..] else {
+        return None;
+    };
+    let means: Vec<f64> = points
+        .iter()
+        .map(|(_, values)| Spread::of(values).map_or(f64::NAN, |s| s.mean))
+        .collect();
+    if means.iter().all(|m| m.is_nan()) {
+        return None;
+    }
+    // Cells lie about their points: half a step beyond the ends.
+    let ends = |axis: &super::spec::Axis| {
+        let (a, b) = (axis.at(0.0), axis.at(1.0));
+        let half = 0.5 * (b - a) / (axis.len() - 1) as f64;
+        (a - half, b + half)
+    };
+    Some(Figure {
+        title: label.into(),
+        x_label: x.name.clone(),
+        y_label: y.name.clone(),
+        layers: vec![Layer::Map {
+            label: label.into(),
+            values: means
+                .chunks(x.len() as usize)
+                .map(<[f64]>::to_vec)
+                .collect(),
+            x: ends(x),
+            y: ends(y),
+        }],
+        x_range: Some(ends(x)),
+        y_range: Some(ends(y)),
+    })
+}
+
+fn distribution(label: &str, mut values: Vec<f64>) -> Option<Figure> {
+    values.sort_by(f64::total_cmp);
+    let n = values.len();
+    // A thousand steps are as many as a picture can show.
+    let step = n.div_ceil(1000).max(1);
+    let points: Vec<(f64, f64)> = (0..n)
+        .step_by(step)
+        .map(|k| (values[k], (k + 1) as f64 / n as f64))
+        .collect();
+    (n > 1 && values[n - 1] > values[0]).then(|| Figure {
+        title: format!("Distribution: {label}"),
+        x_label: label.into(),
+        y_label: "share of runs up to the value".into(),
+        layers: vec![Layer::line("", points, 0)],
+        y_range: Some((0.0, 1.02)),
+        ..Figure::default()
+    })
+}

@@ -1,0 +1,113 @@
+//! Parameters found again: in twins, whose parameters are known, and in the paper's archive.
+
+use std::path::Path;
+use study::fit::{Estimate, Field, fit};
+
+fn find<'a>(found: &'a [study::fit::Outcome], name: &str) -> &'a Estimate {
+    found
+        .iter()
+        .flatten()
+        .find(|e| e.name == name)
+        .unwrap_or_else(|| panic!("no {name}: {found:?}"))
+}
+
+/// Fifty runs of the music scene: each true value lies in its interval at least 45 times.
+#[test]
+fn twins_lie_within_their_intervals() {
+    let mut hits = std::collections::BTreeMap::new();
+    for seed in 2001..2051 {
+        let settings = [
+            "solver.tolerance=1e-7".to_owned(),
+            "solver.energy=false".into(),
+            format!("seed={seed}"),
+        ];
+        let scene = sim::scene::load("music", &settings).unwrap();
+        let mut compression_m = vec![Vec::new(); 2];
+        let mut keep = |s: &sim::run::Sample| {
+            compression_m
+                .iter_mut()
+                .zip(&s.compression_m)
+                .for_each(|(c, d)| c.push(*d));
+            true
+        };
+        let (inputs, _, outcome) = study::ensemble::observe(&scene, None, &mut keep);
+        outcome.unwrap();
+        let own = sim::model::Model::new(&scene).natural_rad_per_s().to_vec();
+        let field = Field {
+            inputs,
+            compression_m,
+            onset_s: 5.0,
+            build_up_s: 11.0,
+        };
+        let found = fit(&field, analyze::Window::from(15.0));
+        for (name, truth) in [
+            ("beat", 2.1507),
+            ("pull", 2.7),
+            ("gait 1", own[0] / std::f64::consts::TAU),
+            ("gait 2", own[1] / std::f64::consts::TAU),
+            ("phase noise", 0.01),
+            ("stiffness", 3000.0),
+            ("damping", 400.0),
+        ] {
+            let e = find(&found, name);
+            let hit = e.interval[0] <= truth && truth <= e.interval[1];
+            let (count, width) = hits.entry(name).or_insert((0, 0.0));
+            *count += usize::from(hit);
+            *width += (e.interval[1] - e.interval[0]) / truth / 50.0;
+        }
+    }
+    println!("{hits:?}");
+    for (name, (count, width)) in hits {
+        assert!(count >= 45, "{name}: {count} of 50 within their intervals");
+        assert!(
+            width < 0.2,
+            "{name}: intervals of {width} of the value say nothing"
+        );
+    }
+}
+
+/// a = h/(I_xx + M h²) = 0.0480 ± 0.0005 and the beat 2.150 ± 0.002 Hz, in each of the archive's ten music logs.
+#[test]
+fn val_the_archives_pendulum_and_beat() {
+    let archive =
+        Path::new(env!("CARGO_MANIFEST_DIR")).join("../../../shared/reference/archive/music");
+    let Ok(entries) = std::fs::read_dir(&archive) else {
+        println!("skipped: no archive at {}", archive.display());
+        return;
+    };
+    let (mut a, mut beat) = (Vec::new(), Vec::new());
+    for entry in entries {
+        let mut npz = npyz::npz::NpzArchive::open(entry.unwrap().path().join("logs.npz")).unwrap();
+        let mut column =
+            |name: &str| -> Vec<f64> { npz.by_name(name).unwrap().unwrap().into_vec().unwrap() };
+        let split = |x: Vec<f64>| {
+            (0..2)
+                .map(|i| x.iter().skip(i).step_by(2).copied().collect())
+                .collect()
+        };
+        let field = Field {
+            inputs: analyze::Inputs {
+                t_s: column("t"),
+                roll_rad: column("roll"),
+                normal_n: split(column("forces")),
+                phase_rad: split(column("walker_phase")),
+                ..analyze::Inputs::default()
+            },
+            onset_s: 5.0,
+            build_up_s: 11.0,
+            ..Field::default()
+        };
+        let found = fit(&field, analyze::Window::from(15.0));
+        a.push(find(&found, "pendulum").value);
+        beat.push(find(&found, "beat").value);
+        println!(
+            "a = {:?}, beat = {:?}, pull = {:?}",
+            a.last(),
+            beat.last(),
+            find(&found, "pull")
+        );
+    }
+    assert_eq!(a.len(), 10);
+    assert!(a.iter().all(|a| (a - 0.0480).abs() < 0.0005), "{a:?}");
+    assert!(beat.iter().all(|f| (f - 2.150).abs() < 0.002), "{beat:?}");
+}
