@@ -336,7 +336,7 @@ fn pendulum(field: &Field, window: Window) -> Result<Vec<Outcome>, String> {
     let per_block = (BLOCK_S / step_s).round().max(1.0) as usize;
     let mut blocks: Vec<[f64; 5]> = Vec::new();
     for k in EDGE..roll.len().saturating_sub(EDGE) {
-        if (k - EDGE) % per_block == 0 {
+        if (k - EDGE).is_multiple_of(per_block) {
             blocks.push([0.0; 5]);
         }
         if let Some(block) = blocks.last_mut() {
