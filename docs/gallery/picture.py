@@ -107,7 +107,7 @@ def main():
                     if time.monotonic() > deadline:
                         raise
             # 256 colours are enough for such pictures and make them small; thin lines keep theirs by this choice of colours.
-            few = Image.open(picture).convert("RGB").quantize(256, Image.Quantize.MAXCOVERAGE, dither=Image.Dither.NONE)
+            few = Image.open(picture).convert("RGB").quantize(256, kmeans=4, dither=Image.Dither.NONE)
             few.save(out, optimize=True)
         finally:
             viewer.terminate()

@@ -46,7 +46,8 @@ impl<W: std::io::Write> Encoded<W> {
 
     /// Begins a stream for a reader that takes messages as they come: it needs no footer.
     ///
-    /// Its bytes depend on what is sent alone. (The footer of a file lists its two stores in no fixed order.)
+    /// Its bytes depend on what is sent alone. (The footer of a file, which the encoder makes from hash maps, is in no fixed order;
+    /// all bytes before it are the same for the same recording.)
     pub fn stream(write: W) -> anyhow::Result<Self> {
         let mut encoded = Encoded::new(write)?;
         encoded.0.do_not_emit_footer();
