@@ -4,7 +4,6 @@
 pub mod accuracy;
 pub mod beat;
 pub mod body;
-pub mod cases;
 pub mod effects;
 pub mod energy;
 pub mod freedoms;
