@@ -52,3 +52,34 @@ impl Energy {
         })
     }
 }
+
+/// Whether a run with fixed steps can be believed, as it goes on.
+///
+/// A step that is too large makes energy out of nothing and often loses it in the dampers again, so neither the motion nor the
+/// throughput tells. What can be in a motion is what it began with, what gravity gave, and what the shoulders did:
+///
+/// ```text
+/// supplied = K₀ + S₀ + max(0, P₀ − P) + |∫ work|        [J]
+/// ```
+/// A run whose unexplained rest exceeds that is an artefact of its method, and stops. The floor is rounding.
+#[derive(Debug, Default)]
+pub(crate) struct Belief {
+    start: Option<Energy>,
+    most_work_j: f64,
+}
+
+/// Below this part of all energies a rest is rounding, or a matter of taste.
+const FLOOR: f64 = 1e-6;
+
+impl Belief {
+    /// What came from nowhere and what was supplied, J, where the first is more.
+    pub(crate) fn betrayed(&mut self, e: &Energy) -> Option<(f64, f64)> {
+        let start = *self.start.get_or_insert(*e);
+        self.most_work_j = self.most_work_j.max(e.work_in_j.abs());
+        let fallen = (start.potential_j - e.potential_j).max(0.0);
+        let supplied = start.kinetic_j + start.elastic_j.abs() + fallen + self.most_work_j;
+        let all = supplied + e.kinetic_j + e.potential_j.abs() + start.potential_j.abs();
+        let nowhere = e.unexplained_j.abs();
+        (nowhere > supplied + FLOOR * all).then_some((nowhere, supplied))
+    }
+}

@@ -4,6 +4,7 @@
 pub mod accuracy;
 pub mod beat;
 pub mod body;
+pub mod cases;
 pub mod effects;
 pub mod energy;
 pub mod freedoms;

@@ -18,6 +18,7 @@ const EXAMPLES: &str = "Examples:
   sim record baseline --seed 7 --out b.mcap
   sim record music --set effects.music.beat_hz=2.3 --set effects.hold=false
   sim record --out - | view -             watch a run while it is computed
+  sim accuracy music                      what accuracy costs: every method against a reference
   sim scenes                              the scenes that come with the program
   sim scenes music > mine.toml            a scene to change";
 

@@ -642,6 +642,11 @@ impl Model {
 }
 
 impl Model {
+    /// What rounding makes of N* of a handle where the heights that it compares are of size `height_m`, N.
+    pub(crate) fn contact_rounding_n(&self, handle: usize, height_m: f64) -> f64 {
+        8.0 * f64::EPSILON * self.contact_stiffness[handle] * height_m.abs()
+    }
+
     /// Books what the contact spring of a handle loses when it opens, or is given when it closes, at `gap_m` ≠ 0.
     pub(crate) fn book_contact(&self, handle: usize, opened: bool, gap_m: f64, y: &mut [f64]) {
         if let Some(page) = self

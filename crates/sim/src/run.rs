@@ -1,6 +1,6 @@
 //! Model + method → samples, in the units and frames of a recording.
 
-use crate::energy::Energy;
+use crate::energy::{Belief, Energy};
 use crate::freedoms::Pose;
 use crate::model::{Model, Workspace};
 use crate::scene::Scene;
@@ -119,9 +119,23 @@ pub fn run_model(
         listener,
         sample: blank(model),
         at_start_j: None,
+        belief: (!method.adaptive).then(Belief::default),
+        betrayed: None,
         sensors: Sensors::new(model),
     };
-    (method.run)(model, settings, &mut bridge)
+    let (stats, outcome) = (method.run)(model, settings, &mut bridge);
+    let outcome = match (outcome, bridge.betrayed) {
+        (Err(Stopped::ByObserver { t_s }), Some((nowhere_j, supplied_j))) => {
+            Err(Stopped::FromNowhere {
+                method: method.name,
+                t_s,
+                nowhere_j,
+                supplied_j,
+            })
+        }
+        (outcome, _) => outcome,
+    };
+    (stats, outcome)
 }
 
 struct Bridge<'a> {
@@ -129,6 +143,10 @@ struct Bridge<'a> {
     listener: &'a mut dyn Listener,
     sample: Sample,
     at_start_j: Option<f64>,
+    /// Of a method that has no other control.
+    belief: Option<Belief>,
+    /// Energy from nowhere and energy supplied, J, once the first was more.
+    betrayed: Option<(f64, f64)>,
     sensors: Sensors<'a>,
 }
 
@@ -178,6 +196,12 @@ impl Observer for Bridge<'_> {
             }
         }
         s.energy = Energy::of(model, y, w, &mut self.at_start_j);
+        if let (Some(energy), Some(belief)) = (&s.energy, &mut self.belief) {
+            self.betrayed = belief.betrayed(energy);
+        }
+        if self.betrayed.is_some() {
+            return false;
+        }
         for a in 0..3 {
             s.pose.position_m[a] += walked[a];
             s.pose.velocity_m_per_s[a] += walk[a];

@@ -1,5 +1,6 @@
 //! One file per subcommand.
 
+mod accuracy;
 mod drum;
 mod explain;
 mod record;
@@ -18,6 +19,8 @@ pub enum Command {
     Drum(drum::Args),
     /// Say what a scene turns on, what state that needs, and what it costs.
     Explain(explain::Args),
+    /// Compare every method's error and time on a scene, or run the hard cases.
+    Accuracy(accuracy::Args),
     /// List the built-in scenes, or print one as TOML.
     Scenes(scenes::Args),
 }
@@ -28,6 +31,7 @@ pub fn run(command: Command) -> ExitCode {
         Command::Record(args) => record::run(&args),
         Command::Drum(args) => drum::run(&args),
         Command::Explain(args) => explain::run(&args),
+        Command::Accuracy(args) => accuracy::run(&args),
         Command::Scenes(args) => scenes::run(&args),
     };
     match outcome {

@@ -85,15 +85,15 @@ pub struct Course<'m> {
     switch_s: f64,
     /// `Some` where contacts open and close.
     contacts: Vec<Contact>,
-    /// How they stood before the last switch.
-    contacts_before: Vec<Contact>,
-    /// Whether N > 0 at the end of the last step, per handle; for methods that locate nothing.
+    /// Whether each handle was in contact when it was last told of.
     touching: Vec<bool>,
     /// What makes a margin of N*, by pairs: ±1 and 0, or 0 and ∞ for a handle without events.
     watch: Vec<(f64x2, f64x2)>,
     locate: bool,
     /// Last event of each handle and how many came at nearly the same moment.
     recent: Vec<(f64, u32)>,
+    /// By how much each handle has to pass its zero since then, N.
+    slack: Vec<f64>,
     most_evaluations: u64,
 }
 
@@ -122,11 +122,11 @@ impl<'m> Course<'m> {
                 .collect(),
             switch_s: f64::INFINITY,
             contacts: vec![Contact::Clamped; n],
-            contacts_before: vec![Contact::Clamped; n],
             touching: vec![false; n],
             watch: vec![(f64x2::ZERO, f64x2::splat(f64::INFINITY)); pairs(n)],
             locate,
             recent: vec![(f64::NEG_INFINITY, 0); n],
+            slack: vec![0.0; n],
             most_evaluations: settings.most_evaluations,
         };
         course.begin_segment();
@@ -256,30 +256,21 @@ impl<'m> Course<'m> {
             self.note_unlocated(observer);
         } else if self.contacts.contains(&Contact::Clamped) {
             self.settle();
+            self.note_standing(observer);
         }
         if self.t_s >= self.switch_s - SAME_MOMENT_S {
             self.t_s = self.t_s.max(self.switch_s.min(self.end_s));
-            self.contacts_before.copy_from_slice(&self.contacts);
             self.begin_segment();
-            for i in 0..self.contacts.len() {
-                match (self.contacts_before[i], self.contacts[i]) {
-                    (Contact::Closed, Contact::Open) => {
-                        self.changed(i, EventKind::ContactOpened, observer)
-                    }
-                    (Contact::Open, Contact::Closed) => {
-                        self.changed(i, EventKind::ContactClosed, observer)
-                    }
-                    _ => {}
-                }
-            }
+            self.note_standing(observer);
         }
         Ok(())
     }
 
     /// Changes the contacts that have passed their zero at the present state, whose margin is not positive.
     ///
-    /// The two laws agree at the zero, so the state and its rate are continuous there. A handle that changes again and
-    /// again at one moment sits on its edge: it is clamped, which is exact for it, until it has left the edge.
+    /// The two laws agree at the zero, so the state and its rate are continuous there. Handles that rounding cannot tell from the one
+    /// that is there change with it, and one that has just changed must pass its zero by more than rounding to change back. A handle
+    /// that changes again and again at one moment sits on its edge: it is clamped, which is exact for it, until it has left the edge.
     pub fn fire(&mut self, observer: &mut dyn Observer) {
         self.model.forces(self.t_s, &self.y, &mut self.w);
         self.stats.evaluations += 1;
@@ -287,9 +278,16 @@ impl<'m> Course<'m> {
         let edge = self.margin_n().max(0.0);
         for i in 0..self.contacts.len() {
             let free = self.w.of(i, |p| p.unclamped);
+            let height_m = self.w.of(i, |p| p.base[2].abs() + p.gap[2].abs());
+            let rounding = self.model.contact_rounding_n(i, height_m);
+            let near = if self.t_s - self.recent[i].0 < 1e-9 {
+                edge - self.slack[i]
+            } else {
+                edge + rounding
+            };
             let (kind, next) = match self.contacts[i] {
-                Contact::Closed if free <= edge => (EventKind::ContactOpened, Contact::Open),
-                Contact::Open if -free <= edge => (EventKind::ContactClosed, Contact::Closed),
+                Contact::Closed if free <= near => (EventKind::ContactOpened, Contact::Open),
+                Contact::Open if -free <= near => (EventKind::ContactClosed, Contact::Closed),
                 _ => continue,
             };
             let (last_s, count) = self.recent[i];
@@ -307,16 +305,18 @@ impl<'m> Course<'m> {
                     next
                 },
             );
-            // What rounding leaves on the wrong side of the zero is the zero of the new segment.
+            // What rounding leaves on the wrong side of the zero, or may, is the zero of the new segment.
             let (sense, zero) = &mut self.watch[i / LANES];
             let short = (sense.as_array()[i % LANES] * free).min(0.0);
-            zero.as_mut_array()[i % LANES] -= short;
+            self.slack[i] = rounding - short;
+            zero.as_mut_array()[i % LANES] += self.slack[i];
             self.changed(i, kind, observer);
         }
     }
 
     fn changed(&mut self, handle: usize, kind: EventKind, observer: &mut dyn Observer) {
         self.stats.events += 1;
+        self.touching[handle] = kind == EventKind::ContactClosed;
         let gap_m = self.w.of(handle, |p| p.gap[2]);
         self.model
             .book_contact(handle, kind == EventKind::ContactOpened, gap_m, &mut self.y);
@@ -381,6 +381,20 @@ impl<'m> Course<'m> {
         self.watch[i / LANES].1.as_mut_array()[i % LANES] = never;
     }
 
+    /// Tells of contacts that stand otherwise than was last told, as a handle may that comes off its edge or meets a switch.
+    fn note_standing(&mut self, observer: &mut dyn Observer) {
+        if !self.locate {
+            return;
+        }
+        for i in 0..self.contacts.len() {
+            match (self.contacts[i], self.touching[i]) {
+                (Contact::Open, true) => self.changed(i, EventKind::ContactOpened, observer),
+                (Contact::Closed, false) => self.changed(i, EventKind::ContactClosed, observer),
+                _ => {}
+            }
+        }
+    }
+
     fn note_unlocated(&mut self, observer: &mut dyn Observer) {
         if self.touching.is_empty() {
             return;
@@ -389,7 +403,6 @@ impl<'m> Course<'m> {
         for i in 0..self.touching.len() {
             let now = self.w.of(i, |p| p.normal) > 0.0;
             if now != self.touching[i] {
-                self.touching[i] = now;
                 self.changed(
                     i,
                     if now {

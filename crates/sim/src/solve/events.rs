@@ -72,20 +72,17 @@ impl Looks {
     }
 }
 
-/// The first zero of `margin` on (0, 1], to `resolution`; the bracket comes from the stages, whose states are a little
-/// less accurate than those that `margin` sees.
+/// The first zero of `margin` on (0, 1], to `resolution`. The stages say where to look; their states are less accurate than those
+/// that `margin` sees (the first ones are of first order), so both ends of a bracket are looked at again.
 pub fn first(looks: &Looks, resolution: f64, mut margin: impl FnMut(f64) -> f64) -> Option<f64> {
     let (seen, n) = looks.sorted();
     let seen = &seen[..n];
-    // A zero at the step's start has fired already: the step begins on its far side.
-    let mut a = (0.0, 0.0);
     for (i, &(theta, value)) in seen.iter().enumerate() {
         if value < 0.0 {
             let b = (theta, margin(theta));
             if b.1 <= 0.0 {
-                return Some(between(a, b, resolution, margin));
+                return Some(back_from(b, &seen[..i], resolution, margin));
             }
-            a = b;
         } else {
             // A dip between stages shows as the lowest of three neighbours.
             if let (Some(before), Some(after)) =
@@ -98,13 +95,30 @@ pub fn first(looks: &Looks, resolution: f64, mut margin: impl FnMut(f64) -> f64)
                 let at = lowest(before, (theta, value), *after);
                 let b = (at, margin(at));
                 if b.1 < 0.0 {
-                    return Some(between(a, b, resolution, margin));
+                    return Some(back_from(b, &seen[..i], resolution, margin));
                 }
             }
-            a = (theta, value);
         }
     }
     None
+}
+
+/// The zero before `b` (margin ≤ 0), behind the last of the looks before it whose margin is positive indeed.
+fn back_from(
+    mut b: (f64, f64),
+    before: &[(f64, f64)],
+    resolution: f64,
+    mut margin: impl FnMut(f64) -> f64,
+) -> f64 {
+    for &(theta, _) in before.iter().rev() {
+        let here = (theta, margin(theta));
+        if here.1 > 0.0 {
+            return between(here, b, resolution, margin);
+        }
+        b = here;
+    }
+    // A zero at the step's start has fired already: the step begins on its far side.
+    between((0.0, 0.0), b, resolution, margin)
 }
 
 /// Where the parabola through three points is lowest, within them.
@@ -209,6 +223,20 @@ mod tests {
         );
         assert_eq!(find(dip(-1e-6)).0, None);
         assert_eq!(find(dip(0.0)).0, None);
+    }
+
+    #[test]
+    fn a_stage_that_sees_too_much_margin_does_not_hide_the_zero() {
+        // A fall from 0.1 m, seen in one step of 0.4 s: the first stage has not yet felt gravity.
+        let gap = |t: f64| 0.1 - 0.5 * 9.81 * (0.4 * t).powi(2);
+        let mut seen = Looks::new();
+        seen.note(0.4, 0.1);
+        [0.45, 0.8, 8.0 / 9.0, 1.0]
+            .iter()
+            .for_each(|&t| seen.note(t, gap(t)));
+        let zero = (0.2f64 / 9.81).sqrt() / 0.4;
+        assert!(zero < 0.4);
+        assert!((first(&seen, 1e-15, gap).unwrap() - zero).abs() < 2e-15);
     }
 
     #[test]

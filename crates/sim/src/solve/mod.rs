@@ -105,6 +105,20 @@ pub enum Stopped {
         /// How many there may be.
         most: usize,
     },
+    /// The energy ledger shows more energy from nowhere than anything supplied.
+    #[error(
+        "{method} gave up at t = {t_s} s: {nowhere_j:.1e} J came from nowhere where {supplied_j:.1e} J were supplied; take a smaller --set solver.step_s or an adaptive --method"
+    )]
+    FromNowhere {
+        /// Method name.
+        method: &'static str,
+        /// When, s.
+        t_s: f64,
+        /// What the ledger does not explain, J.
+        nowhere_j: f64,
+        /// What was there at the start, and came from gravity and from the shoulders, J.
+        supplied_j: f64,
+    },
     /// The observer asked to stop.
     #[error("stopped at t = {t_s} s")]
     ByObserver {
