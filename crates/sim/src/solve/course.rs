@@ -83,6 +83,8 @@ pub struct Course<'m> {
     /// When somebody wants to see the state: the log first, then the sensors' clocks.
     tickers: Vec<Ticker>,
     switch_s: f64,
+    /// When a handle that sits on its edge is looked at again: the sooner it is known where it went, the truer the ledger.
+    edge_s: f64,
     /// `Some` where contacts open and close.
     contacts: Vec<Contact>,
     /// Whether each handle was in contact when it was last told of.
@@ -92,13 +94,13 @@ pub struct Course<'m> {
     locate: bool,
     /// Last event of each handle and how many came at nearly the same moment.
     recent: Vec<(f64, u32)>,
-    /// By how much each handle has to pass its zero since then, N.
-    slack: Vec<f64>,
     most_evaluations: u64,
 }
 
 /// So many changes of one handle at the same moment, and it is treated as sitting on the edge.
 const CHATTER: u32 = 6;
+/// Changes of one handle that are no further apart than this are of the same moment, s.
+const CHATTER_S: f64 = 1e-9;
 
 impl<'m> Course<'m> {
     pub fn new(model: &'m Model, method: &'static str, settings: &Settings, locate: bool) -> Self {
@@ -121,12 +123,12 @@ impl<'m> Course<'m> {
                 .map(|rate_hz| Ticker::new(rate_hz, scene.duration_s))
                 .collect(),
             switch_s: f64::INFINITY,
+            edge_s: f64::INFINITY,
             contacts: vec![Contact::Clamped; n],
             touching: vec![false; n],
             watch: vec![(f64x2::ZERO, f64x2::splat(f64::INFINITY)); pairs(n)],
             locate,
             recent: vec![(f64::NEG_INFINITY, 0); n],
-            slack: vec![0.0; n],
             most_evaluations: settings.most_evaluations,
         };
         course.begin_segment();
@@ -138,7 +140,7 @@ impl<'m> Course<'m> {
 
     /// The next moment that a step must not cross.
     pub fn stop_s(&self) -> f64 {
-        self.switch_s.min(self.end_s)
+        self.switch_s.min(self.end_s).min(self.edge_s)
     }
 
     /// Whether the run has reached its end.
@@ -269,8 +271,8 @@ impl<'m> Course<'m> {
     /// Changes the contacts that have passed their zero at the present state, whose margin is not positive.
     ///
     /// The two laws agree at the zero, so the state and its rate are continuous there. Handles that rounding cannot tell from the one
-    /// that is there change with it, and one that has just changed must pass its zero by more than rounding to change back. A handle
-    /// that changes again and again at one moment sits on its edge: it is clamped, which is exact for it, until it has left the edge.
+    /// that is there change with it. A handle that changes again and again at one moment sits on its edge: it is clamped,
+    /// which is exact for it, until it has left the edge.
     pub fn fire(&mut self, observer: &mut dyn Observer) {
         self.model.forces(self.t_s, &self.y, &mut self.w);
         self.stats.evaluations += 1;
@@ -279,11 +281,10 @@ impl<'m> Course<'m> {
         for i in 0..self.contacts.len() {
             let free = self.w.of(i, |p| p.unclamped);
             let height_m = self.w.of(i, |p| p.base[2].abs() + p.gap[2].abs());
-            let rounding = self.model.contact_rounding_n(i, height_m);
-            let near = if self.t_s - self.recent[i].0 < 1e-9 {
-                edge - self.slack[i]
+            let near = if self.t_s - self.recent[i].0 < CHATTER_S {
+                edge
             } else {
-                edge + rounding
+                edge + self.model.contact_rounding_n(i, height_m)
             };
             let (kind, next) = match self.contacts[i] {
                 Contact::Closed if free <= near => (EventKind::ContactOpened, Contact::Open),
@@ -291,7 +292,7 @@ impl<'m> Course<'m> {
                 _ => continue,
             };
             let (last_s, count) = self.recent[i];
-            let count = if self.t_s - last_s < 1e-9 {
+            let count = if self.t_s - last_s < CHATTER_S {
                 count + 1
             } else {
                 0
@@ -305,11 +306,10 @@ impl<'m> Course<'m> {
                     next
                 },
             );
-            // What rounding leaves on the wrong side of the zero, or may, is the zero of the new segment.
+            // What rounding leaves on the wrong side of the zero is the zero of the new segment.
             let (sense, zero) = &mut self.watch[i / LANES];
             let short = (sense.as_array()[i % LANES] * free).min(0.0);
-            self.slack[i] = rounding - short;
-            zero.as_mut_array()[i % LANES] += self.slack[i];
+            zero.as_mut_array()[i % LANES] -= short;
             self.changed(i, kind, observer);
         }
     }
@@ -343,10 +343,11 @@ impl<'m> Course<'m> {
 
     /// Takes handles off the edge once they have left it.
     fn settle(&mut self) {
+        self.edge_s = f64::INFINITY;
         self.model.forces(self.t_s, &self.y, &mut self.w);
         self.stats.evaluations += 1;
         for i in 0..self.contacts.len() {
-            if self.contacts[i] == Contact::Clamped && self.t_s - self.recent[i].0 > 1e-9 {
+            if self.contacts[i] == Contact::Clamped && self.t_s - self.recent[i].0 >= CHATTER_S {
                 let contact = Self::standing(self.w.of(i, |p| p.unclamped));
                 self.set_contact(i, contact);
             }
@@ -365,6 +366,9 @@ impl<'m> Course<'m> {
 
     fn set_contact(&mut self, i: usize, contact: Contact) {
         self.contacts[i] = contact;
+        if contact == Contact::Clamped {
+            self.edge_s = self.t_s + 2.0 * CHATTER_S;
+        }
         let (gain, floor) = match contact {
             Contact::Closed => (1.0, f64::NEG_INFINITY),
             Contact::Open => (0.0, 0.0),

@@ -4,7 +4,7 @@
 //! give it at their own times for nothing. The rule: an event fires at the first zero on (t₀, t₁]; a step that begins on a
 //! zero does not fire again; a margin that touches zero from above without passing it (grazing) is no event.
 
-/// Margins seen at the stages of one step, in the order of their times.
+/// Margins seen at the start and the stages of one step.
 pub struct Looks {
     seen: [(f64, f64); MOST],
     count: usize,
@@ -14,8 +14,10 @@ pub struct Looks {
 }
 
 const MOST: usize = 16;
-/// A least margin below this part of the largest may hide a zero between two stages.
-const NEAR: f64 = 0.05;
+/// A least margin above this part of the largest hides no zero between two looks.
+const NEAR: f64 = 0.5;
+/// So far a parabola through three looks may be wrong about how low a dip goes, in parts of the dip.
+const DOUBT: f64 = 0.3;
 
 impl Looks {
     pub fn new() -> Self {
@@ -31,6 +33,18 @@ impl Looks {
     #[inline(always)]
     pub fn clear(&mut self) {
         (self.count, self.least, self.most, self.spoilt) = (0, f64::INFINITY, 0.0, false);
+    }
+
+    /// The margin at the start of the step. A start on a zero may be a hair behind it.
+    #[inline(always)]
+    pub fn note_start(&mut self, margin: f64) {
+        self.note(0.0, margin.max(0.0));
+    }
+
+    /// The margin noted last, which is that at the end of the step once all stages are through.
+    #[inline(always)]
+    pub fn latest(&self) -> f64 {
+        self.seen[(self.count + MOST - 1) % MOST].1
     }
 
     /// A margin at `theta` of the step.
@@ -51,9 +65,7 @@ impl Looks {
     /// Whether a low margin lies between two higher ones.
     fn dips(&self) -> bool {
         let (seen, n) = self.sorted();
-        seen[..n]
-            .windows(3)
-            .any(|w| w[1].1 < NEAR * self.most && w[1].1 <= w[0].1 && w[1].1 < w[2].1)
+        (0..n).any(|i| dip(&seen[..n], i).is_some())
     }
 
     /// Says that the stages of the step have been overwritten.
@@ -65,42 +77,88 @@ impl Looks {
         self.spoilt
     }
 
+    /// In the order of their times; of two at one time, the one noted last, which is the more accurate.
     fn sorted(&self) -> ([(f64, f64); MOST], usize) {
-        let (mut seen, n) = (self.seen, self.count.min(MOST));
-        seen[..n].sort_unstable_by(|a, b| a.0.total_cmp(&b.0));
+        let (mut seen, mut n) = (self.seen, 0);
+        for &look in &self.seen[..self.count.min(MOST)] {
+            let at = seen[..n].partition_point(|s| s.0 < look.0);
+            if at == n || seen[at].0 > look.0 {
+                seen.copy_within(at..n, at + 1);
+                n += 1;
+            }
+            seen[at] = look;
+        }
         (seen, n)
     }
 }
 
-/// The first zero of `margin` on (0, 1], to `resolution`. The stages say where to look; their states are less accurate than those
+/// The neighbourhood of look `i` if a dip there may reach zero, as (left, lowest, right): around a look between two higher ones, or
+/// at the step's border towards which the margin falls and rises again.
+fn dip(seen: &[(f64, f64)], i: usize) -> Option<[f64; 3]> {
+    let last = seen.len().checked_sub(1).filter(|&last| last >= 2)?;
+    let middle = i.clamp(1, last - 1);
+    let [l, m, r] = [seen[middle - 1], seen[middle], seen[middle + 1]];
+    let (from, to) = if i == 0 {
+        (l.0, m.0)
+    } else if i == last {
+        (m.0, r.0)
+    } else if m.1 <= l.1 && m.1 <= r.1 {
+        (l.0, r.0)
+    } else {
+        return None;
+    };
+    let (at, margin) = lowest(l, m, r)?;
+    // The parabola is right to a part of the dip's own depth.
+    let near = margin < DOUBT * (l.1.max(r.1) - margin);
+    (near && from < at && at < to).then_some([from, at, to])
+}
+
+/// The first zero of `margin` on (0, 1], to `resolution`. The looks say where to search; their states are less accurate than those
 /// that `margin` sees (the first ones are of first order), so both ends of a bracket are looked at again.
 pub fn first(looks: &Looks, resolution: f64, mut margin: impl FnMut(f64) -> f64) -> Option<f64> {
     let (seen, n) = looks.sorted();
     let seen = &seen[..n];
     for (i, &(theta, value)) in seen.iter().enumerate() {
-        if value < 0.0 {
+        let beyond = if value < 0.0 {
             let b = (theta, margin(theta));
-            if b.1 <= 0.0 {
-                return Some(back_from(b, &seen[..i], resolution, margin));
-            }
+            (b.1 <= 0.0).then_some(b)
         } else {
-            // A dip between stages shows as the lowest of three neighbours.
-            if let (Some(before), Some(after)) =
-                (i.checked_sub(1).map(|j| seen[j]), seen.get(i + 1))
-                && value < NEAR * looks.most
-                && value <= before.1
-                && value <= after.1
-                && after.1 >= 0.0
-            {
-                let at = lowest(before, (theta, value), *after);
-                let b = (at, margin(at));
-                if b.1 < 0.0 {
-                    return Some(back_from(b, &seen[..i], resolution, margin));
-                }
-            }
+            dip(seen, i).and_then(|around| depth(around, &mut margin))
+        };
+        if let Some(b) = beyond {
+            let before = seen.partition_point(|s| s.0 < b.0);
+            return Some(back_from(b, &seen[..before], resolution, margin));
         }
     }
     None
+}
+
+/// The lowest place near the middle of three, if the margin is negative there: two parabolas, through true margins.
+fn depth(around: [f64; 3], margin: &mut impl FnMut(f64) -> f64) -> Option<(f64, f64)> {
+    let mut middle = (around[1], margin(around[1]));
+    if middle.1 >= 0.0 {
+        let [mut l, mut r] = [around[0], around[2]].map(|theta| (theta, margin(theta)));
+        for _ in 0..2 {
+            let (theta, _) = lowest(l, middle, r).filter(|lowest| lowest.0 != middle.0)?;
+            let next = (theta, margin(theta));
+            if next.1 < 0.0 {
+                middle = next;
+                break;
+            }
+            let (near, far) = if theta < middle.0 {
+                (&mut r, &mut l)
+            } else {
+                (&mut l, &mut r)
+            };
+            if next.1 < middle.1 {
+                *near = middle;
+                middle = next;
+            } else {
+                *far = next;
+            }
+        }
+    }
+    (middle.1 < 0.0).then_some(middle)
 }
 
 /// The zero before `b` (margin ≤ 0), behind the last of the looks before it whose margin is positive indeed.
@@ -115,21 +173,20 @@ fn back_from(
         if here.1 > 0.0 {
             return between(here, b, resolution, margin);
         }
-        b = here;
+        if theta > 0.0 {
+            b = here;
+        }
     }
     // A zero at the step's start has fired already: the step begins on its far side.
     between((0.0, 0.0), b, resolution, margin)
 }
 
-/// Where the parabola through three points is lowest, within them.
-fn lowest(l: (f64, f64), m: (f64, f64), r: (f64, f64)) -> f64 {
+/// Where and how low the parabola through three points is lowest, within them.
+fn lowest(l: (f64, f64), m: (f64, f64), r: (f64, f64)) -> Option<(f64, f64)> {
     let (left, right) = ((m.1 - l.1) / (m.0 - l.0), (r.1 - m.1) / (r.0 - m.0));
-    let bend = right - left;
-    if bend > 0.0 {
-        (0.5 * (l.0 + m.0) - left * 0.5 * (r.0 - l.0) / bend).clamp(l.0, r.0)
-    } else {
-        m.0
-    }
+    let bend = (right - left) / (r.0 - l.0);
+    let at = (0.5 * (l.0 + m.0 - left / bend)).clamp(l.0, r.0);
+    (bend > 0.0).then(|| (at, l.1 + (at - l.0) * (left + bend * (at - m.0))))
 }
 
 /// The zero between `a` (margin > 0) and `b` (margin ≤ 0). Chandrupatla's method (1997): inverse quadratic where the margin is

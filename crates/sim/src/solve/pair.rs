@@ -192,6 +192,8 @@ struct Run<'m, P, const EVENTS: bool> {
     relative: Vec<Tile>,
     watched: f64,
     looks: Looks,
+    /// The margin at the start of the step.
+    margin_n: f64,
     /// Whether somebody asks if the steps are limited by stability; how many were, one after the other; since when.
     watch: bool,
     stiff_in_row: u32,
@@ -272,6 +274,7 @@ impl<'m, P: Pair, const EVENTS: bool> Run<'m, P, EVENTS> {
             relative,
             watched: watched as f64,
             looks: Looks::new(),
+            margin_n: 0.0,
             watch,
             stiff_in_row: 0,
             row_began: (0.0, 0),
@@ -397,6 +400,7 @@ impl<'m, P: Pair, const EVENTS: bool> Run<'m, P, EVENTS> {
     /// The first slope after a switch or an event.
     fn begin(&mut self) {
         self.course.slope(&mut self.slope);
+        self.margin_n = self.course.margin_n();
         for (k, slope) in self.k.iter_mut().zip(tiles(&self.slope)) {
             k[0] = *slope;
         }
@@ -458,6 +462,7 @@ impl<'m, P: Pair, const EVENTS: bool> Run<'m, P, EVENTS> {
     fn step<F: Arithmetic>(&mut self, h: f64) -> f64 {
         if EVENTS {
             self.looks.clear();
+            self.looks.note_start(self.margin_n);
         }
         stages!(self, h, 1, P::STAGES + 1, [1 2 3 4 5 6 7 8 9 10 11 12 13 14 15]);
         let mut squares = [0.0; 2];
@@ -512,6 +517,9 @@ impl<'m, P: Pair, const EVENTS: bool> Run<'m, P, EVENTS> {
         }
         for k in &mut self.k {
             k[0] = k[P::STAGES];
+        }
+        if EVENTS {
+            self.margin_n = self.looks.latest();
         }
         Ok(Moved::On)
     }

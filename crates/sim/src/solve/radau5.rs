@@ -176,6 +176,8 @@ struct Radau {
     h_s: f64,
     before: Option<(f64, f64)>,
     looks: Looks,
+    /// The margin at the start of the step.
+    margin_n: f64,
 }
 
 impl Radau {
@@ -210,6 +212,7 @@ impl Radau {
             h_s: 0.0,
             before: None,
             looks: Looks::new(),
+            margin_n: 0.0,
         };
         radau.begin(course);
         let speed = radau.norm(&radau.slope, &course.y) * tolerance;
@@ -220,6 +223,7 @@ impl Radau {
     /// Slope and Jacobian anew: the state or its law has changed at once.
     fn begin(&mut self, course: &mut Course<'_>) {
         course.slope(&mut self.slope);
+        self.margin_n = course.margin_n();
         self.differentiate(course);
         (self.dense_step_s, self.before) = (None, None);
     }
@@ -494,6 +498,7 @@ impl Radau {
             self.begin(course);
         } else {
             course.slope(&mut self.slope);
+            self.margin_n = course.margin_n();
             self.fresh = false;
             // Slow convergence means that the Jacobian has aged.
             if rounds > 3 {
@@ -533,6 +538,7 @@ impl Radau {
     /// The first zero of the margins within the step.
     fn event(&mut self, course: &mut Course<'_>, t0: f64, h: f64) -> Option<f64> {
         self.looks.clear();
+        self.looks.note_start(self.margin_n);
         for theta in LOOKS {
             self.between(course, theta);
             let margin = course.margin_at_n(t0 + theta * h, &self.at);
