@@ -84,7 +84,7 @@ impl Plan {
             .iter()
             .map(|(key, value)| format!("{key}={value}"))
             .collect();
-        // Nobody reads an energy account here; without it the motion is the same and costs less.
+        // Nobody reads an energy account here; without it the motion is the same within the tolerance and costs less.
         if !spec.recordings && !set.iter().any(|s| s.starts_with("solver.energy=")) {
             set.push("solver.energy=false".into());
         }
