@@ -50,7 +50,7 @@ absent() {
         copy=$TARGET/without/workspace
         rm -rf "$copy"
         mkdir -p "$copy"
-        cp -r Cargo.toml Cargo.lock crates schemas tests "$copy"
+        cp -rp Cargo.toml Cargo.lock crates schemas tests "$copy"
         effects=$copy/crates/sim/src/effects
         rm "$effects/$e.rs"
         sed -i "/^pub mod $e;/d; /^    pub $e: Option</d" "$effects/mod.rs"

@@ -229,7 +229,7 @@ def pole_friction(axis):
     for start, colour in ((1.0, GREEN), (10.0, BLUE), (40.0, ORANGE)):
         t, roll = state(text, f"start.roll_pitch_yaw_deg=[{start}, 0.0, 0.0]", of=lambda m: m.roll_rad)
         axis.plot(t, np.degrees(roll) / start, color=colour, lw=1, label=f"from {start:g}°")
-    axis.set(xlabel="time (s)", ylabel="roll over its start")
+    axis.set(xlabel="time (s)", ylabel="roll over its start", xlim=(0, 10))
 
 
 def flexure(axis):
