@@ -3,7 +3,8 @@
 # workspace's root. It takes a while: one build for every effect.
 #   docs/effects.sh            every table
 #   docs/effects.sh costs      what an effect costs where it is on
-#   docs/effects.sh absent     what it costs where it is off, against a build in which its file does not exist
+#   docs/effects.sh absent [GROUP]...  what it costs where it is off, against a build in which its file does not exist;
+#                              a group, "hold friction", is left out together
 #   docs/effects.sh freedoms   fewer freedoms
 set -eu
 WHAT=${1:-all}
@@ -44,25 +45,29 @@ costs() {
     echo "friction, bristle | $((($(count "$COST" music $fixed effects.sling=false effects.friction.law=bristle) - bare) / calls))"
 }
 
-absent() {
-    for e in $ON_IN_MUSIC $OFF_IN_MUSIC; do
-        # A workspace in which the effect is not: its file, its lines in mod.rs, and what other effects ask about it.
+absent() { # [GROUP]...: the effects to leave out together, a build for each group; without groups one for every effect
+    [ $# -gt 0 ] || set -- $ON_IN_MUSIC $OFF_IN_MUSIC
+    for group in "$@"; do
+        # A workspace in which they are not: their files, their lines in mod.rs, and what other effects ask about them.
         copy=$TARGET/without/workspace
         rm -rf "$copy"
         mkdir -p "$copy"
         cp -rp Cargo.toml Cargo.lock crates schemas tests "$copy"
         effects=$copy/crates/sim/src/effects
-        rm "$effects/$e.rs"
-        sed -i "/^pub mod $e;/d; /^    pub $e: Option</d" "$effects/mod.rs"
-        sed -i -z "s/    entry!(\s*$e,\s*\"[^\"]*\"\s*),\n//" "$effects/mod.rs"
-        sed -i "s/scene\.effects\.$e\.is_some()/false/; s/scene\.effects\.$e\.is_none()/true/" "$effects"/*.rs
+        settings=duration_s=20.0
+        for e in $group; do
+            rm "$effects/$e.rs"
+            sed -i "/^pub mod $e;/d; /^    pub $e: Option</d" "$effects/mod.rs"
+            sed -i -z "s/    entry!(\s*$e,\s*\"[^\"]*\"\s*),\n//" "$effects/mod.rs"
+            sed -i "s/scene\.effects\.$e\.is_some()/false/; s/scene\.effects\.$e\.is_none()/true/" "$effects"/*.rs
+            settings="$settings $(without "$e")"
+        done
         (cd "$copy" && cargo build --quiet --release -p sim --example cost --target-dir ../target 2>"$TMP/build.log") ||
             { cat "$TMP/build.log"; exit 1; }
-        set -- $(without "$e")
-        "$TARGET/release/sim" scenes music --set duration_s=20.0 $(printf -- '--set %s ' "$@") >"$TMP/scene.toml"
+        "$TARGET/release/sim" scenes music $(printf -- '--set %s ' $settings) >"$TMP/scene.toml"
         here=$(count "$COST" "$TMP/scene.toml")
         there=$(count "$TARGET/without/target/release/examples/cost" "$TMP/scene.toml")
-        echo "$e | $((here / 20)) | $((there / 20)) | $(percent $((here - there)) "$there") %"
+        echo "$group | $((here / 20)) | $((there / 20)) | $(percent $((here - there)) "$there") %"
     done
 }
 
@@ -79,8 +84,9 @@ freedoms() {
     done
 }
 
+[ $# -eq 0 ] || shift
 case $WHAT in
 all) costs && absent && freedoms ;;
-costs | absent | freedoms) $WHAT ;;
+costs | absent | freedoms) $WHAT "$@" ;;
 *) sed -n 's/^# //p' "$0" >&2 && exit 2 ;;
 esac

@@ -199,6 +199,8 @@ fn settings_are_checked_like_the_scene() {
         2.0
     );
     assert!(with("effects.music=false").unwrap().effects.music.is_none());
+    // What is not there can be taken away too, but not what cannot be.
+    assert!(with("effects.hold=false").unwrap().effects.hold.is_none());
     assert!(
         with("effects.gait.amplitude_m=0.07")
             .unwrap()
@@ -208,6 +210,7 @@ fn settings_are_checked_like_the_scene() {
     );
     for (setting, words) in [
         ("effects.music.beat_hs=2", "Did you mean `beat_hz`?"),
+        ("effects.musik=false", "Did you mean `music`?"),
         ("effects.music.beat_hz=fast", "expected a number"),
         ("effects.music.beat_hz=-2", "zero or more"),
         ("duration_s", "KEY=VALUE"),

@@ -225,11 +225,18 @@ fn apply(scene: Scene, settings: &[String]) -> Result<Scene, SceneError> {
         };
         let (key, value) = (key.trim(), value.trim());
         let path: Vec<&str> = key.split('.').collect();
-        set_key(&mut table, &path, setting_value(value))
-            .map_err(|m| fail(format!("{key}: {m}")))?;
+        let parsed = setting_value(value);
+        let (takes_away, before) = (parsed == toml::Value::Boolean(false), table.clone());
+        set_key(&mut table, &path, parsed).map_err(|m| fail(format!("{key}: {m}")))?;
         // One setting at a time, so that the message names the setting at fault.
-        let _: Scene = toml::Table::try_into(table.clone())
-            .map_err(|e: toml::de::Error| fail(format!("{setting}: {}", readable(e.message()))))?;
+        match toml::Table::try_into::<Scene>(table.clone()) {
+            Ok(_) => {}
+            // A known key that is no switch: what it names is not there already.
+            Err(e) if takes_away && e.message().starts_with("invalid type: boolean") => {
+                table = before;
+            }
+            Err(e) => return Err(fail(format!("{setting}: {}", readable(e.message())))),
+        }
     }
     table
         .try_into()
