@@ -265,7 +265,13 @@ impl<'m, P: Pair, const EVENTS: bool> Run<'m, P, EVENTS> {
             };
         }
         // The ledger feeds nothing back, yet a rest that is quadrature's own would accuse the motion. Its unit: lifted by 1 m.
-        let gravity: f64 = model.scene.body.gravity_m_per_s2.iter().map(|g| g * g).sum();
+        let gravity: f64 = model
+            .scene
+            .body
+            .gravity_m_per_s2
+            .iter()
+            .map(|g| g * g)
+            .sum();
         let unit_j = model.scene.body.mass_kg * (1.0 + gravity.sqrt());
         for d in watched..course.y.len() {
             weight.as_flattened_mut()[d] = LEDGER / unit_j;
