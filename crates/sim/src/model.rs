@@ -187,6 +187,8 @@ pub struct Model {
     natural_rad_per_s: Vec<f64>,
     initial_phases: Vec<f64>,
     has_phases: bool,
+    /// Whether anything looks at the carriers or acts on the handles.
+    carried: bool,
     terms: [Vec<Box<dyn Term>>; 6],
     /// Whose each term is, in the same order.
     owners: [Vec<&'static str>; 6],
@@ -236,6 +238,7 @@ impl Model {
                 })
                 .collect(),
             has_phases: false,
+            carried: true,
             terms: Default::default(),
             owners: Default::default(),
             building: "",
@@ -273,6 +276,9 @@ impl Model {
         model.layout.phases = if model.has_phases { n } else { 0 };
         model.layout.extra = model.extra.len();
         model.layout.ledger = 2 * model.accounts.len();
+        model.carried = model.has_phases
+            || !model.accounts.is_empty()
+            || model.terms.iter().any(|stage| !stage.is_empty());
         model
     }
 
@@ -545,6 +551,17 @@ impl Model {
     /// The right-hand side: dy = f(t, y).
     #[inline]
     pub fn rhs(&self, t_s: f64, y: &[f64], dy: &mut [f64], w: &mut Workspace) {
+        if self.carried {
+            return self.rhs_of_all(t_s, y, dy, w);
+        }
+        // Nothing acts on the handles: nobody asks where they are until a sample does.
+        let pairs = std::mem::take(&mut w.pair);
+        self.rhs_of_all(t_s, y, dy, w);
+        w.pair = pairs;
+    }
+
+    #[inline(always)]
+    fn rhs_of_all(&self, t_s: f64, y: &[f64], dy: &mut [f64], w: &mut Workspace) {
         self.forces(t_s, y, w);
         self.freedoms.accelerate(y, w, dy);
         let phases = self.layout.phase_range();

@@ -119,7 +119,8 @@ const GROW: f64 = 6.0;
 const SMALLEST_STEP_S: f64 = 1e-13;
 /// Below this a step's error estimate is rounding.
 const FINEST: f64 = 3e-15;
-/// The last term of the dense polynomial may be so many times the tolerance; its error is well below its last term.
+/// Where a step may end at an event: the last term of the dense polynomial may be so many times what a step may err; its error is well
+/// below its last term.
 const TRUST: f64 = 10.0;
 
 /// How an explicit run ended.
@@ -177,6 +178,8 @@ fn integrate_fused<P: Pair, const EVENTS: bool>(
 struct Run<'m, P, const EVENTS: bool> {
     course: Course<'m>,
     tolerance: f64,
+    /// As [`TRUST`], for samples: errors of what is only looked at do not add up, so the last term may be the tolerance asked for.
+    trust: f64,
     /// Stages by tile.
     k: Vec<Slopes>,
     dense: Vec<Polynomial>,
@@ -277,9 +280,11 @@ impl<'m, P: Pair, const EVENTS: bool> Run<'m, P, EVENTS> {
             weight.as_flattened_mut()[d] = LEDGER / unit_j;
             relative.as_flattened_mut()[d] = LEDGER / unit_j;
         }
+        let tolerance = (settings.tolerance * P::SHARE).max(FINEST);
         let mut run = Self {
             course,
-            tolerance: (settings.tolerance * P::SHARE).max(FINEST),
+            tolerance,
+            trust: TRUST.max(settings.tolerance / tolerance),
             k: vec![[[0.0; TILE]; MOST_STAGES]; count],
             dense: vec![[[0.0; TILE]; MOST_ROWS]; count],
             trial: vec![0.0; size],
@@ -598,7 +603,7 @@ impl<'m, P: Pair, const EVENTS: bool> Run<'m, P, EVENTS> {
     /// Puts the state at `theta` of the step into `at`: off the polynomial where that is good enough, else by a step.
     #[inline(always)]
     fn between<F: Arithmetic>(&mut self, theta: f64, h: f64, last: f64) {
-        if last * P::last_term(theta) <= TRUST {
+        if last * P::last_term(theta) <= self.trust {
             interpolate::<P, F>(theta, &self.course.y, &self.dense, &mut self.at);
         } else {
             // The polynomial is spoilt by this, but whoever does not trust it at one place does not read it at another.
