@@ -186,7 +186,7 @@ fn lowest(l: (f64, f64), m: (f64, f64), r: (f64, f64)) -> Option<(f64, f64)> {
     let (left, right) = ((m.1 - l.1) / (m.0 - l.0), (r.1 - m.1) / (r.0 - m.0));
     let bend = (right - left) / (r.0 - l.0);
     let at = (0.5 * (l.0 + m.0 - left / bend)).clamp(l.0, r.0);
-    (bend > 0.0).then(|| (at, l.1 + (at - l.0) * (left + bend * (at - m.0))))
+    (bend > 0.0).then_some((at, l.1 + (at - l.0) * (left + bend * (at - m.0))))
 }
 
 /// The zero between `a` (margin > 0) and `b` (margin ≤ 0). Chandrupatla's method (1997): inverse quadratic where the margin is
