@@ -6,7 +6,7 @@ use super::{
     ReadError, ReadOptions, Recording, Tally,
     chunk::{self, Loss, Unpacker, WHOLE_BYTES},
     container::{Block, Definitions, Fields, op},
-    decode::{self, Decoder, NoDecoder, SchemaRef},
+    decode::{self, Decoder, NoDecoder, Place, SchemaRef},
     rows::{Rows, Selection},
 };
 use crate::finding::Kind;
@@ -69,14 +69,13 @@ struct ChannelState<'a> {
     index: usize,
     rows: Rows<'a>,
     state: State,
+    /// Messages of the block that wait to be decoded together.
+    waiting: Vec<Place>,
     times: Vec<i64>,
-    stamps: Vec<i64>,
-    stamped: bool,
     /// Messages that could not be decoded: count, time and text of the first.
     failed: Option<(u64, i64, String)>,
     closed: u64,
     out_of_range: u64,
-    expected: usize,
 }
 
 /// The memory of one thread.
@@ -198,12 +197,18 @@ impl<'a> Worker<'a> {
     }
 
     /// Reads records that stand one after the other.
-    fn records(&mut self, mut bytes: &[u8], result: &mut BlockResult) {
+    fn records(&mut self, block: &[u8], result: &mut BlockResult) {
+        let mut bytes = block;
         while let Some((opcode, body, rest)) = split_record(bytes) {
             bytes = rest;
             if opcode == op::MESSAGE {
                 result.messages += 1;
-                self.message(body, result);
+                self.message(body, block.len() - rest.len(), result);
+            }
+        }
+        for &index in &self.touched {
+            if let Some(channel) = &mut self.channels[index] {
+                channel.decode(block);
             }
         }
         if !bytes.is_empty() {
@@ -221,8 +226,9 @@ impl<'a> Worker<'a> {
         }
     }
 
+    /// Notes where a message lies; its record ends at byte `end` of the block.
     #[inline]
-    fn message(&mut self, body: &[u8], result: &mut BlockResult) {
+    fn message(&mut self, body: &[u8], end: usize, result: &mut BlockResult) {
         let Some((header, data)) = body.split_first_chunk::<22>() else {
             result.troubles.push(Trouble {
                 channel: None,
@@ -257,32 +263,8 @@ impl<'a> Worker<'a> {
             channel.out_of_range += 1;
             return;
         };
-        let State::Ready(decoder) = &mut channel.state else {
-            channel.closed += 1;
-            return;
-        };
-        if channel.times.is_empty() {
-            channel.times.reserve(channel.expected);
-            channel.stamps.reserve(channel.expected);
-        }
-        channel.rows.begin();
-        match decoder.decode(data, &mut channel.rows) {
-            Ok(()) => {
-                channel.rows.keep();
-                channel.times.push(time);
-                match channel.rows.stamp_ns {
-                    Some(stamp) => channel.stamps.push(stamp),
-                    None => channel.stamped = false,
-                }
-            }
-            Err(text) => {
-                channel.rows.abort();
-                match &mut channel.failed {
-                    Some((count, _, _)) => *count += 1,
-                    none => *none = Some((1, time, text)),
-                }
-            }
-        }
+        let bytes = end - data.len()..end;
+        channel.waiting.push(Place { bytes, time });
     }
 
     /// Moves what the channels hold into the result.
@@ -325,19 +307,54 @@ impl<'a> ChannelState<'a> {
             index,
             rows,
             state,
+            waiting: Vec::new(),
             times: Vec::new(),
-            stamps: Vec::new(),
-            stamped: true,
             failed: None,
             closed: 0,
             out_of_range: 0,
-            expected: 0,
         }
     }
 
     /// Whether the current block has given this channel anything yet.
     fn begun(&self) -> bool {
-        !self.times.is_empty() || self.failed.is_some() || self.closed > 0 || self.out_of_range > 0
+        !self.waiting.is_empty() || self.closed > 0 || self.out_of_range > 0
+    }
+
+    /// Decodes the messages that wait, which lie in `block`.
+    fn decode(&mut self, block: &[u8]) {
+        let State::Ready(decoder) = &mut self.state else {
+            // Messages without a decoder do not wait, they are counted.
+            self.closed += self.waiting.drain(..).len() as u64;
+            return;
+        };
+        let rows = &mut self.rows;
+        self.times.reserve(self.waiting.len());
+        let mut places = self.waiting.as_slice();
+        while let Some(place) = places.first() {
+            let alike = decoder.decode_alike(block, places, rows);
+            if alike > 0 {
+                let (done, rest) = places.split_at(alike);
+                self.times.extend(done.iter().map(|place| place.time));
+                places = rest;
+                continue;
+            }
+            rows.begin();
+            match decoder.decode(&block[place.bytes.clone()], rows) {
+                Ok(()) => {
+                    rows.keep();
+                    self.times.push(place.time);
+                }
+                Err(text) => {
+                    rows.abort();
+                    match &mut self.failed {
+                        Some((count, _, _)) => *count += 1,
+                        none => *none = Some((1, place.time, text)),
+                    }
+                }
+            }
+            places = &places[1..];
+        }
+        self.waiting.clear();
     }
 
     fn harvest(&mut self, result: &mut BlockResult) {
@@ -383,11 +400,10 @@ impl<'a> ChannelState<'a> {
                     }
                 })
                 .collect();
-            let stamps = std::mem::take(&mut self.stamps);
             result.batches.push(ChannelBatch {
                 channel: self.index,
                 times: std::mem::take(&mut self.times),
-                stamps: if self.stamped { stamps } else { Vec::new() },
+                stamps: self.rows.take_stamps(),
                 columns,
                 absent: self
                     .rows
@@ -401,9 +417,6 @@ impl<'a> ChannelState<'a> {
                 remark: self.rows.remark.take(),
             });
         }
-        self.expected = rows;
-        self.stamped = true;
-        self.stamps.clear();
         self.rows.clear();
     }
 }

@@ -5,7 +5,7 @@
 //! that does so is kept for the channel.
 
 use super::{
-    decode::{Decoder, SchemaRef},
+    decode::{Decoder, Place, SchemaRef},
     idl,
     layout::{Fail, Program, Shape},
     ros1::describe,
@@ -13,6 +13,12 @@ use super::{
     rows::Rows,
     types::{Type, Types},
 };
+
+/// Bytes that say how a message is represented.
+const HEADER: usize = 4;
+
+/// So many bytes of padding may follow a message.
+const PADDING: usize = 3;
 
 struct Cdr {
     types: Types,
@@ -133,10 +139,31 @@ impl Cdr {
 }
 
 impl Decoder for Cdr {
+    fn decode_alike(&mut self, block: &[u8], places: &[Place], rows: &mut Rows) -> usize {
+        let Some(first) = places.first().map(|place| &block[place.bytes.clone()]) else {
+            return 0;
+        };
+        let Some(&(representation, shape)) = self
+            .fitted
+            .iter()
+            .find(|(known, _)| first.starts_with(&[0, *known]))
+        else {
+            return 0;
+        };
+        let Some((_, program)) = self.programs.iter_mut().find(|(known, _)| *known == shape) else {
+            return 0;
+        };
+        if program.bytes_left().is_none_or(|left| left > PADDING) {
+            return 0;
+        }
+        let head = (&[0, representation][..], HEADER);
+        program.decode_alike(shape, block, places, head, rows)
+    }
+
     fn decode(&mut self, message: &[u8], rows: &mut Rows) -> Result<(), String> {
-        let Some((header, body)) = message.split_first_chunk::<4>() else {
+        let Some((header, body)) = message.split_first_chunk::<HEADER>() else {
             return Err(format!(
-                "CDR message of {} bytes has no room for its header of 4",
+                "CDR message of {} bytes has no room for its header of {HEADER}",
                 message.len()
             ));
         };
@@ -151,7 +178,7 @@ impl Decoder for Cdr {
             .iter()
             .find(|(known, _)| *known == representation)
             && let Ok(end) = self.run(shape, body, rows)?
-            && body.len() - end < 4
+            && body.len() - end <= PADDING
         {
             return Ok(());
         }
@@ -161,8 +188,7 @@ impl Decoder for Cdr {
             rows.abort();
             rows.begin();
             match self.run(shape, body, rows)? {
-                // Up to three bytes of padding may follow.
-                Ok(end) if body.len() - end < 4 => {
+                Ok(end) if body.len() - end <= PADDING => {
                     self.fitted.retain(|(known, _)| *known != representation);
                     self.fitted.push((representation, shape));
                     return Ok(());

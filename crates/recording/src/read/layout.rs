@@ -5,6 +5,7 @@
 //! Between runs stand the things of varying length: strings, sequences, arrays of structs that hold either.
 
 use super::{
+    decode::Place,
     rows::{Rows, UNWANTED},
     types::{Prim, Type, Types},
 };
@@ -126,6 +127,8 @@ struct Flat {
     doubles: Vec<(u32, u32)>,
     others: Vec<Load>,
     end: usize,
+    /// Whether every column gets one value: then messages can be taken column by column.
+    simple: bool,
 }
 
 /// What a message is decoded with.
@@ -157,6 +160,59 @@ impl Flat {
         for load in &self.others {
             load.take::<BIG>(data, rows);
         }
+    }
+
+    /// Takes and keeps messages that all fit, column by column; their fields begin `skip` bytes into them.
+    fn take_alike<const BIG: bool>(
+        &self,
+        block: &[u8],
+        places: &[Place],
+        skip: usize,
+        rows: &mut Rows,
+    ) {
+        let starts = places.iter().map(|place| place.bytes.start + skip);
+        for &(offset, column) in &self.doubles {
+            let at = |start| f64::from_bits(load::<8, BIG>(block, start + offset as usize));
+            rows.extend(column, starts.clone().map(at));
+        }
+        let (mut stamped, mut stamps) = (0, vec![0i64; places.len()]);
+        for load in &self.others {
+            let values = starts
+                .clone()
+                .map(|start| read::<BIG>(load.prim, block, start + load.offset as usize));
+            let scale = match load.sink {
+                Sink::StampSeconds => 1_000_000_000,
+                Sink::StampNanoseconds => 1,
+                Sink::Column(column) => {
+                    rows.extend(column, values);
+                    continue;
+                }
+                Sink::Covariance(field) => {
+                    let absent = values.filter(|value| *value == -1.0).count();
+                    rows.note_absent(field, absent as u64);
+                    continue;
+                }
+                Sink::Nowhere => continue,
+            };
+            stamped = places.len();
+            for (stamp, value) in stamps.iter_mut().zip(values) {
+                *stamp = stamp.wrapping_add((value as i64).wrapping_mul(scale));
+            }
+        }
+        // OK because rows are counted in u32 and a block is far from having as many messages.
+        rows.keep_alike(places.len() as u32, stamps[..stamped].iter().copied());
+    }
+
+    /// Whether no column gets two values, as those of a schema with two fields of one name do.
+    fn is_simple(&self) -> bool {
+        let doubles = self.doubles.iter().map(|(_, column)| *column);
+        let others = self.others.iter().filter_map(|load| match load.sink {
+            Sink::Column(column) => Some(column),
+            _ => None,
+        });
+        let mut columns: Vec<u32> = doubles.chain(others).collect();
+        columns.sort_unstable();
+        columns.windows(2).all(|pair| pair[0] != pair[1])
     }
 }
 
@@ -217,9 +273,44 @@ impl Program {
         let end = self.run(&mut context, 0, rows)?;
         if let Some(mut flat) = context.trace {
             flat.end = end;
+            flat.simple = flat.is_simple();
             self.flat = Some(flat);
         }
         Ok(end)
+    }
+
+    /// Bytes after the last field of the last message that was laid out like the one before; none before there is one.
+    pub fn bytes_left(&self) -> Option<usize> {
+        self.flat.as_ref().map(|flat| flat.length - flat.end)
+    }
+
+    /// Decodes and keeps, column by column, as many of the first messages at `places` as lie like the last one and begin with `head`;
+    /// their fields begin `skip` bytes into them. Returns how many.
+    pub fn decode_alike(
+        &mut self,
+        shape: Shape,
+        block: &[u8],
+        places: &[Place],
+        (head, skip): (&[u8], usize),
+        rows: &mut Rows,
+    ) -> usize {
+        let Some(flat) = self.flat.as_ref().filter(|flat| flat.simple) else {
+            return 0;
+        };
+        let fits = |place: &&Place| {
+            let message = &block[place.bytes.clone()];
+            message.starts_with(head) && message.get(skip..).is_some_and(|body| flat.fits(body))
+        };
+        let count = places.iter().take_while(fits).count();
+        if count > 0 {
+            self.misses = 0;
+            if shape.big_endian {
+                flat.take_alike::<true>(block, &places[..count], skip, rows);
+            } else {
+                flat.take_alike::<false>(block, &places[..count], skip, rows);
+            }
+        }
+        count
     }
 
     fn run(
@@ -538,7 +629,7 @@ impl Load {
             Sink::Column(column) => rows.push(column, value),
             Sink::StampSeconds => stamp((value as i64).wrapping_mul(1_000_000_000), rows),
             Sink::StampNanoseconds => stamp(value as i64, rows),
-            Sink::Covariance(field) if value == -1.0 => rows.note_absent(field),
+            Sink::Covariance(field) if value == -1.0 => rows.note_absent(field, 1),
             Sink::Covariance(_) | Sink::Nowhere => {}
         }
     }

@@ -1,7 +1,7 @@
 //! ROS 1 messages (`ros1`): packed little-endian fields, laid out by `ros1msg` text.
 
 use super::{
-    decode::{Decoder, SchemaRef},
+    decode::{Decoder, Place, SchemaRef},
     layout::{Fail, Problem, Program, Shape},
     ros2msg::{self, Dialect},
     rows::Rows,
@@ -30,6 +30,16 @@ pub(super) fn open(schema: &SchemaRef<'_>, rows: &mut Rows) -> Result<Box<dyn De
 }
 
 impl Decoder for Ros1 {
+    fn decode_alike(&mut self, block: &[u8], places: &[Place], rows: &mut Rows) -> usize {
+        let count = self
+            .program
+            .decode_alike(SHAPE, block, places, (&[], 0), rows);
+        if self.program.bytes_left() > Some(0) {
+            rows.trailing += count as u64;
+        }
+        count
+    }
+
     fn decode(&mut self, message: &[u8], rows: &mut Rows) -> Result<(), String> {
         let end = self
             .program

@@ -30,6 +30,8 @@ pub(super) struct Rows<'a> {
     row: u32,
     /// Header stamp of the message that is being decoded.
     pub stamp_ns: Option<i64>,
+    /// Header stamps of the rows; short of some where not every message has one.
+    stamps: Vec<i64>,
     /// Fields that messages declare as not given, with how many do.
     pub absent: Vec<(String, u64)>,
     /// Sequences that were too long to become signals: field and count.
@@ -54,6 +56,7 @@ impl<'a> Rows<'a> {
             index: HashMap::new(),
             row: 0,
             stamp_ns: None,
+            stamps: Vec::new(),
             absent: Vec::new(),
             long: Vec::new(),
             remark: None,
@@ -113,6 +116,40 @@ impl<'a> Rows<'a> {
         }
     }
 
+    /// Gives a column one value for each of the next rows, which [`Self::keep_alike`] then keeps.
+    ///
+    /// No column may get values twice.
+    #[inline]
+    pub fn extend(&mut self, column: u32, values: impl ExactSizeIterator<Item = f64>) {
+        let row = self.row;
+        let Some(column) = self.columns.get_mut(column as usize) else {
+            return;
+        };
+        if !column.sparse && column.values.len() == row as usize {
+            column.values.extend(values);
+        } else {
+            for (row, value) in (row..).zip(values) {
+                column.push_slowly(row, value);
+            }
+        }
+    }
+
+    /// Keeps rows that were given by [`Self::extend`], all with a header stamp or all without.
+    pub fn keep_alike(&mut self, rows: u32, stamps: impl ExactSizeIterator<Item = i64>) {
+        self.row += rows;
+        self.stamps.extend(stamps);
+    }
+
+    /// The header stamps of the rows; none where not every row has one.
+    pub fn take_stamps(&mut self) -> Vec<i64> {
+        let stamps = std::mem::take(&mut self.stamps);
+        if stamps.len() == self.row as usize {
+            stamps
+        } else {
+            Vec::new()
+        }
+    }
+
     /// Counts a sequence that is too long to become signals.
     pub fn note_long(&mut self, field: &str) {
         count(&mut self.long, field);
@@ -128,11 +165,11 @@ impl<'a> Rows<'a> {
         }) as u32
     }
 
-    /// Counts a message that declares a field as not given.
+    /// Counts messages that declare a field as not given.
     #[inline]
-    pub fn note_absent(&mut self, field: u32) {
+    pub fn note_absent(&mut self, field: u32, messages: u64) {
         if let Some((_, count)) = self.absent.get_mut(field as usize) {
-            *count += 1;
+            *count += messages;
         }
     }
 
@@ -144,6 +181,7 @@ impl<'a> Rows<'a> {
     /// Keeps the message that was decoded.
     pub fn keep(&mut self) {
         self.row += 1;
+        self.stamps.extend(self.stamp_ns);
     }
 
     /// Takes back what a message gave before it turned out to be broken.
@@ -178,6 +216,7 @@ impl<'a> Rows<'a> {
         for (_, count) in &mut self.absent {
             *count = 0;
         }
+        self.stamps.clear();
         self.long.clear();
         self.trailing = 0;
         for column in &mut self.columns {
