@@ -399,7 +399,7 @@ impl<'a> Pass<'a> {
                     entry
                 }
             };
-            self.push(entry, batch, column.rows, column.values);
+            self.push(entry, batch, column.rows, column.values, column.finite);
         }
         let mut quaternions = std::mem::take(&mut self.quaternions);
         quaternions.each(batch, |path, values| {
@@ -412,7 +412,7 @@ impl<'a> Pass<'a> {
                         entry
                     }
                 };
-                self.push(entry, batch, None, values);
+                self.push(entry, batch, None, values, false);
             }
         });
         self.quaternions = quaternions;
@@ -454,10 +454,17 @@ impl<'a> Pass<'a> {
         self.entries.len() - 1
     }
 
-    fn push(&mut self, entry: usize, batch: &Batch<'_>, rows: Option<&[u32]>, values: &[f64]) {
+    fn push(
+        &mut self,
+        entry: usize,
+        batch: &Batch<'_>,
+        rows: Option<&[u32]>,
+        values: &[f64],
+        finite: bool,
+    ) {
         let entry = &mut self.entries[entry];
         if entry.listed {
-            entry.stream.push(values);
+            entry.stream.push(values, finite);
         }
         if rows.is_some() && entry.times.is_none() {
             entry.times = Some(Times::default());

@@ -112,9 +112,10 @@ fn peaks(s: &Spectrum, f_hz: Option<f64>) -> Vec<Peak> {
     if p.len() < 5 {
         return Vec::new();
     }
-    let mut sorted = p[1..].to_vec();
-    sorted.sort_by(f64::total_cmp);
-    let (median, largest) = (sorted[sorted.len() / 2], sorted[sorted.len() - 1]);
+    let mut bins = p[1..].to_vec();
+    let middle = bins.len() / 2;
+    let median = *bins.select_nth_unstable_by(middle, f64::total_cmp).1;
+    let largest = p[1..].iter().copied().fold(median, f64::max);
     let floor = (ABOVE_MEDIAN * median).max(BELOW_PEAK * largest);
     // Maxima of five bins: the taper's main lobe is four wide.
     let is_top = |k: &usize| {

@@ -42,8 +42,8 @@ pub struct Moments {
     max: f64,
 }
 
-/// Lanes of the inner sums: as many independent additions as keep the processor busy.
-const LANES: usize = 8;
+/// Lanes of the inner sums: as many independent additions as the registers hold.
+const LANES: usize = 4;
 
 impl Moments {
     /// The next values, all finite.
@@ -178,7 +178,11 @@ impl Times {
 
 /// `to − from` in seconds, without overflow.
 fn seconds(from_ns: i64, to_ns: i64) -> f64 {
-    (i128::from(to_ns) - i128::from(from_ns)) as f64 / 1e9
+    let ns = match to_ns.checked_sub(from_ns) {
+        Some(ns) => ns as f64,
+        None => (i128::from(to_ns) - i128::from(from_ns)) as f64,
+    };
+    ns / 1e9
 }
 
 /// One signal's moments and spectrum while the recording streams by.
@@ -220,9 +224,9 @@ impl Stream {
         }
     }
 
-    /// The next values. Non-finite ones do not count; in the spectrum the last finite one stands for them.
-    pub fn push(&mut self, x: &[f64]) {
-        if x.iter().all(|x| x.is_finite()) {
+    /// The next values, and whether all are known to be finite. Others do not count; in the spectrum the last finite one stands for them.
+    pub fn push(&mut self, x: &[f64], finite: bool) {
+        if finite || x.iter().all(|x| x.is_finite()) {
             self.moments.push_finite(x);
             if let Some(last) = x.last() {
                 self.held = *last;
@@ -325,7 +329,7 @@ mod tests {
                 }
             })
             .collect();
-        s.push(&x);
+        s.push(&x, false);
         times.push(&(0..1000).map(|k| k * 10_000_000).collect::<Vec<_>>());
         let summary = s.summary(&times, "m");
         assert_eq!(summary.count, 990);
@@ -336,7 +340,7 @@ mod tests {
     fn a_constant_has_no_peak() {
         let mut s = Stream::new(100.0, 128);
         let mut times = Times::default();
-        s.push(&[9.81; 500]);
+        s.push(&[9.81; 500], true);
         times.push(&(0..500).map(|k| k * 10_000_000).collect::<Vec<_>>());
         assert_eq!(s.summary(&times, "").peak_hz, None);
     }

@@ -8,6 +8,39 @@ use realfft::{RealFftPlanner, RealToComplex};
 
 thread_local! {
     static PLANNER: RefCell<RealFftPlanner<f64>> = RefCell::new(RealFftPlanner::new());
+    static WORK: RefCell<Work> = RefCell::default();
+}
+
+/// Memory of transforms. It fits any plan and any number of users that take turns.
+#[derive(Default)]
+pub(crate) struct Work {
+    input: Vec<f64>,
+    output: Vec<Complex64>,
+    scratch: Vec<Complex64>,
+}
+
+impl Work {
+    /// The transform of what `fill` puts into the input.
+    pub fn transform(
+        &mut self,
+        plan: &dyn RealToComplex<f64>,
+        fill: impl FnOnce(&mut [f64]),
+    ) -> &[Complex64] {
+        let none = Complex64::default();
+        self.input.resize(plan.len(), 0.0);
+        self.output.resize(plan.len() / 2 + 1, none);
+        self.scratch.resize(plan.get_scratch_len(), none);
+        fill(&mut self.input);
+        // OK because the buffers have the plan's lengths, the only way in which it can fail.
+        plan.process_with_scratch(&mut self.input, &mut self.output, &mut self.scratch)
+            .expect("buffers of the plan's own length");
+        &self.output
+    }
+}
+
+/// Lends this thread's memory for transforms.
+pub(crate) fn with_work<T>(run: impl FnOnce(&mut Work) -> T) -> T {
+    WORK.with(|work| run(&mut work.borrow_mut()))
 }
 
 /// The plan for `n` real samples.
@@ -21,12 +54,10 @@ pub fn rfft(x: &[f64]) -> Vec<Complex64> {
         return Vec::new();
     }
     let plan = plan(x.len());
-    let mut input = x.to_vec();
-    let mut output = plan.make_output_vec();
-    // OK because both buffers were made to the plan's lengths, the only way in which it can fail.
-    plan.process(&mut input, &mut output)
-        .expect("buffers of the plan's own length");
-    output
+    with_work(|work| {
+        work.transform(plan.as_ref(), |input| input.copy_from_slice(x))
+            .to_vec()
+    })
 }
 
 /// |rfft(x)|.

@@ -15,6 +15,7 @@ pub use confidence::{chi_square_cdf, chi_square_quantile};
 pub use fft::{rfft, rfft_hz, rfft_magnitude};
 pub use taper::Taper;
 
+use fft::Work;
 pub use realfft::num_complex::Complex64;
 use segments::Segments;
 
@@ -272,13 +273,14 @@ pub enum Mode {
 /// # Errors
 /// [`SpectrumError`] for an empty signal, non-finite samples, a rate that is no rate, or lengths that do not fit.
 pub fn welch(x: &[f64], fs_hz: f64, options: &Options) -> Result<Spectrum, SpectrumError> {
-    let mut segments = Segments::new(x.len(), fs_hz, options)?;
+    let segments = Segments::new(x.len(), fs_hz, options)?;
     check_finite(x)?;
+    let mut work = Work::default();
     let mut bins = vec![0.0; segments.bins()];
     let mut all = Vec::new();
     let starts = segments.starts(x.len());
     for start in starts.clone() {
-        let transform = segments.transform(&x[start..start + segments.nperseg]);
+        let transform = segments.transform(&x[start..start + segments.nperseg], &mut work);
         match options.average {
             Average::Mean => bins
                 .iter_mut()
@@ -312,17 +314,17 @@ pub fn csd(
     }
     check_finite(x)?;
     check_finite(y)?;
-    let mut of_x = Segments::new(x.len(), fs_hz, options)?;
-    let mut of_y = Segments::new(y.len(), fs_hz, options)?;
-    let mut sums = vec![Complex64::default(); of_x.bins()];
+    let segments = Segments::new(x.len(), fs_hz, options)?;
+    let (mut work_x, mut work_y) = (Work::default(), Work::default());
+    let mut sums = vec![Complex64::default(); segments.bins()];
     let mut all = Vec::new();
-    let starts = of_x.starts(x.len());
+    let starts = segments.starts(x.len());
     for start in starts.clone() {
-        let range = start..start + of_x.nperseg;
-        let products = of_x
-            .transform(&x[range.clone()])
+        let range = start..start + segments.nperseg;
+        let products = segments
+            .transform(&x[range.clone()], &mut work_x)
             .iter()
-            .zip(of_y.transform(&y[range]))
+            .zip(segments.transform(&y[range], &mut work_y))
             .map(|(x, y)| x.conj() * y);
         match options.average {
             Average::Mean => sums.iter_mut().zip(products).for_each(|(s, p)| *s += p),
@@ -346,14 +348,14 @@ pub fn csd(
             .map(|(re, im)| Complex64::new(re, im) * count)
             .collect();
     }
-    let scale = of_x.scale();
+    let scale = segments.scale();
     let power = sums
         .iter()
         .enumerate()
-        .map(|(k, s)| s * (scale * of_x.sides(k) / count))
+        .map(|(k, s)| s * (scale * segments.sides(k) / count))
         .collect();
     Ok(CrossSpectrum {
-        hz: of_x.hz(),
+        hz: segments.hz(),
         power,
     })
 }
@@ -397,7 +399,8 @@ pub fn spectrogram(
 ) -> Result<Spectrogram, SpectrumError> {
     check_finite(x)?;
     let noverlap = options.noverlap.unwrap_or(options.nperseg.min(x.len()) / 8);
-    let mut segments = Segments::new(
+    let mut work = Work::default();
+    let segments = Segments::new(
         x.len(),
         fs_hz,
         &Options {
@@ -415,7 +418,7 @@ pub fn spectrogram(
     let mut power = Vec::with_capacity(starts.len());
     for start in starts {
         let sides: Vec<f64> = (0..segments.bins()).map(|k| segments.sides(k)).collect();
-        let transform = segments.transform(&x[start..start + segments.nperseg]);
+        let transform = segments.transform(&x[start..start + segments.nperseg], &mut work);
         let value = |(z, sides): (&Complex64, &f64)| match mode {
             Mode::Psd => z.norm_sqr() * scale * sides,
             Mode::Magnitude => z.norm() * scale.sqrt(),

@@ -7,21 +7,21 @@ use std::sync::Arc;
 use realfft::RealToComplex;
 use realfft::num_complex::Complex64;
 
+use super::fft::Work;
+use super::taper::Weights;
 use super::{Detrend, Options, Scaling, Spectrum, SpectrumError, fft};
 
-/// The plan of a segmentation, with its buffers.
+/// The plan of a segmentation; its clones share what is large.
+#[derive(Clone)]
 pub(crate) struct Segments {
     pub nperseg: usize,
     pub step: usize,
     nfft: usize,
     fs_hz: f64,
-    detrend: Detrend,
+    pub detrend: Detrend,
     scaling: Scaling,
-    taper: Vec<f64>,
+    taper: Arc<Weights>,
     plan: Arc<dyn RealToComplex<f64>>,
-    input: Vec<f64>,
-    output: Vec<Complex64>,
-    scratch: Vec<Complex64>,
 }
 
 impl Segments {
@@ -45,7 +45,6 @@ impl Segments {
         if nfft < nperseg {
             return Err(SpectrumError::Nfft { nfft, nperseg });
         }
-        let plan = fft::plan(nfft);
         Ok(Segments {
             nperseg,
             step: nperseg - noverlap,
@@ -53,11 +52,8 @@ impl Segments {
             fs_hz,
             detrend: options.detrend,
             scaling: options.scaling,
-            taper: options.window.values(nperseg),
-            input: plan.make_input_vec(),
-            output: plan.make_output_vec(),
-            scratch: plan.make_scratch_vec(),
-            plan,
+            taper: Weights::of(options.window, nperseg),
+            plan: fft::plan(nfft),
         })
     }
 
@@ -68,12 +64,7 @@ impl Segments {
         }
         Ok(Segments {
             fs_hz,
-            taper: self.taper.clone(),
-            plan: self.plan.clone(),
-            input: Vec::new(),
-            output: Vec::new(),
-            scratch: Vec::new(),
-            ..*self
+            ..self.clone()
         })
     }
 
@@ -83,24 +74,23 @@ impl Segments {
     }
 
     /// The transform of one segment, detrended and tapered, unscaled.
-    pub fn transform(&mut self, x: &[f64]) -> &[Complex64] {
-        let n = self.nperseg;
-        let (offset, slope) = trend(&x[..n], self.detrend);
-        if slope == 0.0 {
-            for ((i, x), w) in self.input.iter_mut().zip(x).zip(&self.taper) {
-                *i = (x - offset) * w;
+    pub fn transform<'a>(&self, x: &[f64], work: &'a mut Work) -> &'a [Complex64] {
+        let x = &x[..self.nperseg];
+        let (offset, slope) = trend(x, self.detrend);
+        let weights = &self.taper.values;
+        work.transform(self.plan.as_ref(), |input| {
+            let (input, padding) = input.split_at_mut(x.len());
+            if slope == 0.0 {
+                for ((i, x), w) in input.iter_mut().zip(x).zip(weights) {
+                    *i = (x - offset) * w;
+                }
+            } else {
+                for (k, ((i, x), w)) in input.iter_mut().zip(x).zip(weights).enumerate() {
+                    *i = (x - offset - slope * k as f64) * w;
+                }
             }
-        } else {
-            for (k, ((i, x), w)) in self.input.iter_mut().zip(x).zip(&self.taper).enumerate() {
-                *i = (x - offset - slope * k as f64) * w;
-            }
-        }
-        self.input[n..].fill(0.0);
-        // OK because the buffers were made to the plan's lengths, the only way in which it can fail.
-        self.plan
-            .process_with_scratch(&mut self.input, &mut self.output, &mut self.scratch)
-            .expect("buffers of the plan's own length");
-        &self.output
+            padding.fill(0.0);
+        })
     }
 
     pub fn bins(&self) -> usize {
@@ -109,8 +99,7 @@ impl Segments {
 
     /// What |X|² is multiplied by.
     pub fn scale(&self) -> f64 {
-        let sum: f64 = self.taper.iter().sum();
-        let squares: f64 = self.taper.iter().map(|w| w * w).sum();
+        let Weights { sum, squares, .. } = *self.taper;
         match self.scaling {
             Scaling::Density => 1.0 / (self.fs_hz * squares),
             Scaling::Spectrum => 1.0 / (sum * sum),
@@ -135,8 +124,7 @@ impl Segments {
             .enumerate()
             .map(|(k, s)| s * scale * self.sides(k))
             .collect();
-        let sum: f64 = self.taper.iter().sum();
-        let squares: f64 = self.taper.iter().map(|w| w * w).sum();
+        let Weights { sum, squares, .. } = *self.taper;
         let segment_s = self.nperseg as f64 / self.fs_hz;
         Spectrum {
             hz: self.hz(),
@@ -151,8 +139,9 @@ impl Segments {
 
     /// ν = 2K / (1 + 2 Σ_j (1 − j/K) ρ_j), ρ_j = (Σ w\[n\] w\[n + jS\] / Σ w²)²; S the step, K the count of segments.
     fn degrees_of_freedom(&self, count: usize) -> f64 {
-        let w = &self.taper;
-        let squares: f64 = w.iter().map(|w| w * w).sum();
+        let Weights {
+            values: w, squares, ..
+        } = self.taper.as_ref();
         let mut sum = 0.0;
         for j in 1..count {
             let lag = j * self.step;
@@ -166,14 +155,24 @@ impl Segments {
     }
 }
 
+/// Σ x, in lanes: independent additions, which are quick and round less than one after the other.
+fn sum(x: &[f64]) -> f64 {
+    let (whole, rest) = x.as_chunks::<16>();
+    let mut lanes = [0.0; 16];
+    for chunk in whole {
+        lanes.iter_mut().zip(chunk).for_each(|(lane, x)| *lane += x);
+    }
+    lanes.iter().sum::<f64>() + rest.iter().sum::<f64>()
+}
+
 /// Offset and slope per sample of what `detrend` takes off.
 fn trend(x: &[f64], detrend: Detrend) -> (f64, f64) {
     let n = x.len() as f64;
     match detrend {
         Detrend::None => (0.0, 0.0),
-        Detrend::Constant => (x.iter().sum::<f64>() / n, 0.0),
+        Detrend::Constant => (sum(x) / n, 0.0),
         Detrend::Linear => {
-            let mean = x.iter().sum::<f64>() / n;
+            let mean = sum(x) / n;
             let middle = (n - 1.0) / 2.0;
             let (mut up, mut down) = (0.0, 0.0);
             for (k, x) in x.iter().enumerate() {

@@ -1,10 +1,12 @@
 //! Welch's method on a signal that arrives in batches, in memory that does not grow with it.
 
+use super::fft::with_work;
 use super::segments::Segments;
-use super::{Options, Spectrum, SpectrumError};
+use super::{Detrend, Options, Spectrum, SpectrumError};
 
 /// Collects samples and transforms each segment as soon as it is whole. Gives exactly what [`super::welch`] gives on
 /// the joined signal (mean average; if the signal ends before the first segment is full, that signal's own spectrum).
+#[derive(Clone)]
 pub struct WelchStream {
     segments: Segments,
     fs_hz: f64,
@@ -12,6 +14,9 @@ pub struct WelchStream {
     buffer: Vec<f64>,
     sums: Vec<f64>,
     count: usize,
+    /// How many samples came while all were the same, and which: they are not held and not transformed, since nothing is left of them
+    /// without their mean. `None` once one was different.
+    still: Option<(usize, f64)>,
 }
 
 impl WelchStream {
@@ -21,19 +26,31 @@ impl WelchStream {
     /// As [`super::welch`], for the options alone.
     pub fn new(fs_hz: f64, options: &Options) -> Result<Self, SpectrumError> {
         let segments = Segments::new(usize::MAX, fs_hz, options)?;
-        let sums = vec![0.0; segments.bins()];
         Ok(WelchStream {
+            still: (options.detrend != Detrend::None).then_some((0, 0.0)),
             segments,
             fs_hz,
             options: *options,
             buffer: Vec::new(),
-            sums,
+            sums: Vec::new(),
             count: 0,
         })
     }
 
     /// The next samples. They have to be finite: leave others out before.
     pub fn push(&mut self, mut x: &[f64]) {
+        if let Some((count, value)) = &mut self.still {
+            if let (0, Some(first)) = (*count, x.first()) {
+                *value = *first;
+            }
+            let same = x.iter().take_while(|x| *x == value).count();
+            *count += same;
+            if same == x.len() {
+                return;
+            }
+            x = &x[same..];
+            self.move_on();
+        }
         let nperseg = self.segments.nperseg;
         while !x.is_empty() {
             // Straight from the caller's slice where a whole segment lies in it.
@@ -55,10 +72,23 @@ impl WelchStream {
         }
     }
 
-    fn add(&mut self, segment: &[f64]) {
-        for (sum, z) in self.sums.iter_mut().zip(self.segments.transform(segment)) {
-            *sum += z.norm_sqr();
+    /// Counts the segments of equal samples and holds what is left of them.
+    fn move_on(&mut self) {
+        if let Some((count, value)) = self.still.take() {
+            let Segments { nperseg, step, .. } = self.segments;
+            self.count = (count + step).saturating_sub(nperseg) / step;
+            self.buffer = vec![value; count - self.count * step];
         }
+    }
+
+    fn add(&mut self, segment: &[f64]) {
+        self.sums.resize(self.segments.bins(), 0.0);
+        with_work(|work| {
+            let transform = self.segments.transform(segment, work);
+            for (sum, z) in self.sums.iter_mut().zip(transform) {
+                *sum += z.norm_sqr();
+            }
+        });
         self.count += 1;
     }
 
@@ -75,12 +105,16 @@ impl WelchStream {
     /// # Errors
     /// As [`WelchStream::finish`], and for a rate that is no rate.
     pub fn finish_at(&self, fs_hz: f64) -> Result<Spectrum, SpectrumError> {
+        if self.still.is_some() {
+            let mut moved = self.clone();
+            moved.move_on();
+            return moved.finish_at(fs_hz);
+        }
         if self.count == 0 {
             return super::welch(&self.buffer, fs_hz, &self.options);
         }
-        Ok(self
-            .segments
-            .at_rate(fs_hz)?
-            .spectrum(self.sums.clone(), self.count))
+        let mut sums = self.sums.clone();
+        sums.resize(self.segments.bins(), 0.0);
+        Ok(self.segments.at_rate(fs_hz)?.spectrum(sums, self.count))
     }
 }

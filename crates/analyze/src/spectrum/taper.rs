@@ -1,6 +1,8 @@
 //! Window functions (tapers), as `scipy.signal.get_window` gives them with `fftbins=True` (periodic).
 
+use std::cell::RefCell;
 use std::f64::consts::PI;
+use std::sync::Arc;
 
 /// A taper that a segment is multiplied by before its transform.
 ///
@@ -36,6 +38,45 @@ impl Taper {
             Taper::Blackman => cosine_sum(&[0.42, 0.50, 0.08], n),
             Taper::Tukey(alpha) => tukey(alpha, n),
         }
+    }
+}
+
+/// The values of a taper and what is needed of them again and again.
+pub(crate) struct Weights {
+    pub values: Vec<f64>,
+    /// Σ w.
+    pub sum: f64,
+    /// Σ w².
+    pub squares: f64,
+}
+
+/// So many of a thread's tapers are kept: signals of one topic share one, topics have few rates.
+const KEPT: usize = 8;
+
+thread_local! {
+    static KNOWN: RefCell<Vec<(Taper, Arc<Weights>)>> = const { RefCell::new(Vec::new()) };
+}
+
+impl Weights {
+    /// `n` values of a taper, shared by all that ask for the same.
+    pub fn of(taper: Taper, n: usize) -> Arc<Self> {
+        KNOWN.with_borrow_mut(|known| {
+            let same = |(t, w): &(Taper, Arc<Weights>)| *t == taper && w.values.len() == n;
+            if let Some(at) = known.iter().position(same) {
+                return known[at].1.clone();
+            }
+            let values = taper.values(n);
+            let weights = Arc::new(Weights {
+                sum: values.iter().sum(),
+                squares: values.iter().map(|w| w * w).sum(),
+                values,
+            });
+            if known.len() >= KEPT {
+                known.remove(0);
+            }
+            known.push((taper, weights.clone()));
+            weights
+        })
     }
 }
 

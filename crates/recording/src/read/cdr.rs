@@ -156,8 +156,8 @@ impl Decoder for Cdr {
         if program.bytes_left().is_none_or(|left| left > PADDING) {
             return 0;
         }
-        let head = (&[0, representation][..], HEADER);
-        program.decode_alike(shape, block, places, head, rows)
+        let suits = |message: &[u8]| message.first_chunk() == Some(&[0, representation]);
+        program.decode_alike(shape, block, places, HEADER, suits, rows)
     }
 
     fn decode(&mut self, message: &[u8], rows: &mut Rows) -> Result<(), String> {

@@ -145,7 +145,7 @@ impl Flat {
     fn fits(&self, data: &[u8]) -> bool {
         data.len() == self.length
             && self.checks.iter().all(|(at, bytes)| {
-                data.get(*at as usize..*at as usize + 4) == Some(bytes.as_slice())
+                data.get(*at as usize..).and_then(<[u8]>::first_chunk) == Some(bytes)
             })
     }
 
@@ -177,26 +177,29 @@ impl Flat {
         }
         let (mut stamped, mut stamps) = (0, vec![0i64; places.len()]);
         for load in &self.others {
+            let offset = load.offset as usize;
             let values = starts
                 .clone()
-                .map(|start| read::<BIG>(load.prim, block, start + load.offset as usize));
-            let scale = match load.sink {
-                Sink::StampSeconds => 1_000_000_000,
-                Sink::StampNanoseconds => 1,
-                Sink::Column(column) => {
-                    rows.extend(column, values);
-                    continue;
+                .map(|start| read::<BIG>(load.prim, block, start + offset));
+            let mut stamp = |scale: i64| {
+                stamped = places.len();
+                for (stamp, value) in stamps.iter_mut().zip(values.clone()) {
+                    *stamp = stamp.wrapping_add((value as i64).wrapping_mul(scale));
                 }
-                Sink::Covariance(field) => {
-                    let absent = values.filter(|value| *value == -1.0).count();
-                    rows.note_absent(field, absent as u64);
-                    continue;
-                }
-                Sink::Nowhere => continue,
             };
-            stamped = places.len();
-            for (stamp, value) in stamps.iter_mut().zip(values) {
-                *stamp = stamp.wrapping_add((value as i64).wrapping_mul(scale));
+            match load.sink {
+                Sink::StampSeconds => stamp(1_000_000_000),
+                Sink::StampNanoseconds => stamp(1),
+                Sink::Column(column) => rows.extend(column, values),
+                Sink::Covariance(field) => {
+                    // Only those of doubles are marked so.
+                    let absent = (-1f64).to_bits();
+                    let marked = starts
+                        .clone()
+                        .filter(|start| self::load::<8, BIG>(block, start + offset) == absent);
+                    rows.note_absent(field, marked.count() as u64);
+                }
+                Sink::Nowhere => {}
             }
         }
         // OK because rows are counted in u32 and a block is far from having as many messages.
@@ -284,14 +287,15 @@ impl Program {
         self.flat.as_ref().map(|flat| flat.length - flat.end)
     }
 
-    /// Decodes and keeps, column by column, as many of the first messages at `places` as lie like the last one and begin with `head`;
-    /// their fields begin `skip` bytes into them. Returns how many.
+    /// Decodes and keeps, column by column, as many of the first messages at `places` as lie like the last one and as `suits` lets
+    /// through; their fields begin `skip` bytes into them. Returns how many.
     pub fn decode_alike(
         &mut self,
         shape: Shape,
         block: &[u8],
         places: &[Place],
-        (head, skip): (&[u8], usize),
+        skip: usize,
+        suits: impl Fn(&[u8]) -> bool,
         rows: &mut Rows,
     ) -> usize {
         let Some(flat) = self.flat.as_ref().filter(|flat| flat.simple) else {
@@ -299,7 +303,7 @@ impl Program {
         };
         let fits = |place: &&Place| {
             let message = &block[place.bytes.clone()];
-            message.starts_with(head) && message.get(skip..).is_some_and(|body| flat.fits(body))
+            suits(message) && message.get(skip..).is_some_and(|body| flat.fits(body))
         };
         let count = places.iter().take_while(fits).count();
         if count > 0 {
@@ -761,7 +765,7 @@ fn load<const N: usize, const BIG: bool>(bytes: &[u8], offset: usize) -> u64 {
 }
 
 /// A number as a double: integers beyond 2⁵³ are rounded.
-#[inline]
+#[inline(always)]
 fn read<const BIG: bool>(prim: Prim, bytes: &[u8], at: usize) -> f64 {
     match prim {
         Prim::Bool => f64::from(u8::from(bytes[at] != 0)),

@@ -33,7 +33,7 @@ impl Decoder for Ros1 {
     fn decode_alike(&mut self, block: &[u8], places: &[Place], rows: &mut Rows) -> usize {
         let count = self
             .program
-            .decode_alike(SHAPE, block, places, (&[], 0), rows);
+            .decode_alike(SHAPE, block, places, 0, |_| true, rows);
         if self.program.bytes_left() > Some(0) {
             rows.trailing += count as u64;
         }

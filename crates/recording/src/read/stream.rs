@@ -43,6 +43,8 @@ pub struct Column<'a> {
     pub rows: Option<&'a [u32]>,
     /// The values.
     pub values: &'a [f64],
+    /// Whether none of them is NaN or infinite.
+    pub finite: bool,
 }
 
 /// A message as it is in the file.
@@ -206,6 +208,8 @@ struct Watch {
     long: Vec<(String, u64)>,
     trailing: u64,
     odd: Vec<(Arc<str>, u64, i64)>,
+    /// Path and number of the columns in the order of the last batch, which mostly is that of the next.
+    columns: Vec<(Arc<str>, usize)>,
     messages: u64,
 }
 
@@ -325,7 +329,7 @@ impl<'a> Taker<'a> {
             }
         }
         let mut columns = Vec::with_capacity(batch.columns.len());
-        for column in &batch.columns {
+        for (position, column) in batch.columns.iter().enumerate() {
             if let Some((count, row)) = column.odd {
                 match watch
                     .odd
@@ -338,11 +342,13 @@ impl<'a> Taker<'a> {
                         .push((column.path.clone(), count, batch.times[row as usize])),
                 }
             }
-            let id = match self.ids.get(&column.path) {
-                Some(&id) => id,
-                None => {
-                    let id = self.ids.len();
-                    self.ids.insert(column.path.clone(), id);
+            let id = match watch.columns.get(position) {
+                Some((path, id)) if *path == column.path => *id,
+                _ => {
+                    let next = self.ids.len();
+                    let id = *self.ids.entry(column.path.clone()).or_insert(next);
+                    watch.columns.truncate(position);
+                    watch.columns.push((column.path.clone(), id));
                     id
                 }
             };
@@ -352,6 +358,7 @@ impl<'a> Taker<'a> {
                 path: &column.path,
                 rows,
                 values: &column.values,
+                finite: column.odd.is_none(),
             });
         }
         sink(&Batch {
