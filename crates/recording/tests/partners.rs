@@ -32,8 +32,8 @@ fn data(name: &str) -> PathBuf {
 
 type Expected = BTreeMap<String, Vec<(usize, Option<f64>)>>;
 
-fn expected() -> Expected {
-    let text = std::fs::read(data("expected.json")).expect("expected.json");
+fn expected(name: &str) -> Expected {
+    let text = std::fs::read(data(name)).expect("numbers");
     serde_json::from_slice(&text).expect("numbers by path")
 }
 
@@ -72,7 +72,7 @@ fn compare(name: &str, recording: &Recording, expected: &Expected) {
 
 #[test]
 fn every_encoding_in_every_container() {
-    let expected = expected();
+    let expected = expected("expected.json");
     for name in CONTAINERS {
         let path = data(&format!("{name}.mcap"));
         for threads in [1, 3] {
@@ -108,13 +108,31 @@ fn every_encoding_in_every_container() {
     }
 }
 
+/// `data/partners.py` made these.
+#[test]
+fn further_partners() {
+    for (name, numbers, messages) in [
+        ("foxglove_zstd", "foxglove", 4 * COUNT),
+        ("foxglove_lz4", "foxglove", 4 * COUNT),
+        ("foxglove_none", "foxglove", 4 * COUNT),
+        ("ros1_writer", "ros1_writer", 2 * COUNT),
+    ] {
+        let path = data(&format!("{name}.mcap"));
+        let recording = Recording::open(&path, &ReadOptions::default()).expect("opens");
+        let info = recording.info();
+        assert_eq!(info.warnings, Vec::<String>::new(), "{name}");
+        assert_eq!(info.messages, messages as u64, "{name}");
+        compare(name, &recording, &expected(&format!("{numbers}.json")));
+    }
+}
+
 #[test]
 fn from_memory_as_from_a_file() {
     let bytes = std::fs::read(data("zstd.mcap")).expect("reads");
     compare(
         "memory",
         &Recording::from_bytes(bytes, &ReadOptions::default()).expect("opens"),
-        &expected(),
+        &expected("expected.json"),
     );
 }
 

@@ -514,4 +514,5 @@ def main():
     print(len(signals), "signals")
 
 
-main()
+if __name__ == "__main__":
+    main()
