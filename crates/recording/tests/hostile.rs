@@ -11,7 +11,8 @@ use std::{
 };
 
 use recording::{
-    read::{ReadOptions, Recording},
+    Kind,
+    read::{ChannelInfo, ReadOptions, Recording},
     write::{RawChannel, RecordingWriter, WriterOptions},
 };
 
@@ -23,13 +24,14 @@ fn rounds() -> usize {
         .unwrap_or(usual)
 }
 
+fn path(name: &str) -> PathBuf {
+    PathBuf::from(env!("CARGO_MANIFEST_DIR"))
+        .join("tests/data")
+        .join(name)
+}
+
 fn data(name: &str) -> Vec<u8> {
-    std::fs::read(
-        PathBuf::from(env!("CARGO_MANIFEST_DIR"))
-            .join("tests/data")
-            .join(name),
-    )
-    .expect("test data")
+    std::fs::read(path(name)).expect("test data")
 }
 
 /// A 64-bit congruence (Knuth's MMIX).
@@ -176,6 +178,79 @@ fn schemas_and_messages_changed_at_random() {
         writer.finish().expect("finishes");
         let bytes = shared.0.lock().expect("unpoisoned").clone();
         read(bytes);
+    }
+}
+
+/// Every number that messages of a channel give, with its path and log time, and how many messages cannot be decoded.
+fn numbers(info: &ChannelInfo, messages: &[Vec<u8>], first: i64) -> (Vec<(String, i64, u64)>, u64) {
+    let shared = Shared::default();
+    let mut writer =
+        RecordingWriter::to_stream(shared.clone(), &WriterOptions::default()).expect("begins");
+    let channel = RawChannel {
+        topic: &info.topic,
+        message_encoding: &info.encoding,
+        schema_name: &info.schema,
+        schema_encoding: &info.schema_encoding,
+        schema_data: &info.schema_data,
+        metadata: &BTreeMap::new(),
+    };
+    let channel = writer.raw_channel(&channel).expect("opens");
+    for (t_ns, message) in (first..).zip(messages) {
+        let message = message.as_slice();
+        writer.message(channel, t_ns, message).expect("writes");
+    }
+    writer.finish().expect("finishes");
+    let bytes = shared.0.lock().expect("unpoisoned").clone();
+    let recording = Recording::from_bytes(bytes, &ReadOptions::default()).expect("opens");
+    let (signals, findings) = recording.signals(&|_| true).expect("reads");
+    let mut numbers = Vec::new();
+    for signal in signals {
+        for (t_ns, value) in signal.times_ns.iter().zip(&signal.values) {
+            numbers.push((signal.path.clone(), *t_ns, value.to_bits()));
+        }
+    }
+    numbers.sort();
+    let broken = findings.iter().filter(|f| f.kind == Kind::Undecodable);
+    (numbers, broken.map(|f| f.count).sum())
+}
+
+/// Messages that lie like the one before are decoded together, several times quicker: they must not mean anything else than alone.
+#[test]
+fn messages_mean_the_same_among_others() {
+    let recording = Recording::open(&path("zstd.mcap"), &ReadOptions::default()).expect("opens");
+    let mut messages: Vec<Vec<Vec<u8>>> = vec![Vec::new(); recording.info().channels.len()];
+    recording
+        .messages(&|_| true, &mut |message| {
+            messages[message.channel].push(message.data.to_vec())
+        })
+        .expect("reads");
+    let mut random = Random(13);
+    for round in 0..rounds() / 30 {
+        for (info, messages) in recording.info().channels.iter().zip(&messages) {
+            let mut chosen = Vec::new();
+            for _ in 0..6 {
+                let mut message = messages[random.below(4)].clone();
+                if random.below(3) == 0 {
+                    // How CDR is represented is learned from the messages before: the header stays.
+                    let header = message[..4.min(message.len())].to_vec();
+                    random.change(&mut message);
+                    if info.encoding == "cdr" {
+                        let length = message.len().min(4);
+                        message[..length].copy_from_slice(&header[..length]);
+                    }
+                }
+                chosen.push(message);
+            }
+            let together = numbers(info, &chosen, 0);
+            let mut alone = (Vec::new(), 0);
+            for (t_ns, message) in (0..).zip(chosen.chunks(1)) {
+                let one = numbers(info, message, t_ns);
+                alone.0.extend(one.0);
+                alone.1 += one.1;
+            }
+            alone.0.sort();
+            assert!(together == alone, "{} in round {round}", info.topic);
+        }
     }
 }
 
