@@ -8,3 +8,4 @@ pub mod pool;
 pub mod predictions;
 pub mod statistics;
 pub mod sweep;
+pub mod twin;

@@ -7,6 +7,7 @@ mod predictions;
 mod status;
 mod submit;
 mod sweep;
+mod twin;
 
 use anyhow::{Context, Result};
 use clap::{CommandFactory, Parser, Subcommand};
@@ -31,6 +32,8 @@ enum Command {
     Paper(paper::Args),
     /// The paper's predictions, tried: statistics, figures, verdicts.
     Predictions(predictions::Args),
+    /// Twins of field recordings: what sensors alone say, beside the truth.
+    Twin(twin::Args),
     /// Run a study file: `study FILE.toml` is short for it.
     Run(sweep::Args),
     /// Estimate the model's parameters from recordings, with intervals.
@@ -46,6 +49,7 @@ enum Command {
 const EXAMPLES: &str = "Examples:
   study paper                              Table 1 of the paper, beside the paper's own
   study predictions                        what the paper predicts, tried
+  study twin                               field recordings without force sensors: how far off
   study tongue.toml                        a sweep of your own: results in the folder `tongue`
   study tongue.toml --resume               go on where it stopped
   study tongue.toml --shard 3/8            the third eighth of it, on any machine
@@ -78,6 +82,7 @@ pub fn run() -> ExitCode {
     let outcome = match Args::parse_from(words).command {
         Command::Paper(args) => paper::run(&args),
         Command::Predictions(args) => predictions::run(&args),
+        Command::Twin(args) => twin::run(&args),
         Command::Run(args) => sweep::run(&args),
         Command::Fit(args) => fit::run(&args),
         Command::Status(args) => status::run(&args),

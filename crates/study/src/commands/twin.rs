@@ -1,0 +1,44 @@
+//! `study twin`: how far the paper's metrics can be had from sensors alone.
+
+use super::{Format, print, progress, watch_interrupts};
+use anyhow::Result;
+use std::time::Instant;
+use study::twin::{table, to_json, twins};
+
+/// Arguments of `study twin`.
+#[derive(clap::Args)]
+#[command(after_help = EXAMPLES)]
+pub struct Args {
+    /// Seeds of each condition, from 1001 on.
+    #[arg(long, value_name = "N", default_value_t = 20, value_parser = clap::value_parser!(u64).range(1..=10_000))]
+    seeds: u64,
+    /// Threads; 0 is one per core. The result does not depend on it.
+    #[arg(long, value_name = "N", default_value_t = 0)]
+    jobs: usize,
+    /// What to print.
+    #[arg(long, value_enum, default_value_t = Format::Table)]
+    format: Format,
+}
+
+const EXAMPLES: &str = "Examples:
+  study twin                        field-imu in music and in baseline, clocks right and off: the table in docs/field.md
+  study twin --seeds 3
+  study twin --format json > twins.json";
+
+/// Simulates the twins and prints how far their sensors are off.
+pub fn run(args: &Args) -> Result<()> {
+    let began = Instant::now();
+    let stop = watch_interrupts()?;
+    let bar = progress(args.seeds * study::twin::CONDITIONS.len() as u64)?;
+    let found = twins(args.seeds, args.jobs, stop, || bar.inc(1)).map_err(anyhow::Error::msg)?;
+    bar.finish_and_clear();
+    eprintln!(
+        "{} twins in {:.1} s",
+        found.iter().map(|f| f.twins.len()).sum::<usize>(),
+        began.elapsed().as_secs_f64()
+    );
+    match args.format {
+        Format::Table => print(&table(&found)),
+        Format::Json => print(&format!("{:#}\n", to_json(&found))),
+    }
+}
