@@ -95,6 +95,40 @@ pub struct RolesFile {
     pub gravity_m_per_s2: Option<f64>,
     /// Start of the analysis window (s), where `--window` does not say.
     pub analysis_start_s: Option<f64>,
+    /// The load's sensor: its place from the centre of mass, forward, left, up (m).
+    #[serde(default, deserialize_with = "place")]
+    pub imu_place_m: Option<[f64; 3]>,
+    /// How its axes stand to those of the load: roll, pitch, yaw, R = R_z R_y R_x (deg). Without it they are levelled by gravity.
+    #[serde(default, deserialize_with = "place")]
+    pub imu_mounting_roll_pitch_yaw_deg: Option<[f64; 3]>,
+    /// How old a gyroscope's sample is at its stamp (s).
+    #[serde(default, deserialize_with = "age")]
+    pub gyro_age_s: Option<f64>,
+    /// How old an accelerometer's sample is at its stamp (s).
+    #[serde(default, deserialize_with = "age")]
+    pub accel_age_s: Option<f64>,
+}
+
+/// An age that a sensor's sample can have.
+fn age<'de, D: serde::Deserializer<'de>>(from: D) -> Result<Option<f64>, D::Error> {
+    let age_s = f64::deserialize(from)?;
+    if !(-0.2..=0.2).contains(&age_s) {
+        return Err(serde::de::Error::custom(format!(
+            "found an age of {age_s} s, expected -0.2 to 0.2"
+        )));
+    }
+    Ok(Some(age_s))
+}
+
+/// Three numbers that are numbers.
+fn place<'de, D: serde::Deserializer<'de>>(from: D) -> Result<Option<[f64; 3]>, D::Error> {
+    let values = <[f64; 3]>::deserialize(from)?;
+    if !values.iter().all(|x| x.abs() <= 1e3) {
+        return Err(serde::de::Error::custom(format!(
+            "found {values:?}, expected three numbers up to 1000"
+        )));
+    }
+    Ok(Some(values))
 }
 
 impl RolesFile {
@@ -171,6 +205,21 @@ const BY_SCHEMA: &[(&str, Role, &str)] = &[
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Roles {
     patterns: BTreeMap<Role, Vec<String>>,
+    /// What the user says of the sensors themselves.
+    pub sensors: Sensors,
+}
+
+/// What the user says of the sensors; `None` where nothing is said. See [`RolesFile`] for the meaning.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Sensors {
+    /// Place of the load's sensor, m.
+    pub place_m: Option<[f64; 3]>,
+    /// Its mounting, deg.
+    pub mounting_roll_pitch_yaw_deg: Option<[f64; 3]>,
+    /// Age of gyroscopes' samples, s.
+    pub gyro_age_s: Option<f64>,
+    /// Age of accelerometers' samples, s.
+    pub accel_age_s: Option<f64>,
 }
 
 impl Roles {
@@ -236,6 +285,12 @@ impl Roles {
             roles.patterns.insert(Role::Truth, vec![state.clone()]);
         }
         if let Some(user) = user {
+            roles.sensors = Sensors {
+                place_m: user.imu_place_m,
+                mounting_roll_pitch_yaw_deg: user.imu_mounting_roll_pitch_yaw_deg,
+                gyro_age_s: user.gyro_age_s,
+                accel_age_s: user.accel_age_s,
+            };
             for role in Role::ALL {
                 let said = user.patterns(role);
                 if !said.is_empty() {

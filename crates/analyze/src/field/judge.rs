@@ -2,8 +2,9 @@
 
 use recording::read::Recording;
 
-use super::{Columns, Records};
+use super::{Columns, Records, unloadings};
 use crate::clock::from_signals;
+use crate::filter::{Band, butter, sosfiltfilt};
 use crate::imu::orientation::causal;
 use crate::imu::rath::Motion;
 use crate::imu::track::period_s;
@@ -14,7 +15,7 @@ use crate::roles::{Role, Roles};
 use crate::steps::agreement;
 
 use super::carriers::Carriers;
-use crate::inputs::Window;
+use crate::inputs::{Window, interpolate};
 
 /// Where a recording holds the moments of true steps.
 pub const STEP_TOPIC: &str = "/truth/step";
@@ -271,6 +272,9 @@ impl Judge {
             offset_s,
             inner,
         );
+        if let Some(value) = unloading_agreement(motion, &clean, offset_s, inner) {
+            out.push(("unloading_f1", value));
+        }
         if let Some(e) = error {
             let text = match clock {
                 Some(c) => format!(
@@ -290,6 +294,61 @@ impl Judge {
             ));
         }
     }
+}
+
+/// Moments at which the support falls through 0.05 of the weight, from the sensor and from the second derivative of a true height, both
+/// below 10 Hz: the share that agrees to 10 ms (F1). `None` where the truth is slower than 100 Hz or nothing is unloaded.
+fn unloading_agreement(
+    motion: &Motion,
+    (u_s, z): &(Vec<f64>, Vec<f64>),
+    clock_s: f64,
+    (from_s, to_s): (f64, f64),
+) -> Option<Value> {
+    const WITHIN_S: f64 = 0.01;
+    let t_s = &motion.inputs.t_s;
+    let step_s = period_s(t_s)?;
+    if period_s(u_s)? > 0.01 || t_s.len() < 3 {
+        return None;
+    }
+    let g = motion.settings.gravity_m_per_s2;
+    let shifted: Vec<f64> = t_s.iter().map(|t| t + clock_s).collect();
+    let z = interpolate(u_s, z, &shifted);
+    let mut lifted: Vec<f64> = z
+        .windows(3)
+        .map(|w| (w[0] - 2.0 * w[1] + w[2]) / (step_s * step_s))
+        .collect();
+    lifted.insert(0, lifted[0]);
+    lifted.push(lifted[lifted.len() - 1]);
+    let sections = butter(2, Band::Low(10.0), 1.0 / step_s).ok()?;
+    let moments = |up: &[f64]| -> Option<Vec<f64>> {
+        let ratio: Vec<f64> = sosfiltfilt(&sections, up)
+            .ok()?
+            .iter()
+            .map(|a| 1.0 + a / g)
+            .collect();
+        let mut found = unloadings(t_s, &ratio);
+        found.retain(|t| (from_s..=to_s).contains(t));
+        Some(found)
+    };
+    let (found, truth) = (moments(&motion.accel_up_m_per_s2)?, moments(&lifted)?);
+    if truth.is_empty() {
+        return None;
+    }
+    let a = agreement(&found, &truth, WITHIN_S);
+    let text = format!(
+        "{} of {} true and {} found unloadings within {:.0} ms, median {:+.1} ms, after {:+.2} ms between the two clocks",
+        a.matched,
+        truth.len(),
+        found.len(),
+        1e3 * WITHIN_S,
+        1e3 * a.offset_s,
+        1e3 * clock_s
+    );
+    Some(Value {
+        unit: "1",
+        reason: Some(text),
+        ..Value::number(a.f1).source("imu")
+    })
 }
 
 /// Estimate minus truth.

@@ -19,10 +19,10 @@ use crate::events::Event;
 use crate::examine::Quality;
 use crate::imu::Track;
 use crate::imu::orientation::Options;
-use crate::imu::rath::{self, Motion, Mounting, Settings};
+use crate::imu::rath::{self, Motion, Settings};
 use crate::inputs::{Inputs, Window};
 use crate::metrics::{Metrics, Value, metrics_of};
-use crate::roles::{Role, Roles};
+use crate::roles::{Role, Roles, Sensors};
 use carriers::Carriers;
 use judge::Judge;
 
@@ -101,20 +101,25 @@ impl Field {
         let start_ns = recording.info().start_ns;
         let columns = Columns { signals, start_ns };
         let places = place::places(recording);
-        let simulated = place::is_simulated(recording);
+        let options = options(place::is_simulated(recording), &roles.sensors);
         for topic in imus {
             let Some(track) = columns.track(topic) else {
                 continue;
             };
-            let here = places.get(topic).copied().unwrap_or_default();
             let is_rath = roles.topic(Role::Imu) == Some(topic.as_str());
             if is_rath {
+                let here = places.get(topic).copied().unwrap_or_default();
+                let settings = Settings {
+                    orientation: options,
+                    gravity_m_per_s2,
+                    ..here.or_as_said(&roles.sensors)
+                };
                 field.topic = Some(topic.clone());
-                field.motion(&columns, topic, &track, here, gravity_m_per_s2, simulated);
+                field.motion(&columns, topic, &track, settings);
             }
             // The one sensor of a walker's phone plays the rath's role for want of another: steps tell.
             if !is_rath || (roles.patterns(Role::Carriers).is_empty() && !about_the_rath(topic)) {
-                field.carriers.add(topic, &track, options(simulated));
+                field.carriers.add(topic, &track, options);
             }
         }
         if let Some(topic) = roles.topic(Role::Beats) {
@@ -143,30 +148,13 @@ impl Field {
         Ok(())
     }
 
-    fn motion(
-        &mut self,
-        columns: &Columns,
-        topic: &str,
-        track: &Track,
-        here: place::Place,
-        g: f64,
-        simulated: bool,
-    ) {
+    fn motion(&mut self, columns: &Columns, topic: &str, track: &Track, settings: Settings) {
         if columns.first(topic, GYRO_MARK) == Some(-1.0) {
             self.no_motion = Some(format!(
                 "{topic} has no gyroscope (angular_velocity_covariance[0] is -1)"
             ));
             return;
         }
-        let settings = Settings {
-            orientation: options(simulated),
-            mounting: here
-                .body_from_sensor
-                .map_or(Mounting::Levelled, Mounting::Known),
-            lever_m: here.lever_m,
-            gravity_m_per_s2: g,
-            ..Settings::default()
-        };
         match rath::motion(track, &settings) {
             Ok(motion) => self.motion = Some(motion),
             Err(error) => self.no_motion = Some(format!("{topic}: {error}")),
@@ -349,12 +337,17 @@ pub fn unloadings(t_s: &[f64], support_ratio: &[f64]) -> Vec<f64> {
     out
 }
 
-/// A simulated sensor's samples are true at their stamps.
-fn options(simulated: bool) -> Options {
-    if simulated {
+/// What the user says of the samples' age; else those of a simulated sensor are true at their stamps, and others as old as usual.
+fn options(simulated: bool, said: &Sensors) -> Options {
+    let usual = if simulated {
         Options::without_latency()
     } else {
         Options::default()
+    };
+    Options {
+        latency_s: said.gyro_age_s.unwrap_or(usual.latency_s),
+        accel_latency_s: said.accel_age_s.unwrap_or(usual.accel_latency_s),
+        ..usual
     }
 }
 

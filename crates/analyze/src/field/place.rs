@@ -1,9 +1,12 @@
-//! Where sensors sit: from the scene that a simulated recording carries.
+//! Where sensors sit: as the user says, or from the scene that a simulated recording carries.
 
 use std::collections::HashMap;
 
 use nalgebra::UnitQuaternion;
 use recording::read::Recording;
+
+use crate::imu::rath::{Mounting, Settings};
+use crate::roles::Sensors;
 
 /// A sensor's place on the body.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -12,6 +15,23 @@ pub struct Place {
     pub lever_m: [f64; 3],
     /// Body from sensor, where somebody says.
     pub body_from_sensor: Option<UnitQuaternion<f64>>,
+}
+
+impl Place {
+    /// Settings for this place; what the user says stands over it. Without a word on the mounting the sensor is levelled.
+    pub fn or_as_said(self, said: &Sensors) -> Settings {
+        let turned = said
+            .mounting_roll_pitch_yaw_deg
+            .map(|a| a.map(f64::to_radians))
+            .map(|[roll, pitch, yaw]| UnitQuaternion::from_euler_angles(roll, pitch, yaw));
+        Settings {
+            lever_m: said.place_m.unwrap_or(self.lever_m),
+            mounting: turned
+                .or(self.body_from_sensor)
+                .map_or(Mounting::Levelled, Mounting::Known),
+            ..Settings::default()
+        }
+    }
 }
 
 /// Whether the recording's own record says that it was simulated: its samples are true at their stamps.

@@ -26,6 +26,9 @@ use std::f64::consts::{PI, SQRT_2};
 /// MPU-6500 and MPU-9250 register maps, gyroscope bandwidth 92 Hz: delay 3.9 ms.
 pub const MEMS_LATENCY_S: f64 = 0.0039;
 
+/// The same of its accelerometer, s: MPU-6500 and MPU-9250, bandwidth 99 Hz: delay 2.88 ms.
+pub const MEMS_ACCEL_LATENCY_S: f64 = 0.00288;
+
 /// Accelerometer samples are averaged, in the inertial frame, down to about this rate before they correct the tilt, Hz.
 /// The correction works on seconds; doing it 50 times a second costs a fraction and changes nothing.
 const CORRECTION_HZ: f64 = 50.0;
@@ -41,14 +44,17 @@ pub struct Options {
     /// How old a sample is at its time stamp (the sensor's own low-pass, its queue), s. The estimate is carried forward by it.
     /// 0: the stamp is the instant at which the value was true, as in a simulated sensor.
     pub latency_s: f64,
+    /// The same of the accelerometer, s. A force is turned to earth by the orientation of its own instant; what τ averages does not need it.
+    pub accel_latency_s: f64,
 }
 
 impl Default for Options {
-    /// τ = 3 s, the published setting; [`MEMS_LATENCY_S`].
+    /// τ = 3 s, the published setting; [`MEMS_LATENCY_S`] and [`MEMS_ACCEL_LATENCY_S`].
     fn default() -> Self {
         Self {
             tau_s: 3.0,
             latency_s: MEMS_LATENCY_S,
+            accel_latency_s: MEMS_ACCEL_LATENCY_S,
         }
     }
 }
@@ -58,6 +64,7 @@ impl Options {
     pub fn without_latency() -> Self {
         Self {
             latency_s: 0.0,
+            accel_latency_s: 0.0,
             ..Self::default()
         }
     }

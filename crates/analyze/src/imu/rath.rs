@@ -193,12 +193,15 @@ pub fn motion(track: &Track, settings: &Settings) -> Result<Motion, MotionError>
     let n = body.len();
     let (mut roll_rad, mut pitch_rad) = (Vec::with_capacity(n), Vec::with_capacity(n));
     let (mut support_ratio, mut accel_up) = (Vec::with_capacity(n), Vec::with_capacity(n));
-    for (q, f) in estimate.earth_from_sensor.iter().zip(&force) {
+    for (i, (q, f)) in estimate.earth_from_sensor.iter().zip(&force).enumerate() {
         // R = Rz(yaw) Ry(pitch) Rx(roll), REP-103.
         let (roll, pitch, _) = q.euler_angles();
         roll_rad.push(roll);
         pitch_rad.push(pitch);
-        let up = (q * f).z;
+        let rate = Vector3::from(body.gyro_rad_per_s[i])
+            - body_from_sensor * Vector3::from(estimate.bias_rad_per_s[i]);
+        let since = rate * -settings.orientation.accel_latency_s;
+        let up = (q * UnitQuaternion::from_scaled_axis(since) * f).z;
         support_ratio.push(up / g);
         accel_up.push(up - g);
     }
@@ -333,25 +336,42 @@ fn at_centre_of_mass(
         .zip(&estimate.bias_rad_per_s)
         .map(|(w, b)| Vector3::from(*w) - body_from_sensor * Vector3::from(*b))
         .collect();
-    // Re-contact jerks the body: 60 Hz keeps that and takes off the worst of the derivative's noise.
-    let smooth: [Vec<f64>; 3] = std::array::from_fn(|axis| {
-        let x: Vec<f64> = rates.iter().map(|w| w[axis]).collect();
-        butter(2, Band::Low(60.0), 1.0 / period_s)
-            .and_then(|sections| sosfiltfilt(&sections, &x))
-            .unwrap_or(x)
-    });
+    let rates = below(rates, period_s);
+    let force = below(force.collect(), period_s);
     let n = rates.len();
-    force
-        .enumerate()
-        .map(|(i, f)| {
+    // α over two steps is the mean of two differences, so its edges are those of a sum weighted 1, 2, 1. Whatever else is in the equation
+    // is weighted alike: where a pole touches down, α × r cancels what the sensor felt only if both begin at once.
+    let weighted = |v: &[Vector3<f64>], i: usize| {
+        (v[i.saturating_sub(1)] + v[i] * 2.0 + v[(i + 1).min(n - 1)]) * 0.25
+    };
+    (0..n)
+        .map(|i| {
             let (a, b) = (i.saturating_sub(1), (i + 1).min(n - 1));
-            let dt_s = (b - a) as f64 * period_s;
-            let alpha = Vector3::from_fn(|axis, _| (smooth[axis][b] - smooth[axis][a]) / dt_s);
-            let w = Vector3::from_fn(|axis, _| smooth[axis][i]);
-            f - alpha.cross(&r) - w.cross(&w.cross(&r))
+            let alpha = (rates[b] - rates[a]) / ((b - a) as f64 * period_s);
+            let w = weighted(&rates, i);
+            weighted(&force, i) - alpha.cross(&r) - w.cross(&w.cross(&r))
         })
         .collect()
 }
+
+/// Fast sensors: without what lies above [`ACCELERATION_HZ`], where a derivative is noise only. Others as they are: the weights see to it.
+fn below(v: Vec<Vector3<f64>>, period_s: f64) -> Vec<Vector3<f64>> {
+    if 1.0 / period_s < 5.0 * ACCELERATION_HZ {
+        return v;
+    }
+    let smooth: [Vec<f64>; 3] = std::array::from_fn(|axis| {
+        let x: Vec<f64> = v.iter().map(|w| w[axis]).collect();
+        butter(2, Band::Low(ACCELERATION_HZ), 1.0 / period_s)
+            .and_then(|sections| sosfiltfilt(&sections, &x))
+            .unwrap_or(x)
+    });
+    (0..v.len())
+        .map(|i| Vector3::from_fn(|axis, _| smooth[axis][i]))
+        .collect()
+}
+
+/// Up to here angular acceleration is taken from the gyroscope, Hz: re-contact jerks the body faster than a person moves.
+const ACCELERATION_HZ: f64 = 60.0;
 
 /// Seconds at both ends without height, times the corner.
 const ENDS: f64 = 0.5;
@@ -422,10 +442,68 @@ pub fn metrics(motion: &Motion, window: Window) -> Metrics {
         // About the estimate, not about the draws' mean: what the draws add on average is theirs.
         let variance =
             drawn.iter().map(|d| (d - mean).powi(2)).sum::<f64>() / (drawn.len() - 1) as f64;
-        let half = 1.96 * variance.sqrt();
+        let half = 1.96 * (variance + beyond_the_budget(name, motion, window).powi(2)).sqrt();
         value.ci95 = Some([x - half, x + half]);
     }
+    if out
+        .number("rms_roll_deg")
+        .is_some_and(|roll| roll.to_radians() < SEEN * motion.settings.budget.tilt_offset_rad)
+    {
+        for (name, value) in &mut out.0 {
+            if OF_ROLL.contains(name) {
+                *value = Value {
+                    unit: value.unit,
+                    ..Value::missing("so small a roll has no line that the sensor could tell from its own wandering").source("imu")
+                };
+            }
+        }
+    }
     out
+}
+
+/// Metrics of the roll's lines.
+const OF_ROLL: &[&str] = &["roll_peak_hz", "subharmonic_ratio"];
+/// RMS roll from which its lines are looked for, in standard deviations of the tilt's constant error.
+const SEEN: f64 = 5.0;
+
+/// Standard error of a metric that no draw shows, in its own unit: what the window holds and the estimate does not.
+fn beyond_the_budget(name: &str, motion: &Motion, window: Window) -> f64 {
+    let inputs = &motion.inputs;
+    let range = window.range(&inputs.t_s);
+    let seen: Vec<f64> = inputs.height_m[range.clone()]
+        .iter()
+        .copied()
+        .filter(|z| z.is_finite())
+        .collect();
+    let Some(period_s) = super::track::period_s(&inputs.t_s) else {
+        return 0.0;
+    };
+    match name {
+        // Lines sit on bins of 1/T, and the estimate's T is shorter than the window's: up to half a bin each, evenly spread.
+        "peak_hz" | "roll_peak_hz" if !seen.is_empty() => {
+            0.5 / (seen.len() as f64 * period_s) / 3f64.sqrt() * 2f64.sqrt()
+        }
+        // The definition counts samples at 30 Hz; others of the same motion come up to one of them later, evenly spread.
+        "onset_time_s" => (1.0 / 30.0) / 3f64.sqrt(),
+        // The ends have no height. Stretches of their length swing so much more or less than the whole.
+        "rms_z_m" => {
+            let lost = range.len() - seen.len();
+            let mean = seen.iter().sum::<f64>() / seen.len().max(1) as f64;
+            let power = |z: &[f64]| {
+                z.iter().map(|z| (z - mean).powi(2)).sum::<f64>() / z.len().max(1) as f64
+            };
+            let whole = power(&seen);
+            if lost < 2 || whole <= 0.0 {
+                return 0.0;
+            }
+            let parts: Vec<f64> = seen.chunks_exact(lost.min(seen.len())).map(power).collect();
+            let spread = (parts.iter().map(|p| (p - whole).powi(2)).sum::<f64>()
+                / parts.len().max(1) as f64)
+                .sqrt();
+            lost as f64 / range.len() as f64 * spread / (2.0 * whole.sqrt())
+        }
+        _ => 0.0,
+    }
 }
 
 /// The window's columns as they might have come out of an equally good sensor, at 30 Hz.
