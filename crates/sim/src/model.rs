@@ -317,6 +317,11 @@ impl Model {
         self.has_phases = true;
     }
 
+    /// Gives the phases other first values, rad.
+    pub(crate) fn set_phases_at_start(&mut self, phases_rad: Vec<f64>) {
+        self.initial_phases = phases_rad;
+    }
+
     /// Shifts the natural frequencies, rad/s.
     pub(crate) fn shift_frequencies(&mut self, shift: impl Fn(usize) -> f64) {
         for (i, w) in self.natural_rad_per_s.iter_mut().enumerate() {

@@ -45,12 +45,24 @@ impl<'m> Recorder<'m> {
     ///
     /// # Errors
     /// What the writer says.
-    pub fn new(model: &'m Model, mut writer: RecordingWriter) -> Result<Self, WriteError> {
+    pub fn new(model: &'m Model, writer: RecordingWriter) -> Result<Self, WriteError> {
+        // OK because a checked scene keeps stamps below 2262.
+        let epoch_ns = (model.scene.epoch_s * 1e9).round() as i64;
+        Self::at(model, writer, epoch_ns)
+    }
+
+    /// The same with the stamp of t = 0 to the nanosecond, ns since 1970.
+    ///
+    /// # Errors
+    /// What the writer says.
+    pub fn at(
+        model: &'m Model,
+        mut writer: RecordingWriter,
+        epoch_ns: i64,
+    ) -> Result<Self, WriteError> {
         let scene = &model.scene;
         writer.metadata("rath", &metadata(scene))?;
         writer.attachment("scene.toml", "application/toml", to_toml(scene).as_bytes())?;
-        // OK because a checked scene keeps stamps below 2262.
-        let epoch_ns = (scene.epoch_s * 1e9).round() as i64;
         let has = |there: bool, writer: &mut RecordingWriter, topic, kind| {
             there.then(|| writer.channel(topic, kind)).transpose()
         };
@@ -119,6 +131,11 @@ impl<'m> Recorder<'m> {
             weight_n: model.body.mass_kg * model.body.gravity_m_per_s2.norm(),
             failed: None,
         })
+    }
+
+    /// The writer, for what else belongs into the recording.
+    pub fn writer(&mut self) -> &mut RecordingWriter {
+        &mut self.writer
     }
 
     /// Completes the recording and gives it its name.

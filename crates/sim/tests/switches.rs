@@ -36,6 +36,9 @@ fn everything() -> Scene {
         build_up_s = 0.0
         [effects.noise]
         [effects.feedback]
+        [effects.measured]
+        t_s = [0.0, 20.0, 40.0, 60.0]
+        phase_rad = [[0.3, 251.0, 502.0, 753.0], [1.1, 250.0, 503.0, 754.0], [2.0, 252.0, 500.0, 750.0]]
         [effects.path]
         turn_deg = 90.0
         turn_start_s = 0.0

@@ -4,6 +4,7 @@ mod accuracy;
 mod drum;
 mod explain;
 mod record;
+mod replay;
 mod scenes;
 
 use clap::Subcommand;
@@ -15,6 +16,8 @@ use std::process::ExitCode;
 pub enum Command {
     /// Run a scene and write the recording (MCAP).
     Record(record::Args),
+    /// Let a recording's carriers and beat drive a scene, and compare the body's motion with the measured one.
+    Replay(replay::Args),
     /// Write the drum of a scene as a WAV file.
     Drum(drum::Args),
     /// Say what a scene turns on, what state that needs, and what it costs.
@@ -29,6 +32,10 @@ pub enum Command {
 pub fn run(command: Command) -> ExitCode {
     let outcome = match command {
         Command::Record(args) => record::run(&args),
+        Command::Replay(args) => match replay::run(&args) {
+            Ok(replay::Input::Damaged) => return ExitCode::from(3),
+            other => other.map(|_| ()),
+        },
         Command::Drum(args) => drum::run(&args),
         Command::Explain(args) => explain::run(&args),
         Command::Accuracy(args) => accuracy::run(&args),

@@ -15,6 +15,7 @@ pub mod gait;
 pub mod hold;
 pub mod imu;
 pub mod lift;
+pub mod measured;
 pub mod music;
 pub mod noise;
 pub mod path;
@@ -43,6 +44,7 @@ pub struct Effects {
     pub music: Option<music::Music>,
     pub noise: Option<noise::Noise>,
     pub feedback: Option<feedback::Feedback>,
+    pub measured: Option<measured::Measured>,
     pub path: Option<path::Path>,
     pub flexure: Option<flexure::Flexure>,
     pub imu: Option<imu::Imu>,
@@ -111,6 +113,8 @@ pub const TABLE: &[Entry] = &[
         feedback,
         "the load that a carrier feels shifts the gait's phase"
     ),
+    // After everything that has a say in phase rates, before what moves the party.
+    entry!(measured, "carriers move as somebody measured"),
     entry!(path, "the way slopes and turns"),
     entry!(flexure, "poles bend: their first mode"),
     entry!(imu, "virtual inertial sensors on body and carriers"),

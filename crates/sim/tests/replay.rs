@@ -1,0 +1,199 @@
+//! A recording drives a scene: twins come back as they were, a wrong model does not, and what cannot be replayed ends in one sentence.
+
+use recording::read::{ReadOptions, Recording};
+use recording::schema::rath;
+use recording::topics::{MessageKind, PHASES};
+use recording::write::{RecordingWriter, WriterOptions};
+use serde_json::Value;
+use std::path::{Path, PathBuf};
+use std::process::{Command, Output};
+
+fn sim(args: &[&str]) -> Output {
+    Command::new(env!("CARGO_BIN_EXE_sim"))
+        .args(args)
+        .output()
+        .unwrap()
+}
+
+fn record(folder: &Path, name: &str, more: &[&str]) -> PathBuf {
+    let out = folder.join(format!("{name}.mcap"));
+    let mut args = vec!["record", name, "--out", out.to_str().unwrap()];
+    args.extend(more);
+    let done = sim(&args);
+    assert!(done.status.success(), "{done:?}");
+    out
+}
+
+/// The misfit of a replay, and its recording.
+fn replay(file: &Path, more: &[&str]) -> (Value, PathBuf) {
+    let out = file.with_extension("replay.mcap");
+    let mut args = vec!["replay", file.to_str().unwrap(), "--format", "json"];
+    args.extend(["--out", out.to_str().unwrap()]);
+    args.extend(more);
+    let done = sim(&args);
+    assert!(done.status.success(), "{done:?}");
+    (serde_json::from_slice(&done.stdout).unwrap(), out)
+}
+
+fn share(found: &Value, signal: &str) -> f64 {
+    found["misfit"][signal]["share"].as_f64().unwrap()
+}
+
+const SIGNALS: [&str; 5] = ["height_m", "roll_deg", "pitch_deg", "yaw_deg", "force_n"];
+
+/// Phases, shoulders and beat of the music scene bring its motion back, contact lost and regained and all; with another stiffness they
+/// do not. What is left is the noise's path between its 30 Hz samples.
+#[test]
+fn a_twin_comes_back_and_a_wrong_stiffness_does_not() {
+    let folder = tempfile::tempdir().unwrap();
+    let file = record(folder.path(), "music", &["--duration", "30"]);
+    for drive in ["phases", "shoulders", "beat"] {
+        let (found, out) = replay(&file, &["--drive", drive]);
+        assert_eq!(found["starts_as_measured"], true);
+        for signal in SIGNALS {
+            // The roll grows by itself from next to nothing, and what it grows from is the noise's path too.
+            let most = if signal == "roll_deg" { 0.05 } else { 0.01 };
+            assert!(share(&found, signal) < most, "{drive} {signal}: {found}");
+        }
+        // Both motions, on the same stamps.
+        let recording = Recording::open(&out, &ReadOptions::default()).unwrap();
+        let count = |topic: &str| {
+            let all = &recording.info().channels;
+            all.iter().find(|c| c.topic == topic).unwrap().messages
+        };
+        assert_eq!(count("/rath/state"), 901);
+        assert_eq!(count("/measured/rath/state"), 901);
+        assert_eq!(count("/measured/carriers/phases"), 901);
+        assert_eq!(count("/measured/beat"), count("/beat"));
+        assert!(recording.info().metadata["replay"].contains_key("misfit.roll_deg"));
+        // The attached scene is complete: it makes the same motion again.
+        let scene = folder.path().join("again.toml");
+        std::fs::write(&scene, recording.attachment("scene.toml").unwrap()).unwrap();
+        let again = folder.path().join("again.mcap");
+        let (scene, again) = (scene.to_str().unwrap(), again.to_str().unwrap());
+        assert!(sim(&["record", scene, "--out", again]).status.success());
+        let states = |path: &Path| {
+            let recording = Recording::open(path, &ReadOptions::default()).unwrap();
+            let wanted = |p: &str| p == "/rath/state.roll_rad";
+            recording.signals(&wanted).unwrap().0.remove(0).values
+        };
+        assert_eq!(states(&out), states(Path::new(again)));
+    }
+    let (wrong, _) = replay(&file, &["--set", "effects.contact.stiffness_n_per_m=4000"]);
+    assert!(share(&wrong, "height_m") > 0.05, "{wrong}");
+    assert!(share(&wrong, "force_n") > 0.05, "{wrong}");
+    assert!(wrong["misfit"]["height_m"]["offset"].as_f64().unwrap() > 0.02);
+}
+
+/// A stretch from the middle, with the body as it was there.
+#[test]
+fn a_stretch_begins_as_it_was_measured() {
+    let folder = tempfile::tempdir().unwrap();
+    let file = record(folder.path(), "baseline", &["--duration", "30"]);
+    let stretch = ["--scene", "baseline", "--from", "10", "--to", "20"];
+    let (found, _) = replay(&file, &stretch);
+    assert_eq!(found["misfit"]["height_m"]["samples"], 301);
+    for signal in ["height_m", "pitch_deg", "force_n"] {
+        assert!(share(&found, signal) < 0.01, "{signal}: {found}");
+    }
+    // Sideways nothing tells phases where the body is; shoulders do.
+    let (found, _) = replay(&file, &[&stretch[..], &["--drive", "shoulders"]].concat());
+    for signal in SIGNALS {
+        assert!(share(&found, signal) < 0.01, "{signal}: {found}");
+    }
+}
+
+/// A recording of phases alone.
+fn phases(path: &Path, carriers: usize, phase: impl Fn(usize, f64) -> Option<f64>) {
+    let mut writer = RecordingWriter::create(path, &WriterOptions::default()).unwrap();
+    let channel = writer.channel(PHASES, MessageKind::Phases).unwrap();
+    for k in 0..600 {
+        let t = f64::from(k) / 30.0;
+        let phase_rad: Vec<f64> = (0..carriers).filter_map(|i| phase(i, t)).collect();
+        if phase_rad.is_empty() {
+            continue;
+        }
+        let message = rath::Phases {
+            time_s: t,
+            phase_rad,
+            ..rath::Phases::default()
+        };
+        writer.message(channel, (t * 1e9) as i64, &message).unwrap();
+    }
+    writer.finish().unwrap();
+}
+
+#[test]
+fn what_cannot_be_replayed_ends_in_one_sentence() {
+    let folder = tempfile::tempdir().unwrap();
+    let at = |name: &str| folder.path().join(name);
+    let still = record(folder.path(), "stand-still", &["--duration", "3"]);
+    let eight = record(folder.path(), "eight-carriers", &["--duration", "3"]);
+    let beatless = record(folder.path(), "baseline", &["--duration", "3"]);
+    phases(&at("gap.mcap"), 2, |_, t| {
+        (!(7.0..9.0).contains(&t)).then_some(12.0 * t)
+    });
+    phases(&at("nan.mcap"), 2, |i, t| {
+        Some(if i == 1 { f64::NAN } else { t })
+    });
+    phases(&at("one.mcap"), 1, |_, t| Some(12.0 * t));
+    phases(&at("short.mcap"), 2, |_, t| (t < 0.05).then_some(t));
+    std::fs::write(at("empty.mcap"), b"").unwrap();
+    std::fs::write(at("text.mcap"), b"not a recording at all").unwrap();
+    let out = at("out.mcap");
+    let (gap, eight, beatless) = (at("gap.mcap"), eight.as_path(), beatless.as_path());
+    for (file, more, says) in [
+        (still.as_path(), &[][..], "there are no phases in it"),
+        (eight, &[], "holds 8 carriers, but the scene `music` has 2"),
+        (&at("one.mcap"), &[], "holds 1 carriers"),
+        (&gap, &[], "has a gap from 6.9"),
+        (&gap, &["--to", "30"], "change --from or --to"),
+        (&gap, &["--from", "3", "--to", "2"], "change --from or --to"),
+        (&gap, &["--from", "nan"], "change --from or --to"),
+        (
+            &gap,
+            &["--drive", "shoulders"],
+            "there are no shoulders in it",
+        ),
+        (&gap, &["--drive", "beat"], "holds 0 beats"),
+        (
+            beatless,
+            &["--drive", "beat", "--scene", "baseline"],
+            "has no effects.music",
+        ),
+        (&at("nan.mcap"), &[], "0 usable samples"),
+        (&at("short.mcap"), &[], "usable samples"),
+        (&at("empty.mcap"), &[], "is empty"),
+        (&at("text.mcap"), &[], "is not an MCAP"),
+        (&at("none.mcap"), &[], "cannot be read"),
+        (&gap, &["--scene", "musik"], "Did you mean `music`"),
+    ] {
+        let mut args = vec!["replay", file.to_str().unwrap()];
+        args.extend(["--out", out.to_str().unwrap()]);
+        args.extend(more);
+        let done = sim(&args);
+        let text = String::from_utf8(done.stderr).unwrap();
+        assert_eq!(done.status.code(), Some(1), "{file:?} {more:?}: {text}");
+        assert!(
+            text.contains(says) && text.lines().count() == 1,
+            "{says}: {text}"
+        );
+        assert!(!out.exists() && done.stdout.is_empty());
+    }
+    // What is beside the gap is good, wrapped phases are phases, and without the body's motion there is nothing to compare.
+    phases(&at("wrapped.mcap"), 2, |_, t| {
+        (!(7.0..9.0).contains(&t)).then_some((12.0 * t).rem_euclid(std::f64::consts::TAU))
+    });
+    let turns = |file: &Path| {
+        let (found, out) = replay(file, &["--from", "9.5"]);
+        assert_eq!(found["misfit"], serde_json::json!({}));
+        let recording = Recording::open(&out, &ReadOptions::default()).unwrap();
+        let wanted = |p: &str| p == "/carriers/phases.phase_rad[1]";
+        let phase = recording.signals(&wanted).unwrap().0.remove(0).values;
+        (phase[phase.len() - 1] - phase[0]) / 12.0
+    };
+    for file in [gap, at("wrapped.mcap")] {
+        let span = turns(&file);
+        assert!((span - 599.0 / 30.0 + 9.5).abs() < 0.034, "{span}");
+    }
+}
