@@ -27,6 +27,8 @@ pub struct Request {
     pub roles: Option<RolesFile>,
     /// Judge estimates by the recorded truth.
     pub truth: bool,
+    /// All sensors were stamped by one clock: what looks like an offset between carriers is theirs.
+    pub one_clock: bool,
     /// Keep the outlines of signals for drawing.
     pub traces: bool,
 }
@@ -184,7 +186,13 @@ pub fn examine(
     let said = request.roles.as_ref();
     let mut inputs = pass.inputs(&metadata, said);
     let mut field = match estimates(recording, &roles, request) {
-        Ok(()) => Field::read(recording, &roles, inputs.gravity_m_per_s2, request.truth)?,
+        Ok(()) => Field::read(
+            recording,
+            &roles,
+            inputs.gravity_m_per_s2,
+            request.truth,
+            request.one_clock,
+        )?,
         Err(why) => {
             warnings.extend(why);
             Field::default()

@@ -81,6 +81,8 @@ pub struct Inputs {
     /// N_tot / (M g) where it is measured as such (the vertical specific force of the centre of mass over g), on `t_s`.
     /// Used where `normal_n` is empty.
     pub support_ratio: Vec<f64>,
+    /// Vertical motion of each carrier's shoulder about its slow course (m), on `t_s`; NaN where it is not known.
+    pub heave_m: Vec<Vec<f64>>,
     /// Time of the phases (s); empty means `t_s`.
     pub phase_t_s: Vec<f64>,
     /// Gait phase of each carrier (rad), wrapped or not.
@@ -109,6 +111,7 @@ impl Default for Inputs {
             force_t_s: Vec::new(),
             normal_n: Vec::new(),
             support_ratio: Vec::new(),
+            heave_m: Vec::new(),
             phase_t_s: Vec::new(),
             phase_rad: Vec::new(),
             beat_phase_rad: Vec::new(),

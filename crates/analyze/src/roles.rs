@@ -229,6 +229,7 @@ impl Roles {
         user: Option<&RolesFile>,
     ) -> Self {
         let mut channels: Vec<(&str, String)> = channels
+            .filter(|(topic, _)| !stands_beside(topic))
             .map(|(topic, schema)| (topic, schema.replacen("/msg/", "/", 1)))
             .collect();
         channels.sort();
@@ -323,6 +324,13 @@ impl Roles {
     pub fn iter(&self) -> impl Iterator<Item = (Role, &[String])> {
         self.patterns.iter().map(|(r, p)| (*r, &p[..]))
     }
+}
+
+/// Whether a topic repeats in the recording's own terms what another is about: what `analyze --annotate` found, what `sim replay` was given.
+fn stands_beside(topic: &str) -> bool {
+    ["/findings/", "/measured/"]
+        .iter()
+        .any(|p| topic.starts_with(p))
 }
 
 fn is_truth(topic: &str) -> bool {

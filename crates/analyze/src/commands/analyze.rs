@@ -74,6 +74,7 @@ fn request(args: &AnalyzeArgs) -> anyhow::Result<Request> {
         topics: args.topic.clone(),
         roles,
         truth: args.truth,
+        one_clock: args.one_clock,
         traces: args.draws(),
     })
 }

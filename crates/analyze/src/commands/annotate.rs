@@ -1,11 +1,15 @@
 //! `--annotate OUT.mcap`: the recording again, with what was found as topics beside it.
 
+use std::f64::consts::FRAC_PI_2;
 use std::path::Path;
 
 use analyze::examine::Analysis;
+use analyze::inputs::Inputs;
 use analyze::{metrics::Datum, phase};
+use nalgebra::UnitQuaternion;
 use recording::cdr::{Float64, Log, Time};
 use recording::read::Recording;
+use recording::schema::rath;
 use recording::topics::MessageKind;
 use recording::write::{RawChannel, RecordingWriter, WriterOptions};
 
@@ -41,10 +45,11 @@ pub(super) fn write(recording: &Recording, analysis: &Analysis, out: &Path) -> a
     let mut topics: Vec<(&'static str, _)> = Vec::new();
     for message in &own {
         if topics.iter().all(|(t, _)| *t != message.topic) {
-            let kind = if matches!(message.content, Content::Text(..)) {
-                MessageKind::Log
-            } else {
-                MessageKind::Float64
+            let kind = match message.content {
+                Content::Text(..) => MessageKind::Log,
+                Content::Number(_) => MessageKind::Float64,
+                Content::State(_) => MessageKind::RathState,
+                Content::Phases(_) => MessageKind::Phases,
             };
             topics.push((message.topic, writer.channel(message.topic, kind)?));
         }
@@ -78,6 +83,8 @@ struct Message {
 enum Content {
     Number(f64),
     Text(&'static str, String),
+    State(rath::State),
+    Phases(rath::Phases),
 }
 
 fn put(
@@ -92,6 +99,8 @@ fn put(
         Content::Number(data) => {
             writer.message(*channel, message.t_ns, &Float64 { data: *data })?
         }
+        Content::State(state) => writer.message(*channel, message.t_ns, state)?,
+        Content::Phases(phases) => writer.message(*channel, message.t_ns, phases)?,
         Content::Text(kind, what) => {
             let log = Log {
                 stamp: Time::from_ns(message.t_ns),
@@ -176,5 +185,73 @@ fn own(a: &Analysis, start_ns: i64) -> Vec<Message> {
             .collect();
         series("/findings/rms_roll_2s_deg", &i.t_s[m - 1..], &rms);
     }
+    out.extend(
+        states(i)
+            .into_iter()
+            .chain(gait(i))
+            .map(|(t_s, topic, content)| Message {
+                t_ns: at(t_s),
+                topic,
+                content,
+            }),
+    );
     out
+}
+
+/// The body's motion where only an inertial sensor saw it: roll and pitch, and the height about its slow course. Nobody saw the heading.
+fn states(i: &Inputs) -> Vec<(f64, &'static str, Content)> {
+    if i.sources.attitude != "imu" {
+        return Vec::new();
+    }
+    let state = |(k, t_s): (usize, &f64)| {
+        let (roll_rad, pitch_rad) = (*i.roll_rad.get(k)?, *i.pitch_rad.get(k)?);
+        let seen = roll_rad.is_finite() && pitch_rad.is_finite();
+        let q = UnitQuaternion::from_euler_angles(roll_rad, pitch_rad, 0.0);
+        let height = i.height_m.get(k).copied().filter(|z| z.is_finite());
+        seen.then(|| {
+            let state = rath::State {
+                time_s: *t_s,
+                position_m: height.map(|z| rath::Vector3 { x: 0.0, y: 0.0, z }),
+                orientation: Some(rath::Quaternion {
+                    x: q.i,
+                    y: q.j,
+                    z: q.k,
+                    w: q.w,
+                }),
+                roll_rad,
+                pitch_rad,
+                ..rath::State::default()
+            };
+            (*t_s, "/findings/state", Content::State(state))
+        })
+    };
+    i.t_s.iter().enumerate().filter_map(state).collect()
+}
+
+/// Phases that steps tell, as the project's own recordings count them: sin φ is up. A step, where the walker pushes hardest, is at −π/2.
+fn gait(i: &Inputs) -> Vec<(f64, &'static str, Content)> {
+    if i.sources.phases != "imu" {
+        return Vec::new();
+    }
+    let message = |(k, t_s): (usize, &f64)| {
+        let phase_rad: Vec<f64> = i.phase_rad.iter().map(|p| p[k] - FRAC_PI_2).collect();
+        let beat = i.beat_phase_rad.get(k).copied().filter(|b| b.is_finite());
+        phase_rad.iter().all(|p| p.is_finite()).then(|| {
+            let each: Vec<&[f64]> = phase_rad.chunks(1).collect();
+            let phases = rath::Phases {
+                time_s: *t_s,
+                order_parameter: phase::order_parameter(&each)[0],
+                beat_present: beat.is_some(),
+                beat_phase_rad: beat,
+                natural_frequency_rad_per_s: Vec::new(),
+                phase_rad,
+            };
+            (*t_s, "/findings/phases", Content::Phases(phases))
+        })
+    };
+    i.phase_times()
+        .iter()
+        .enumerate()
+        .filter_map(message)
+        .collect()
 }

@@ -93,6 +93,9 @@ struct AnalyzeArgs {
     /// Judge estimates by the truth that the recording holds
     #[arg(long)]
     truth: bool,
+    /// All sensors were stamped by one clock: leave the carriers' clocks as they are
+    #[arg(long)]
+    one_clock: bool,
 }
 
 impl AnalyzeArgs {

@@ -5,8 +5,9 @@ use crate::examine::Quality;
 use crate::filter::{Band, butter, sosfiltfilt};
 use crate::imu::Track;
 use crate::imu::orientation::{Options, batch};
-use crate::imu::rath::Motion;
+use crate::imu::rath::{ENDS, Motion};
 use crate::imu::track::period_s;
+use crate::imu::vertical::height;
 use crate::inputs::interpolate;
 use crate::metrics::{Datum, Metrics, Value};
 use crate::phase::hilbert;
@@ -33,6 +34,8 @@ struct Worn {
     t_s: Vec<f64>,
     /// Vertical acceleration, or the norm of the specific force where no gyroscope tells what is vertical, m/s².
     heave: Vec<f64>,
+    /// Whether it is the former.
+    upright: bool,
     steps: Result<Steps, StepError>,
     /// What its clock is ahead of the carriers' common clock, once found, s.
     ahead_s: f64,
@@ -92,6 +95,7 @@ impl Carriers {
         self.0.push(Worn {
             topic: topic.to_owned(),
             heave,
+            upright: turns,
             steps,
             t_s: track.t_s.clone(),
             ahead_s: 0.0,
@@ -254,6 +258,38 @@ impl Carriers {
             .map(|((_, s), t)| interpolate(t, &s.phase_rad, &axis))
             .collect();
         Some((axis, phases))
+    }
+
+    /// Vertical motion of each sensor about its slow course at the times `at_s`, m, NaN where it is not known; nothing at all where one of
+    /// them cannot tell what is vertical, or does not walk.
+    pub fn heave_m(&self, at_s: &[f64], corner_hz: f64) -> Vec<Vec<f64>> {
+        let of = |worn: &Worn| {
+            let period_s = period_s(&worn.t_s).filter(|_| worn.upright && worn.steps.is_ok())?;
+            let (first, last) = (worn.t_s[0], worn.t_s[worn.t_s.len() - 1]);
+            // As for the body: a wrong stamp far away must not ask for all memory.
+            let n = (((last - first) / period_s).round() as usize + 1).min(4 * worn.t_s.len());
+            let grid: Vec<f64> = (0..n).map(|k| first + k as f64 * period_s).collect();
+            let mut accel = interpolate(&worn.t_s, &worn.heave, &grid);
+            let mean = accel.iter().sum::<f64>() / n as f64;
+            accel.iter_mut().for_each(|a| *a -= mean);
+            let heave = height(&accel, period_s, corner_hz);
+            let common = |t: f64| t - worn.ahead_s;
+            let grid: Vec<f64> = grid.into_iter().map(common).collect();
+            let ends = ENDS / corner_hz;
+            let (from, to) = (grid[0] + ends, grid[n - 1] - ends);
+            let mut out = interpolate(&grid, &heave, at_s);
+            for (x, t) in out.iter_mut().zip(at_s) {
+                if !(from..=to).contains(t) {
+                    *x = f64::NAN;
+                }
+            }
+            Some(out)
+        };
+        self.0
+            .iter()
+            .map(of)
+            .collect::<Option<_>>()
+            .unwrap_or_default()
     }
 
     /// 95 % interval of the synchrony: the phases' own error, as twins show it.

@@ -62,7 +62,7 @@ struct Filled {
 }
 
 impl Field {
-    /// Reads the sensors' topics; nothing when the recording has none.
+    /// Reads the sensors' topics; nothing when the recording has none. The carriers' clocks are put on each other unless they are `one_clock`.
     ///
     /// # Errors
     /// Where the file cannot be read.
@@ -71,6 +71,7 @@ impl Field {
         roles: &Roles,
         gravity_m_per_s2: f64,
         truth: bool,
+        one_clock: bool,
     ) -> Result<Self, ReadError> {
         let topics: Vec<&str> = [Role::Imu, Role::Carriers, Role::Beats, Role::Truth]
             .iter()
@@ -128,7 +129,9 @@ impl Field {
                 (field.beat_s, field.beat_source) = (told, "beat");
             }
         }
-        field.align(roles);
+        if !one_clock {
+            field.align(roles);
+        }
         if truth {
             field.judge = Judge::read(&columns, roles, recording);
         }
@@ -187,6 +190,9 @@ impl Field {
             }
             inputs.sources.attitude = "imu".into();
             inputs.sources.height = "imu".into();
+            // With the same corner as the body's height, so that their difference is a compression.
+            let corner_hz = motion.settings.height_corner_hz;
+            inputs.heave_m = self.carriers.heave_m(&inputs.t_s, corner_hz);
             self.filled.motion = true;
         }
         if inputs.phase_rad.is_empty()

@@ -374,7 +374,7 @@ fn below(v: Vec<Vector3<f64>>, period_s: f64) -> Vec<Vector3<f64>> {
 const ACCELERATION_HZ: f64 = 60.0;
 
 /// Seconds at both ends without height, times the corner.
-const ENDS: f64 = 0.5;
+pub(crate) const ENDS: f64 = 0.5;
 
 /// Number of draws behind an interval.
 const DRAWS: usize = 40;

@@ -67,8 +67,10 @@ const HELP: &str = "What drives is read from /carriers/phases, /tf and /beat. A 
 sensors, gets its phases and the body's measured motion from `analyze`, which writes them as /findings/phases and
 /findings/state; they are used where the other topics are missing:
 
-  analyze field.mcap --annotate found.mcap
+  analyze field.mcap --one-clock --annotate found.mcap
   sim replay found.mcap --scene rath.toml
+
+(without --one-clock where every device stamps by its own clock).
 
 OUT holds the model's motion on the usual topics and the measured one on /measured/rath/state, /measured/carriers/phases,
 /measured/handles/forces and /measured/beat, all with the recording's stamps. Times that the scene itself names (onsets,
