@@ -2,7 +2,9 @@
 //! They are others' to ship; the tests run where `../shared/imu` lies beside the workspace.
 
 use analyze::examine::{Analysis, Request, examine};
+use recording::import::ingest;
 use recording::read::{ReadOptions, Recording};
+use recording::write::{RecordingWriter, WriterOptions};
 use std::path::PathBuf;
 
 fn analysed(name: &str) -> Option<Analysis> {
@@ -76,4 +78,43 @@ fn val_oxford_steps() {
         assert!(f1 >= 0.95, "{name}: {f1}");
         assert!(rate.abs() <= 0.02, "{name}: {rate}");
     }
+}
+
+/// The worked example of docs/field.md: three raw logs in the layouts of two apps, clocks 150 ms apart, no truth in them. What the simulation
+/// that they were made of knew (`sim record data-samples/phones/scene.toml`, then `analyze`) stands here as numbers.
+#[test]
+fn raw_phone_files_become_the_papers_metrics() {
+    let folder = PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("../../data-samples/phones");
+    let files = ["rath.zip", "carrier_1.zip", "carrier_2.zip"].map(|name| folder.join(name));
+    let out = tempfile::tempdir().unwrap();
+    let path = out.path().join("walk.mcap");
+    let mut writer = RecordingWriter::create(&path, &WriterOptions::default()).unwrap();
+    ingest(&files, None, &mut writer).unwrap();
+    writer.finish().unwrap();
+    let recording = Recording::open(&path, &ReadOptions::default()).unwrap();
+    let roles = std::fs::read_to_string(folder.join("roles.toml")).unwrap();
+    let request = Request {
+        roles: Some(toml::from_str(&roles).unwrap()),
+        ..Request::default()
+    };
+    let found = examine("walk.mcap", &recording, &request).unwrap();
+    for (name, truth, within) in [
+        ("rms_roll_deg", 18.567, 0.3),
+        ("synchrony", 0.9963, 0.02),
+        ("onset_time_s", 20.06, 0.5),
+        ("dz_pp_m", 0.1433, 0.0143),
+        // 100 Hz and a lever: two samples of a landing are weighted together (docs/field.md).
+        ("t_float", 0.3271, 0.015),
+        ("peak_hz", 2.1507, 0.03),
+    ] {
+        let value = found.metrics.number(name).unwrap();
+        assert!(
+            (value - truth).abs() <= within,
+            "{name}: {value}, true {truth}"
+        );
+    }
+    let word = found.metrics.get("mechanism").unwrap().as_word();
+    assert_eq!(word, Some("parametric"));
+    let clocks = found.quality.iter().filter(|q| q.kind == "clock_offset");
+    assert_eq!(clocks.count(), 2);
 }

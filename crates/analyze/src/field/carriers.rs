@@ -17,10 +17,10 @@ use nalgebra::{UnitQuaternion, Vector3};
 
 use super::remark;
 
-/// Clocks of two carriers that part by more than this are put right, s: on twins with right clocks the largest found is 0.03 s.
-const CLOCK_S: f64 = 0.04;
-/// Half the 95 % interval of an offset so found, s: by twins.
-const CLOCK_ERROR_S: f64 = 0.03;
+/// How far clocks have to part to be put right, and half the 95 % interval of what is found (s), by twins: with the tilt of a pole that two
+/// carry, and with the heave alone. Less cannot be told from a true lag between steps.
+const TWO_S: (f64, f64) = (0.03, 0.02);
+const MANY_S: (f64, f64) = (0.04, 0.03);
 /// J below which the heaves are not taken for the rath's: on twins it is 0.98 and more.
 const MATCH: f64 = 0.8;
 /// Rate at which heaves are compared, Hz.
@@ -54,6 +54,29 @@ impl Rider {
     fn at(&self, i: usize, shift: i64) -> Complex64 {
         self.z[(i as i64 + shift) as usize]
     }
+}
+
+/// J: how much of `x` is one complex number times the shifted, signed sum of the riders; at most a hair below 1.
+fn alike(
+    x: &[Complex64],
+    riders: &[Rider],
+    signs: &[f64],
+    shift: &[i64],
+    inner: &std::ops::Range<usize>,
+) -> f64 {
+    let (mut xs, mut ss, mut xx) = (Complex64::default(), 0.0, 0.0);
+    for i in inner.clone() {
+        let sum: Complex64 = riders
+            .iter()
+            .zip(signs)
+            .zip(shift)
+            .map(|((r, sign), s)| r.at(i, *s) * *sign)
+            .sum();
+        xs += x[i].conj() * sum;
+        ss += sum.norm_sqr();
+        xx += x[i].norm_sqr();
+    }
+    (xs.norm_sqr() / (ss * xx).max(f64::MIN_POSITIVE)).min(1.0 - 1e-12)
 }
 
 /// All worn sensors.
@@ -102,24 +125,26 @@ impl Carriers {
         });
     }
 
-    /// Puts the carriers on one clock: the offsets under which their heaves, added up, are the rath's heave.
+    /// Puts the carriers on one clock: the offsets under which their heaves, added up, are the rath's heave, and, where two carry a pole, their
+    /// difference its tilt.
     ///
     /// ```text
-    /// H(t) ≈ γ Σ_j z_j(t + o_j),    J(o) = |⟨H, S⟩|² / (⟨H, H⟩⟨S, S⟩),  S = Σ_j z_j(t + o_j)
+    /// H(t) ≈ γ Σ_j z_j(t + o_j),    P(t) ≈ κ (z_1(t + o_1) − z_2(t + o_2))
+    /// J_X = |⟨X, S⟩|² / (⟨X, X⟩⟨S, S⟩),    o = argmax Σ_X −ln(1 − J_X)
     /// ```
-    /// H, z_j analytic signals of the heave of the rath and of carrier j, 1 to 5 Hz; γ one complex number: gain and lag of the load behind the
-    /// shoulders, the same for all; o_j what carrier j's clock is ahead (s). J is largest where the beats between the carriers (they add while
-    /// in step, cancel while not) are those that the rath feels; so they have to have been out of step for a while. What all clocks have in
-    /// common goes into γ and stays; so does a whole number of steps, which changes no phase: each o_j lies within half a step.
+    /// H, P, z_j analytic signals of the rath's heave and tilt and of carrier j's heave, 1 to 5 Hz; S the sum or difference on the right; γ, κ one
+    /// complex number each: gain and lag of the load behind the shoulders, the same for all; o_j what carrier j's clock is ahead (s). It shows
+    /// where carriers fall in and out of step: the heave grows and fades, the tilt fades and grows. What all clocks have in common goes
+    /// into γ and κ and stays; so does a whole number of steps, which changes no phase: each o_j lies within half a step.
     pub fn align(&mut self, motion: &Motion) -> Vec<Quality> {
-        let Some((offsets_s, match_)) = self.offsets(motion) else {
+        let Some((offsets_s, least_s, error_s)) = self.offsets(motion) else {
             return Vec::new();
         };
         let (low, high) = offsets_s
             .iter()
             .flatten()
             .fold((f64::MAX, f64::MIN), |(a, b), o| (a.min(*o), b.max(*o)));
-        if match_ < MATCH || high - low < CLOCK_S {
+        if high - low < least_s {
             return Vec::new();
         }
         let mut out = Vec::new();
@@ -132,15 +157,16 @@ impl Carriers {
                 format!(
                     "runs {:+.0} ± {:.0} ms off the carriers' common clock, or whole steps more; put right before comparing phases",
                     1e3 * offset_s,
-                    1e3 * CLOCK_ERROR_S
+                    1e3 * error_s
                 ),
             ));
         }
         out
     }
 
-    /// o_j of everyone who walks, with mean zero (s), and J; `None` for fewer than two.
-    fn offsets(&self, motion: &Motion) -> Option<(Vec<Option<f64>>, f64)> {
+    /// o_j of everyone who walks, with mean zero; how far they have to part to be believed; half their 95 % interval (s). `None` for fewer
+    /// than two, or when the rath does not move as the carriers do.
+    fn offsets(&self, motion: &Motion) -> Option<(Vec<Option<f64>>, f64, f64)> {
         let seen = &motion.inputs;
         let walks = |w: &&Worn| w.steps.is_ok();
         let ends = |t: &[f64]| Some((*t.first()?, *t.last()?));
@@ -158,7 +184,6 @@ impl Carriers {
             let band = gait_band(x, 1.0 / period_s(t_s)?)?;
             Some(hilbert(&interpolate(t_s, &band, &grid)))
         };
-        let heave = analytic(&seen.t_s, &seen.support_ratio)?;
         let mut riders = Vec::new();
         for (k, worn) in self.0.iter().enumerate() {
             if let Ok(steps) = &worn.steps {
@@ -169,9 +194,17 @@ impl Carriers {
                 });
             }
         }
+        let mut felt = vec![(
+            analytic(&seen.t_s, &seen.support_ratio)?,
+            vec![1.0; riders.len()],
+        )];
+        let two = riders.len() == 2;
+        if two {
+            felt.push((analytic(&seen.t_s, &seen.pitch_rad)?, vec![1.0, -1.0]));
+        }
         let most = riders.iter().map(|r| r.reach).max()?;
         // Shifted by up to half a step either way nothing may leave the record.
-        let margin = 2 * most as usize + 1;
+        let margin = most as usize + 2;
         let inner = margin..n.checked_sub(margin)?;
         let mut shift = vec![0i64; riders.len()];
         let mut found = vec![0.0; riders.len()];
@@ -180,31 +213,18 @@ impl Carriers {
             let before = shift.clone();
             // The first stays: what all have in common cannot be told.
             for j in 1..riders.len() {
-                let rest: Vec<Complex64> = inner
-                    .clone()
-                    .map(|i| {
-                        let others = riders.iter().zip(&shift).enumerate();
-                        others
-                            .filter(|(k, _)| *k != j)
-                            .map(|(_, (r, s))| r.at(i, *s))
-                            .sum()
-                    })
-                    .collect();
-                let match_at = |s: i64| {
-                    let (mut hs, mut ss, mut hh) = (Complex64::default(), 0.0, 0.0);
-                    for (i, rest) in inner.clone().zip(&rest) {
-                        let sum = rest + riders[j].at(i, s);
-                        hs += heave[i].conj() * sum;
-                        ss += sum.norm_sqr();
-                        hh += heave[i].norm_sqr();
-                    }
-                    hs.norm_sqr() / (ss * hh).max(f64::MIN_POSITIVE)
+                let score = |s: i64| -> f64 {
+                    let mut shift = shift.clone();
+                    shift[j] = s;
+                    felt.iter()
+                        .map(|(x, signs)| -(1.0 - alike(x, &riders, signs, &shift, &inner)).ln())
+                        .sum()
                 };
                 let reach = riders[j].reach;
                 let (s, top) = (-reach..=reach)
-                    .map(|s| (s, match_at(s)))
+                    .map(|s| (s, score(s)))
                     .max_by(|a, b| a.1.total_cmp(&b.1))?;
-                let (l, r) = (match_at(s - 1), match_at(s + 1));
+                let (l, r) = (score(s - 1), score(s + 1));
                 let bend = l - 2.0 * top + r;
                 let between = if bend < 0.0 {
                     0.5 * (l - r) / bend
@@ -214,16 +234,20 @@ impl Carriers {
                 (shift[j], best) = (s, top);
                 found[j] = (s as f64 + between.clamp(-0.5, 0.5)) / ALIGN_HZ;
             }
-            if shift == before {
+            if two || shift == before {
                 break;
             }
+        }
+        if best < -(1.0 - MATCH).ln() {
+            return None;
         }
         let mean = found.iter().sum::<f64>() / found.len() as f64;
         let mut out = vec![None; self.0.len()];
         for (rider, o) in riders.iter().zip(found) {
             out[rider.number] = Some(o - mean);
         }
-        Some((out, best))
+        let (least_s, error_s) = if two { TWO_S } else { MANY_S };
+        Some((out, least_s, error_s))
     }
 
     /// Phases on one time axis, rad, for those who walk; `None` for fewer than two.
@@ -370,7 +394,7 @@ impl Carriers {
 }
 
 /// Half the 95 % interval of a synchrony from gait phases, 1: by simulated twins (docs/field.md).
-const PHASE_ERROR: f64 = 0.012;
+const PHASE_ERROR: f64 = 0.006;
 
 /// 1 to 5 Hz, zero phase; `None` where the sensor is too slow or the record too short.
 fn gait_band(x: &[f64], rate_hz: f64) -> Option<Vec<f64>> {
