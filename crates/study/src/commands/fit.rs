@@ -1,14 +1,9 @@
 //! `study fit FILE...`: parameters of the model from recordings.
 
 use super::{Format, print};
-use analyze::Window;
-use analyze::examine::{Request, examine};
-use anyhow::{Context, Result, anyhow};
-use recording::import::ingest;
-use recording::read::{ReadOptions, Recording};
-use recording::write::{RecordingWriter, WriterOptions};
+use anyhow::Result;
 use serde_json::json;
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 use study::fit::{Estimate, Field, Outcome, fit};
 use study::statistics::summarise;
 
@@ -19,9 +14,10 @@ pub struct Args {
     /// Recordings (.mcap), or logs of the paper's archive (.npz).
     #[arg(required = true)]
     files: Vec<PathBuf>,
-    /// The scene that says when the music begins and how it builds up.
-    #[arg(long, value_name = "SCENE", default_value = "music")]
-    scene: String,
+    /// The scene that says when the music begins, how it builds up, and, for a recording of sensors alone, where the handles are and
+    /// what the body weighs. Default: `music`, and no weight.
+    #[arg(long, value_name = "SCENE")]
+    scene: Option<String>,
     /// What to print.
     #[arg(long, value_enum, default_value_t = Format::Table)]
     format: Format,
@@ -30,11 +26,14 @@ pub struct Args {
 const EXAMPLES: &str = "Examples:
   study fit music-1001.mcap
   study fit archive/music/seed_*/logs.npz
-  study fit field.mcap --scene rath.toml --format json";
+  study fit field.mcap --scene rath.toml --format json
+
+A field recording (inertial sensors on the rath and on every carrier, stamped by one clock) gives the beat, amplitudes and, where all
+handles carry for long enough, stiffness and damping; it may have come through `analyze FILE --annotate OUT.mcap` or not.";
 
 /// Fits every file, and says what they have in common.
 pub fn run(args: &Args) -> Result<()> {
-    let scene = sim::scene::load(&args.scene, &[])?;
+    let scene = sim::scene::load(args.scene.as_deref().unwrap_or("music"), &[])?;
     let (onset_s, build_up_s) = scene
         .effects
         .music
@@ -42,8 +41,12 @@ pub fn run(args: &Args) -> Result<()> {
     let mut all: Vec<(String, Vec<Outcome>)> = Vec::new();
     for file in &args.files {
         let name = file.display().to_string();
-        let (mut field, window) = read(file)?;
+        let (mut field, window) = Field::read(file)?;
         (field.onset_s, field.build_up_s) = (onset_s, build_up_s);
+        field.handles_m.clone_from(&scene.carriers.handles_m);
+        if args.scene.is_some() {
+            field.inputs.mass_kg.get_or_insert(scene.body.mass_kg);
+        }
         all.push((name, fit(&field, window)));
     }
     let together = common(&all);
@@ -126,46 +129,4 @@ fn common(all: &[(String, Vec<Outcome>)]) -> Vec<(Estimate, usize)> {
             Some((estimate, s.runs))
         })
         .collect()
-}
-
-/// The columns of a recording, and its window of analysis.
-fn read(file: &Path) -> Result<(Field, Window)> {
-    let name = file.display().to_string();
-    let log = file
-        .extension()
-        .is_some_and(|e| e.eq_ignore_ascii_case("npz"));
-    let recording = if log {
-        // The archive's logs become recordings first, as everybody's do.
-        let folder = tempfile::tempdir()?;
-        let path = folder.path().join("log.mcap");
-        let mut writer = RecordingWriter::create(&path, &WriterOptions::default())?;
-        ingest(&[file.to_owned()], None, &mut writer)
-            .with_context(|| format!("cannot read {name}"))?;
-        writer.finish()?;
-        Recording::from_bytes(std::fs::read(&path)?, &ReadOptions::default())?
-    } else {
-        Recording::open(file, &ReadOptions::default())
-            .with_context(|| format!("cannot read {name}"))?
-    };
-    let analysis = examine(&name, &recording, &Request::default())?;
-    let (mut signals, _) =
-        recording.signals(&|path| path.starts_with("/handles/forces.compression_m"))?;
-    signals.sort_by(|a, b| a.path.cmp(&b.path));
-    let forces = analysis.inputs.force_times().len();
-    let compression_m: Vec<Vec<f64>> = signals
-        .into_iter()
-        .map(|s| s.values)
-        .filter(|v| v.len() == forces)
-        .collect();
-    if analysis.inputs.t_s.is_empty() {
-        return Err(anyhow!(
-            "{name}: nothing in it moves: no state and no inertial sensor was found"
-        ));
-    }
-    let field = Field {
-        inputs: analysis.inputs,
-        compression_m,
-        ..Field::default()
-    };
-    Ok((field, analysis.window))
 }

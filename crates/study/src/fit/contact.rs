@@ -1,0 +1,203 @@
+//! What the body feels: stiffness and damping at the handles, and the pendulum of its roll.
+
+use super::squares::{Block, bootstrapped, solve};
+use super::{BLOCK_S, CARRIES, EDGE, Field, KEPT_S, Outcome, budgeted, pair};
+use analyze::imu::rath::Budget;
+use analyze::inputs::{Window, mean_step_s};
+use analyze::mechanism::spline_derivatives;
+use std::ops::Range;
+
+/// Stiffness and damping where contact is kept for a second and longer.
+pub(super) fn contact(field: &Field) -> Result<Vec<Outcome>, String> {
+    let i = &field.inputs;
+    if field.compression_m.is_empty() || i.normal_n.len() != field.compression_m.len() {
+        return Err("the compression of the handles is not recorded".into());
+    }
+    let step_s = mean_step_s(i.force_times()).ok_or("no forces")?;
+    // Of every `skip`-th sample: sums over blocks, all handles together.
+    let sums = |skip: usize| {
+        let step_s = step_s * skip as f64;
+        let least = (KEPT_S / step_s).ceil() as usize;
+        let mut blocks: Vec<Block<2>> = Vec::new();
+        for (normal, gap) in i.normal_n.iter().zip(&field.compression_m) {
+            let n: Vec<f64> = normal.iter().step_by(skip).copied().collect();
+            let d: Vec<f64> = gap.iter().step_by(skip).copied().collect();
+            let mut from = 0;
+            while from < n.len() {
+                let length = n[from..].iter().take_while(|x| **x > 0.0).count();
+                if length >= least.max(2 * EDGE + 2) {
+                    if let Some((rate, _)) = spline_derivatives(&d[from..from + length], step_s) {
+                        let mut block = Block::empty();
+                        for k in EDGE..length - EDGE {
+                            block.add([d[from + k], rate[k]], n[from + k]);
+                        }
+                        blocks.push(block);
+                    }
+                }
+                from += length.max(1);
+            }
+        }
+        blocks
+    };
+    let blocks = sums(1);
+    let why = || "contact is never kept for a second".to_owned();
+    let (value, interval) = bootstrapped(&blocks, |p| [p[0], p[1]]).ok_or_else(why)?;
+    let coarse = solve(&sums(2), |k| k).map_or(value, |p| [p[0], p[1]]);
+    let interval = std::array::from_fn(|p| {
+        let sampling = (coarse[p] - value[p]).abs();
+        [interval[p][0] - sampling, interval[p][1] + sampling]
+    });
+    let names = [("stiffness", "N/m"), ("damping", "N·s/m")];
+    Ok(pair(names, value, interval))
+}
+
+/// Stiffness and damping from the body's specific force and everybody's heave, while all handles carry.
+pub(super) fn contact_from_sensors(field: &Field, window: Window) -> Result<Vec<Outcome>, String> {
+    let i = &field.inputs;
+    let (n, mass_kg) = (
+        i.heave_m.len(),
+        i.mass_kg.ok_or("nobody says what the body weighs")?,
+    );
+    if field.handles_m.len() != n {
+        return Err(format!(
+            "{n} carriers wore a sensor, but the scene has {} handles",
+            field.handles_m.len()
+        ));
+    }
+    let weight_n = mass_kg * i.gravity_m_per_s2;
+    // The middle, where everything is known; sensors have no holes after their clocks' grid.
+    let known = |k: usize| {
+        let at = |x: &[f64]| x.get(k).is_some_and(|x| x.is_finite());
+        [&i.height_m, &i.roll_rad, &i.pitch_rad, &i.support_ratio]
+            .iter()
+            .all(|x| at(x))
+            && i.heave_m.iter().all(|x| at(x))
+    };
+    let range = window.range(&i.t_s);
+    let from = range
+        .clone()
+        .find(|k| known(*k))
+        .ok_or("no samples in the window")?;
+    let to = (from..range.end).find(|k| !known(*k)).unwrap_or(range.end);
+    let step_s = mean_step_s(&i.t_s[from..to]).ok_or("no samples in the window")?;
+    let found = |skip: usize| {
+        let at: Vec<usize> = (from..to).step_by(skip).collect();
+        let step_s = step_s * skip as f64;
+        let mut gaps = Vec::new();
+        for (heave, [x, y, z]) in i.heave_m.iter().zip(&field.handles_m) {
+            let gap: Vec<f64> = at
+                .iter()
+                .map(|&k| {
+                    let ((sr, cr), (sp, cp)) = (i.roll_rad[k].sin_cos(), i.pitch_rad[k].sin_cos());
+                    heave[k] - i.height_m[k] - (cp * sr * y + cp * cr * z - sp * x)
+                })
+                .collect();
+            let (rate, _) = spline_derivatives(&gap, step_s)?;
+            gaps.push((gap, rate));
+        }
+        let total: Vec<f64> = at.iter().map(|&k| i.support_ratio[k] * weight_n).collect();
+        let sum = |k: usize| -> [f64; 2] {
+            let (gap, rate) = gaps
+                .iter()
+                .map(|(g, r)| (g[k], r[k]))
+                .unzip::<_, _, Vec<f64>, Vec<f64>>();
+            [gap.iter().sum(), rate.iter().sum()]
+        };
+        let per_block = (BLOCK_S / step_s).round().max(1.0) as usize;
+        let stretches: Vec<Range<usize>> = (EDGE..at.len().saturating_sub(EDGE))
+            .step_by(per_block)
+            .map(|first| first..(first + per_block).min(at.len() - EDGE))
+            .collect();
+        // Each stretch about its own means: what drifts, and where the slow course of the heights is, drops out.
+        let blocks = |carries: &dyn Fn(usize, usize) -> bool| {
+            let of = |(b, stretch): (usize, &Range<usize>)| {
+                let rows: Vec<usize> = stretch.clone().filter(|k| carries(b, *k)).collect();
+                let count = rows.len().max(1) as f64;
+                let mean =
+                    |x: &dyn Fn(usize) -> f64| rows.iter().map(|k| x(*k)).sum::<f64>() / count;
+                let means = [
+                    mean(&|k| sum(k)[0]),
+                    mean(&|k| sum(k)[1]),
+                    mean(&|k| total[k]),
+                ];
+                let mut block = Block::<2>::empty();
+                for k in rows {
+                    let [gap, rate] = sum(k);
+                    block.add([gap - means[0], rate - means[1]], total[k] - means[2]);
+                }
+                (block, means)
+            };
+            stretches
+                .iter()
+                .enumerate()
+                .map(of)
+                .unzip::<_, _, Vec<_>, Vec<_>>()
+        };
+        // First where the whole load is near the weight; then where every handle's share, as the fit sees it, is well above nothing.
+        let (mut rows, mut means) = blocks(&|_, k| total[k] > 0.7 * weight_n);
+        for _ in 0..12 {
+            let p = solve(&rows, |k| k)?;
+            let least = CARRIES * weight_n / n as f64;
+            let offset: Vec<f64> = means
+                .iter()
+                .map(|[gap, rate, load]| (load - p[0] * gap - p[1] * rate) / n as f64)
+                .collect();
+            (rows, means) = blocks(&|b, k| {
+                let share = |(gap, rate): &(Vec<f64>, Vec<f64>)| p[0] * gap[k] + p[1] * rate[k];
+                means[b][2] > 0.0 && gaps.iter().all(|g| share(g) + offset[b] > least)
+            });
+        }
+        bootstrapped(&rows, |p| [p[0], p[1]])
+    };
+    let why = || "all handles never carry long enough".to_owned();
+    let (value, interval) = found(1).ok_or_else(why)?;
+    let coarse = found(2).map_or(value, |(coarse, _)| coarse);
+    let budget = Budget::default();
+    let scale = budget.height_scale.hypot(budget.support_scale);
+    Ok(pair(
+        [("stiffness", "N/m"), ("damping", "N·s/m")],
+        value,
+        std::array::from_fn(|p| {
+            let sampling = (coarse[p] - value[p]).abs();
+            let wide = [interval[p][0] - sampling, interval[p][1] + sampling];
+            budgeted(value[p], wide, scale)
+        }),
+    ))
+}
+
+/// a and b of the roll's pendulum.
+pub(super) fn pendulum(field: &Field, window: Window) -> Result<Vec<Outcome>, String> {
+    let i = &field.inputs;
+    let range = window.range(&i.t_s);
+    let mut total = i.total_force_n();
+    if let (true, Some(mass_kg)) = (total.is_empty(), i.mass_kg) {
+        total = i
+            .support_ratio
+            .iter()
+            .map(|s| s * mass_kg * i.gravity_m_per_s2)
+            .collect();
+    }
+    if total.len() != i.t_s.len() || i.roll_rad.len() != i.t_s.len() {
+        return Err("roll and forces are not recorded together".into());
+    }
+    let step_s = mean_step_s(&i.t_s[range.clone()]).ok_or("no samples in the window")?;
+    let (roll, total) = (&i.roll_rad[range.clone()], &total[range]);
+    if roll.iter().chain(total).any(|x| !x.is_finite()) {
+        return Err("roll or forces have gaps".into());
+    }
+    let (rate, bend) = spline_derivatives(roll, step_s).ok_or("too few samples in the window")?;
+    let per_block = (BLOCK_S / step_s).round().max(1.0) as usize;
+    let mut blocks: Vec<Block<2>> = Vec::new();
+    for k in EDGE..roll.len().saturating_sub(EDGE) {
+        if (k - EDGE).is_multiple_of(per_block) {
+            blocks.push(Block::empty());
+        }
+        if let Some(block) = blocks.last_mut() {
+            block.add([-total[k] * roll[k].sin(), -rate[k]], bend[k]);
+        }
+    }
+    let (value, interval) =
+        bootstrapped(&blocks, |p| [p[0], p[1]]).ok_or("the roll does not move")?;
+    let names = [("pendulum", "1/(kg·m)"), ("roll damping", "1/s")];
+    Ok(pair(names, value, interval))
+}

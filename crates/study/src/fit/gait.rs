@@ -1,0 +1,278 @@
+//! What the carriers do: beat, pull, frequencies, amplitudes.
+
+use super::squares::{Block, bootstrapped};
+use super::{BLOCK_S, Estimate, Field, Outcome, budgeted, estimate};
+use analyze::imu::rath::Budget;
+use analyze::inputs::{Window, interpolate, mean_step_s};
+use analyze::phase::unwrap;
+use nalgebra::{DMatrix, DVector};
+use std::f64::consts::TAU;
+use std::ops::Range;
+
+/// Beat, pull and the carriers' own frequencies.
+pub(super) fn gait(field: &Field) -> Result<Vec<Outcome>, String> {
+    let i = &field.inputs;
+    let t_s = i.phase_times();
+    if i.phase_rad.is_empty() {
+        return Err("no gait phases".into());
+    }
+    let from = t_s.partition_point(|t| *t < field.onset_s);
+    // Before the first beat that was heard and after the last, nobody knows its phase: what lies between is used.
+    let psi = &i.beat_phase_rad;
+    let heard = |k: &usize| psi[*k].is_finite();
+    let (from, to) = match (
+        (from..psi.len()).find(heard),
+        (from..psi.len()).rev().find(heard),
+    ) {
+        (Some(first), Some(last)) if i.phases_are_measured && psi.len() == t_s.len() => {
+            (first, last + 1)
+        }
+        _ => (from, t_s.len()),
+    };
+    if to < from + 100 {
+        return Err("too few phases after the onset of the music".into());
+    }
+    let t_s = &t_s[from..to];
+    let phases: Vec<Vec<f64>> = i.phase_rad.iter().map(|p| unwrap(&p[from..to])).collect();
+    if phases.iter().flatten().any(|p| !p.is_finite()) {
+        return Err("phases have gaps".into());
+    }
+    let (n, carriers) = (t_s.len(), phases.len());
+    let middle = 0.5 * (t_s[0] + t_s[n - 1]);
+    // Where the beat was heard through and through, the search begins at its frequency, and what it wanders about it is put on the phases' side.
+    let heard = i
+        .beat_phase_rad
+        .get(from..to)
+        .filter(|psi| i.phases_are_measured && psi.len() == n && psi.iter().all(|p| p.is_finite()));
+    let told = heard.map(|psi| tempo(t_s, psi));
+    let against: Vec<Vec<f64>> = match (heard, told) {
+        (Some(psi), Some((omega, _))) => phases
+            .iter()
+            .map(|p| {
+                (0..n)
+                    .map(|k| p[k] - psi[k] + omega * (t_s[k] - middle))
+                    .collect()
+            })
+            .collect(),
+        _ => phases.clone(),
+    };
+    let grown = |t: f64| match field.build_up_s {
+        0.0 => 1.0,
+        tau => 1.0 - (-(t - field.onset_s) / tau).exp(),
+    };
+    // In the last third the carriers follow the beat if they ever do: where the search begins.
+    let third = 2 * n / 3;
+    let span = t_s[n - 1] - t_s[third];
+    let mean = phases
+        .iter()
+        .map(|p| (p[n - 1] - p[third]) / span)
+        .sum::<f64>()
+        / carriers as f64;
+    let start = told.map_or(mean, |(omega, _)| omega);
+    let own_start = mean;
+    // Unknowns: A = K cos ψ, B = K sin ψ (ψ at the middle), Ω, ω_1 …
+    let size = 3 + carriers;
+    let normal =
+        |omega: f64, a: f64, b: f64, own: &[f64], who: Range<usize>, when: Range<usize>| {
+            let mut gram = DMatrix::<f64>::zeros(size, size);
+            let mut right = DVector::<f64>::zeros(size);
+            let mut squares = 0.0;
+            let mut row = DVector::<f64>::zeros(size);
+            for c in who {
+                let phase = &phases[c];
+                for k in when.clone() {
+                    let dt = t_s[k] - t_s[k - 1];
+                    let (mut s, mut co, mut turn) = (0.0, 0.0, 0.0);
+                    for j in [k - 1, k] {
+                        let x = omega * (t_s[j] - middle) - against[c][j];
+                        let (sin, cos) = x.sin_cos();
+                        let m = 0.5 * grown(t_s[j]);
+                        s += m * sin;
+                        co += m * cos;
+                        turn += m * (a * cos - b * sin) * (t_s[j] - middle);
+                    }
+                    row.fill(0.0);
+                    (row[0], row[1], row[2], row[3 + c]) = (s, co, turn, 1.0);
+                    let miss = (phase[k] - phase[k - 1]) / dt - own[c] - a * s - b * co;
+                    // Increments over dt have variance σ²/dt: weight dt, the same for an even clock.
+                    gram.ger(dt, &row, &row, 1.0);
+                    right.axpy(dt * miss, &row, 1.0);
+                    squares += dt * miss * miss;
+                }
+            }
+            (gram, right, squares)
+        };
+    // Where in its turn the beat is, and how strong: a coarse look before the descent.
+    let own0 = vec![own_start; carriers];
+    let mut best = (f64::INFINITY, start, 0.0, 0.0, own0.clone());
+    let reach = if told.is_some() { 0 } else { 20 };
+    for step in -reach..=reach {
+        let omega: f64 = start + f64::from(step) * 0.25 / span;
+        let (gram, right, _) = normal(omega, 0.0, 0.0, &own0, 0..carriers, 1..n);
+        // Without Ω the problem is linear.
+        let keep: Vec<usize> = (0..size).filter(|k| *k != 2).collect();
+        let small = gram.select_rows(&keep).select_columns(&keep);
+        let Some(x) = small.lu().solve(&right.select_rows(&keep)) else {
+            continue;
+        };
+        let own: Vec<f64> = (0..carriers).map(|c| own_start + x[2 + c]).collect();
+        let (_, _, squares) = normal(omega, x[0], x[1], &own, 0..carriers, 1..n);
+        if squares < best.0 {
+            best = (squares, omega, x[0], x[1], own);
+        }
+    }
+    let (mut squares, mut omega, mut a, mut b, mut own) = best;
+    for _ in 0..50 {
+        let (gram, right, _) = normal(omega, a, b, &own, 0..carriers, 1..n);
+        let step = gram
+            .lu()
+            .solve(&right)
+            .ok_or("beat and gait cannot be told apart")?;
+        // Half steps until it is better: far from the answer the beat's frequency overshoots.
+        let mut part = 1.0;
+        loop {
+            let new_own: Vec<f64> = own
+                .iter()
+                .enumerate()
+                .map(|(c, w)| w + part * step[3 + c])
+                .collect();
+            let new = (
+                omega + part * step[2],
+                a + part * step[0],
+                b + part * step[1],
+            );
+            let found = normal(new.0, new.1, new.2, &new_own, 0..carriers, 1..n).2;
+            if found <= squares || part < 1e-3 {
+                (omega, a, b, own, squares) = (new.0, new.1, new.2, new_own, found);
+                break;
+            }
+            part *= 0.5;
+        }
+        if step.norm() < 1e-10 {
+            break;
+        }
+    }
+    let (gram, _, squares) = normal(omega, a, b, &own, 0..carriers, 1..n);
+    let variance = squares / ((n - 1) * carriers - size) as f64;
+    let inverse = gram
+        .try_inverse()
+        .ok_or("beat and gait cannot be told apart")?;
+    let cover = if i.phases_are_measured {
+        let per_block = ((BLOCK_S * (n - 1) as f64 / (t_s[n - 1] - t_s[0])) as usize).max(1);
+        let mut spread = DMatrix::<f64>::zeros(size, size);
+        let mut blocks = 0;
+        for c in 0..carriers {
+            for first in (1..n).step_by(per_block) {
+                let block = first..(first + per_block).min(n);
+                let pull = normal(omega, a, b, &own, c..c + 1, block).1;
+                spread.ger(1.0, &pull, &pull, 1.0);
+                blocks += 1;
+            }
+        }
+        if blocks <= 2 * size {
+            return Err("too few phases after the onset of the music".into());
+        }
+        &inverse * spread * &inverse * (blocks as f64 / (blocks - size) as f64)
+    } else {
+        inverse * variance
+    };
+    let half = |v: f64| 1.96 * v.max(0.0).sqrt();
+    let pull = a.hypot(b);
+    let (ca, cb) = (a / pull, b / pull);
+    let pull_variance =
+        ca * ca * cover[(0, 0)] + 2.0 * ca * cb * cover[(0, 1)] + cb * cb * cover[(1, 1)];
+    let mut out = vec![
+        match told {
+            Some((omega, half)) => estimate("beat", "Hz", omega / TAU, half / TAU),
+            None => estimate("beat", "Hz", omega / TAU, half(cover[(2, 2)]) / TAU),
+        },
+        estimate("pull", "rad/s", pull, half(pull_variance)),
+    ];
+    for (c, w) in own.iter().enumerate() {
+        let k = 3 + c;
+        out.push(estimate(
+            format!("gait {}", c + 1),
+            "Hz",
+            w / TAU,
+            half(cover[(k, k)]) / TAU,
+        ));
+    }
+    if i.phases_are_measured {
+        // In twins the pull and what goes with it lay in their intervals less often than an interval promises.
+        let why = "steps are found in a band about the cadence, which smooths what it shows in";
+        out.truncate(1);
+        out.extend(["pull", "gait", "phase noise"].map(|name| Err((name.into(), why.into()))));
+        return Ok(out);
+    }
+    // The noise: its variance has itself a known spread.
+    let sigma = variance.sqrt();
+    let count = ((n - 1) * carriers - size) as f64;
+    out.push(estimate(
+        "phase noise",
+        "rad/√s",
+        sigma,
+        1.96 * sigma / (2.0 * count).sqrt(),
+    ));
+    Ok(out)
+}
+
+/// Frequency of a beat that was heard, rad/s, and half of its 95 % interval: a straight line through its phase, every beat one
+/// observation, and never surer than a clock's ppm.
+fn tempo(t_s: &[f64], psi: &[f64]) -> (f64, f64) {
+    let n = t_s.len() as f64;
+    let (mt, mp) = (t_s.iter().sum::<f64>() / n, psi.iter().sum::<f64>() / n);
+    let (mut tt, mut tp) = (0.0, 0.0);
+    for (t, p) in t_s.iter().zip(psi) {
+        tt += (t - mt) * (t - mt);
+        tp += (t - mt) * (p - mp);
+    }
+    let omega = tp / tt;
+    let miss = |(t, p): (&f64, &f64)| (p - mp - omega * (t - mt)).powi(2);
+    let variance = t_s.iter().zip(psi).map(miss).sum::<f64>() / n;
+    let beats = ((psi[psi.len() - 1] - psi[0]).abs() / TAU).max(1.0);
+    let half = 1.96 * (variance / (tt / n) / beats).sqrt();
+    (omega, half.max(1e-6 * omega.abs()))
+}
+
+/// How far the shoulders go up and down in step with the phases.
+pub(super) fn amplitudes(field: &Field, window: Window) -> Result<Vec<Outcome>, String> {
+    let i = &field.inputs;
+    if i.heave_m.is_empty() || i.heave_m.len() != i.phase_rad.len() {
+        return Err("the shoulders' heave is not recorded".into());
+    }
+    let range = window.range(&i.t_s);
+    let t_s = &i.t_s[range.clone()];
+    let step_s = mean_step_s(t_s).ok_or("no samples in the window")?;
+    let per_block = (BLOCK_S / step_s).round().max(1.0) as usize;
+    let phase_t = i.phase_times();
+    let known = match (phase_t.first(), phase_t.last()) {
+        (Some(a), Some(b)) => *a..=*b,
+        _ => return Err("no gait phases".into()),
+    };
+    let each = i.heave_m.iter().zip(&i.phase_rad).enumerate();
+    each.map(|(c, (heave, phase))| {
+        let phase = interpolate(phase_t, &unwrap(phase), t_s);
+        let mut blocks: Vec<Block<3>> = Vec::new();
+        for (k, (z, phi)) in heave[range.clone()].iter().zip(&phase).enumerate() {
+            if k.is_multiple_of(per_block) {
+                blocks.push(Block::empty());
+            }
+            let told = z.is_finite() && phi.is_finite() && known.contains(&t_s[k]);
+            if let (true, Some(block)) = (told, blocks.last_mut()) {
+                block.add([phi.sin(), phi.cos(), 1.0], *z);
+            }
+        }
+        let name = format!("amplitude {}", c + 1);
+        let found = bootstrapped(&blocks, |p| [p[0].hypot(p[1])]);
+        Ok(match found {
+            Some(([value], [interval])) => Ok(Estimate {
+                name,
+                unit: "m",
+                value,
+                interval: budgeted(value, interval, Budget::default().height_scale),
+            }),
+            None => Err((name, "the shoulder does not move with the phase".to_owned())),
+        })
+    })
+    .collect()
+}

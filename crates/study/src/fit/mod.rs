@@ -1,0 +1,128 @@
+//! Parameters of the model from a recording, with intervals.
+//!
+//! ```text
+//! beat, pull     φ̇_i = ω_i + K m(t) sin(Ωt + ψ₀ − φ_i) + noise,   m(t) = 1 − e^{−(t − t₀)/τ} from t₀ on
+//! amplitude      z_i = A_i sin φ_i + B_i cos φ_i                      √(A² + B²), lift and all
+//! contact        N_i = k δ_i + c δ̇_i                               while contact is kept
+//! … from sensors N_tot = k Σδ_i + c Σδ̇_i + e                       while all handles carry
+//! pendulum       θ̈ = −a N_tot sin θ − b θ̇                          a = h/(I_xx + M h²) where the handles are held
+//! ```
+//! φ_i gait phases (rad), Ω = 2π·beat, ω_i own frequencies [rad/s], K pull of the music [rad/s]; t₀, τ its onset and build-up (s),
+//! taken from a scene. Increments of φ carry white noise, so least squares (Gauss and Newton) gives the interval of Ω, K, ω_i
+//! by itself; sines are the mean of both ends of an increment, an error of (1/12)(ω_i − Ω)²Δt² of K (10⁻⁴ at 30 Hz).
+//! k, c, a, b: linear least squares on derivatives of the not-a-knot spline, their intervals from a moving-block bootstrap (500
+//! draws, blocks of two roll periods), because neighbours are alike; so are the intervals of the gait from phases that steps tell, whose
+//! increments a band has smoothed (sums over blocks, Newey & West's way without weights). Contact adds what k and c change by when every other
+//! sample is left out: a bound, 15 times over, of what the sampling does. From sensors z_i is the shoulder's and the body's motion about
+//! their slow course, δ_i = z_i − (body's height + (R p_i)_z), N_tot the body's specific force times its mass; a handle carries where
+//! k δ_i + c δ̇_i + e/N, its share of the load, is above a seventh of the weight over N. Source: Seber & Wild, Nonlinear Regression (1989);
+//! Künsch, Ann. Stat. 17 (1989); docs/reproduction.md.
+
+mod contact;
+mod gait;
+mod read;
+mod squares;
+
+use analyze::inputs::{Inputs, Window};
+use contact::{contact, contact_from_sensors, pendulum};
+use gait::{amplitudes, gait};
+
+/// What a fit is made from.
+#[derive(Clone, Debug, Default)]
+pub struct Field {
+    /// Columns of the recording.
+    pub inputs: Inputs,
+    /// Compression of each handle's spring (m), on the forces' time; empty where nobody measured it.
+    pub compression_m: Vec<Vec<f64>>,
+    /// Handles in the body's axes, m: what compression from inertial sensors needs.
+    pub handles_m: Vec<[f64; 3]>,
+    /// When the music begins, s.
+    pub onset_s: f64,
+    /// How long it builds up, s.
+    pub build_up_s: f64,
+}
+
+/// A parameter.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Estimate {
+    /// Name.
+    pub name: String,
+    /// Unit.
+    pub unit: &'static str,
+    /// The estimate.
+    pub value: f64,
+    /// Ends of its 95 % interval.
+    pub interval: [f64; 2],
+}
+
+/// A parameter, or what it is called and why there is none.
+pub type Outcome = Result<Estimate, (String, String)>;
+
+/// Bootstrap samples behind an interval.
+const DRAWS: u64 = 500;
+/// Length of a block of the bootstrap, s: two periods of the roll.
+const BLOCK_S: f64 = 2.0;
+/// Contact has to be kept at least so long, s.
+const KEPT_S: f64 = 1.0;
+/// A handle carries where its share of the load is above this part of the mean share.
+const CARRIES: f64 = 1.0 / 7.0;
+/// Samples left out at each end of a stretch, where the spline's derivative is poor.
+const EDGE: usize = 4;
+
+/// Everything that the recording can tell. Pendulum, amplitudes and contact from sensors over `window`, the rest over all of it.
+pub fn fit(field: &Field, window: Window) -> Vec<Outcome> {
+    let missing = |names: &[&str], why: String| -> Vec<Outcome> {
+        names
+            .iter()
+            .map(|n| Err(((*n).to_owned(), why.clone())))
+            .collect()
+    };
+    let mut out = gait(field).unwrap_or_else(|why| missing(&["beat", "pull"], why));
+    out.extend(amplitudes(field, window).unwrap_or_else(|why| missing(&["amplitude"], why)));
+    let contact = match field.inputs.heave_m.is_empty() {
+        true => contact(field),
+        false => contact_from_sensors(field, window),
+    };
+    out.extend(contact.unwrap_or_else(|why| missing(&["stiffness", "damping"], why)));
+    out.extend(
+        pendulum(field, window).unwrap_or_else(|why| missing(&["pendulum", "roll damping"], why)),
+    );
+    out
+}
+
+fn estimate(name: impl Into<String>, unit: &'static str, value: f64, half: f64) -> Outcome {
+    Ok(Estimate {
+        name: name.into(),
+        unit,
+        value,
+        interval: [value - half, value + half],
+    })
+}
+
+/// An interval with what sensor and method leave uncertain by themselves, a relative standard deviation, which no redrawing of one
+/// recording's blocks can show.
+fn budgeted(value: f64, [low, high]: [f64; 2], scale: f64) -> [f64; 2] {
+    let own = 1.96 * scale * value;
+    [
+        value - (value - low).hypot(own),
+        value + (high - value).hypot(own),
+    ]
+}
+
+/// Two parameters.
+fn pair(
+    names: [(&str, &'static str); 2],
+    value: [f64; 2],
+    interval: [[f64; 2]; 2],
+) -> Vec<Outcome> {
+    (0..2)
+        .map(|p| {
+            Ok(Estimate {
+                name: names[p].0.into(),
+                unit: names[p].1,
+                value: value[p],
+                interval: interval[p],
+            })
+        })
+        .collect()
+}
