@@ -130,6 +130,23 @@ fn bad_input_gets_one_sentence_and_leaves_nothing() {
 }
 
 #[test]
+fn a_file_that_is_not_there_is_said_once() {
+    let folder = tempfile::tempdir().expect("a folder");
+    for (name, args) in [
+        ("sim", &["replay", "none.mcap"][..]),
+        ("analyze", &["none.mcap"]),
+        ("study", &["fit", "none.mcap"]),
+    ] {
+        let out = run_in(folder.path(), name, args);
+        let said = String::from_utf8_lossy(&out.stderr);
+        assert_eq!(out.status.code(), Some(1), "{name}: {said}");
+        assert!(said.contains("none.mcap: cannot be read"), "{said}");
+        assert_eq!(said.matches("os error").count(), 1, "{said}");
+        assert_eq!(said.lines().count(), 1, "{said}");
+    }
+}
+
+#[test]
 fn what_is_no_recording_is_refused_in_one_sentence() {
     let folder = tempfile::tempdir().expect("a folder");
     std::fs::write(folder.path().join("empty.mcap"), b"").expect("written");

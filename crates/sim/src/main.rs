@@ -19,6 +19,7 @@ const EXAMPLES: &str = "Examples:
   sim record music --set effects.music.beat_hz=2.3 --set effects.hold=false
   sim record --out - | view -             watch a run while it is computed
   sim accuracy music                      what accuracy costs: every method against a reference
+  sim replay music-1001.mcap              a recording's carriers drive a scene; how far the motions part
   sim scenes                              the scenes that come with the program
   sim scenes music > mine.toml            a scene to change";
 

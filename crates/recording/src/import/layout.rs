@@ -105,9 +105,9 @@ pub(super) fn find(name: &str) -> Result<Layout, ImportError> {
     let text = match BUILT_IN.iter().find(|(known, _)| *known == name) {
         Some((_, text)) => (*text).to_owned(),
         None if Path::new(name).exists() => {
-            std::fs::read_to_string(name).map_err(|source| ImportError::Io {
+            std::fs::read_to_string(name).map_err(|cause| ImportError::Io {
                 name: name.to_owned(),
-                source,
+                cause,
             })?
         }
         None => {

@@ -25,12 +25,12 @@ use crate::write::{RecordingWriter, WriteError};
 #[non_exhaustive]
 pub enum ImportError {
     /// The log cannot be read.
-    #[error("{name}: cannot be read: {source}")]
+    #[error("{name}: cannot be read: {cause}")]
     Io {
         /// The file.
         name: String,
         /// What the system said.
-        source: io::Error,
+        cause: io::Error,
     },
     /// The log is not what it should be; the text says what was found and what was expected.
     #[error("{name}: {problem}")]
@@ -197,9 +197,9 @@ fn read(files: &Files, layout: Option<&layout::Layout>) -> Result<imu::Log, Impo
 /// Reads the texts of a file, folder or zip.
 fn open(path: &Path) -> Result<Files, ImportError> {
     let name = path.display().to_string();
-    let io = |source| ImportError::Io {
+    let io = |cause| ImportError::Io {
         name: name.clone(),
-        source,
+        cause,
     };
     let mut texts = Vec::new();
     if path.is_dir() {

@@ -183,9 +183,9 @@ impl Columns<'_> {
 
 fn read(path: &Path) -> Result<Log, ImportError> {
     let name = path.display().to_string();
-    let file = File::open(path).map_err(|source| ImportError::Io {
+    let file = File::open(path).map_err(|cause| ImportError::Io {
         name: name.clone(),
-        source,
+        cause,
     })?;
     let archive = ZipArchive::new(BufReader::new(file)).map_err(|error| ImportError::Content {
         name: name.clone(),

@@ -66,12 +66,12 @@ impl Default for ReadOptions {
 #[non_exhaustive]
 pub enum ReadError {
     /// The system does not let us.
-    #[error("{name}: cannot be read: {source}")]
+    #[error("{name}: cannot be read: {cause}")]
     Io {
         /// The file.
         name: String,
         /// What the system said.
-        source: std::io::Error,
+        cause: std::io::Error,
     },
     /// There is nothing in it.
     #[error("{name}: is empty; expected an MCAP recording")]
@@ -213,9 +213,9 @@ impl Recording {
     /// Opens a file. It is mapped, not read, so it may be larger than the memory.
     pub fn open(path: &Path, options: &ReadOptions) -> Result<Self, ReadError> {
         let name = path.display().to_string();
-        let io = |source| ReadError::Io {
+        let io = |cause| ReadError::Io {
             name: name.clone(),
-            source,
+            cause,
         };
         let mut file = File::open(path).map_err(io)?;
         let kind = file.metadata().map_err(io)?;

@@ -3,7 +3,7 @@
 use super::Field;
 use analyze::Window;
 use analyze::examine::{Request, examine};
-use anyhow::{Context, Result, anyhow};
+use anyhow::{Result, anyhow};
 use recording::import::ingest;
 use recording::read::{ReadOptions, Recording};
 use recording::write::{RecordingWriter, WriterOptions};
@@ -24,13 +24,11 @@ impl Field {
             let folder = tempfile::tempdir()?;
             let path = folder.path().join("log.mcap");
             let mut writer = RecordingWriter::create(&path, &WriterOptions::default())?;
-            ingest(&[file.to_owned()], None, &mut writer)
-                .with_context(|| format!("cannot read {name}"))?;
+            ingest(&[file.to_owned()], None, &mut writer)?;
             writer.finish()?;
             Recording::from_bytes(std::fs::read(&path)?, &ReadOptions::default())?
         } else {
-            Recording::open(file, &ReadOptions::default())
-                .with_context(|| format!("cannot read {name}"))?
+            Recording::open(file, &ReadOptions::default())?
         };
         // To put clocks right by the carriers' own lags would take away what the pull is seen by.
         let request = Request {
