@@ -1,31 +1,16 @@
 //! Three hundred random scenes that are right, and three hundred that are wrong. Seeds are the numbers of the scenes.
 
+#[path = "common/dice.rs"]
+mod dice;
+
+use dice::Dice;
 use sim::model::Model;
 use sim::run::{Sample, run_model, settings};
 use sim::scene::{load, parse, to_toml};
 use sim::solve::method;
 use std::panic::catch_unwind;
 
-/// SplitMix64: Steele, Lea, Flood (2014).
-struct Dice(u64);
-
 impl Dice {
-    fn next(&mut self) -> u64 {
-        self.0 = self.0.wrapping_add(0x9E37_79B9_7F4A_7C15);
-        let mut z = self.0;
-        z = (z ^ (z >> 30)).wrapping_mul(0xBF58_476D_1CE4_E5B9);
-        z = (z ^ (z >> 27)).wrapping_mul(0x94D0_49BB_1331_11EB);
-        z ^ (z >> 31)
-    }
-    fn from(&mut self, low: f64, high: f64) -> f64 {
-        low + (high - low) * (self.next() >> 11) as f64 / (1u64 << 53) as f64
-    }
-    fn below(&mut self, n: u64) -> u64 {
-        self.next() % n
-    }
-    fn chance(&mut self, p: f64) -> bool {
-        self.from(0.0, 1.0) < p
-    }
     fn pick<'a>(&mut self, list: &[&'a str]) -> &'a str {
         list[self.below(list.len() as u64) as usize]
     }

@@ -6,23 +6,12 @@ use sim::scene::{Scene, parse};
 use sim::solve::{METHODS, Method, Settings};
 use std::panic::{AssertUnwindSafe, catch_unwind};
 
-/// SplitMix64: Steele, Lea, Flood (2014).
-struct Dice(u64);
+#[path = "dice.rs"]
+mod dice;
+
+use dice::Dice;
 
 impl Dice {
-    fn next(&mut self) -> u64 {
-        self.0 = self.0.wrapping_add(0x9E37_79B9_7F4A_7C15);
-        let mut z = self.0;
-        z = (z ^ (z >> 30)).wrapping_mul(0xBF58_476D_1CE4_E5B9);
-        z = (z ^ (z >> 27)).wrapping_mul(0x94D0_49BB_1331_11EB);
-        z ^ (z >> 31)
-    }
-    fn from(&mut self, low: f64, high: f64) -> f64 {
-        low + (high - low) * (self.next() >> 11) as f64 / (1u64 << 53) as f64
-    }
-    fn chance(&mut self, p: f64) -> bool {
-        self.from(0.0, 1.0) < p
-    }
     /// What is usual, or in one of three cases a power of ten between the two exponents.
     fn wild(&mut self, usual: f64, low: f64, high: f64) -> f64 {
         if self.chance(1.0 / 3.0) {
@@ -39,7 +28,7 @@ impl Dice {
 /// A scene of 60 kg and usual effects, of whose numbers every third is out by many powers of ten.
 pub fn wild(seed: u64) -> String {
     let mut d = Dice(seed ^ 0x5CE7E);
-    let n = 1 + d.next() % 6;
+    let n = 1 + d.below(6);
     let mass = d.wild(60.0, -6.0, 9.0);
     let size = d.wild(0.2, -4.0, 2.0);
     let [a, b, c] = [0; 3].map(|_| size * d.wild(1.0, -3.0, 3.0));
@@ -96,7 +85,7 @@ pub fn wild(seed: u64) -> String {
             d.wild(3000.0, -3.0, 12.0),
             d.wild(400.0, -3.0, 9.0)
         );
-        match d.next() % 5 {
+        match d.below(5) {
             0 => t += "bilateral = true\n",
             1 => {
                 t += &format!(
@@ -211,7 +200,7 @@ const WRONG: f64 = 1e-3;
 /// The method of a scene: three times in four the default.
 pub fn method_of(seed: u64) -> &'static Method {
     let all = METHODS.len() as u64;
-    let i = Dice(seed ^ 0x3E7).next() % (4 * all);
+    let i = Dice(seed ^ 0x3E7).below(4 * all);
     &METHODS[if i < all { i as usize } else { 0 }]
 }
 
