@@ -16,7 +16,7 @@ use std::{
 
 use mcap::{Compression, WriteOptions, records::MessageHeader, write::NoSeek};
 
-use crate::{cdr, topics::MessageKind};
+use crate::{cdr, read::ChannelInfo, topics::MessageKind};
 
 /// A message larger than this is refused.
 const MAX_MESSAGE_BYTES: usize = 256 << 20;
@@ -155,6 +155,20 @@ pub struct RawChannel<'a> {
     pub schema_data: &'a [u8],
     /// Further properties.
     pub metadata: &'a BTreeMap<String, String>,
+}
+
+impl<'a> From<&'a ChannelInfo> for RawChannel<'a> {
+    /// The same channel again.
+    fn from(c: &'a ChannelInfo) -> Self {
+        Self {
+            topic: &c.topic,
+            message_encoding: &c.encoding,
+            schema_name: &c.schema,
+            schema_encoding: &c.schema_encoding,
+            schema_data: &c.schema_data,
+            metadata: &c.metadata,
+        }
+    }
 }
 
 struct Channel {

@@ -95,19 +95,7 @@ fn field_log(scene: &sim::scene::Scene, path: &Path) {
         .info()
         .channels
         .iter()
-        .map(|c| {
-            seen(&c.topic).then(|| {
-                let channel = RawChannel {
-                    topic: &c.topic,
-                    message_encoding: &c.encoding,
-                    schema_name: &c.schema,
-                    schema_encoding: &c.schema_encoding,
-                    schema_data: &c.schema_data,
-                    metadata: &c.metadata,
-                };
-                writer.raw_channel(&channel).unwrap()
-            })
-        })
+        .map(|c| seen(&c.topic).then(|| writer.raw_channel(&RawChannel::from(c)).unwrap()))
         .collect();
     recording
         .messages(&seen, &mut |raw| {

@@ -30,14 +30,7 @@ pub(super) fn write(recording: &Recording, analysis: &Analysis, out: &Path) -> a
     }
     let mut channels = Vec::new();
     for c in &recording.info().channels {
-        channels.push(writer.raw_channel(&RawChannel {
-            topic: &c.topic,
-            message_encoding: &c.encoding,
-            schema_name: &c.schema,
-            schema_encoding: &c.schema_encoding,
-            schema_data: &c.schema_data,
-            metadata: &c.metadata,
-        })?);
+        channels.push(writer.raw_channel(&RawChannel::from(c))?);
     }
     let start_ns = recording.info().start_ns;
     let mut own = own(analysis, start_ns);

@@ -1,7 +1,7 @@
 //! `sim explain`: what a scene turns on, what state that needs, and what it costs.
 
+use super::{Format, number};
 use anyhow::Result;
-use clap::ValueEnum;
 use serde_json::{Value, json};
 use sim::effects::{Entry, TABLE};
 use sim::model::Model;
@@ -23,12 +23,6 @@ pub struct Args {
     /// Table for people, or JSON.
     #[arg(long, default_value = "table")]
     format: Format,
-}
-
-#[derive(Clone, Copy, PartialEq, ValueEnum)]
-enum Format {
-    Table,
-    Json,
 }
 
 const EXAMPLES: &str = "Examples:
@@ -238,10 +232,6 @@ fn try_freedoms(scene: &Scene) -> Vec<Trial> {
             }
         })
         .collect()
-}
-
-fn number(x: f64) -> Value {
-    if x.is_finite() { json!(x) } else { Value::Null }
 }
 
 fn as_json(found: &Findings) -> Value {

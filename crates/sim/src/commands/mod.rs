@@ -7,7 +7,8 @@ mod record;
 mod replay;
 mod scenes;
 
-use clap::Subcommand;
+use clap::{Subcommand, ValueEnum};
+use serde_json::{Value, json};
 use std::io::Write;
 use std::process::ExitCode;
 
@@ -26,6 +27,13 @@ pub enum Command {
     Accuracy(accuracy::Args),
     /// List the built-in scenes, or print one as TOML.
     Scenes(scenes::Args),
+}
+
+/// How a command prints its result.
+#[derive(Clone, Copy, PartialEq, ValueEnum)]
+enum Format {
+    Table,
+    Json,
 }
 
 /// Runs a command; errors go to stderr, one sentence first, then the causes.
@@ -56,4 +64,9 @@ fn print(text: &str) -> anyhow::Result<()> {
         Err(e) if e.kind() != std::io::ErrorKind::BrokenPipe => Err(e.into()),
         _ => Ok(()),
     }
+}
+
+/// A number as JSON has it: null where it is none.
+fn number(x: f64) -> Value {
+    if x.is_finite() { json!(x) } else { Value::Null }
 }

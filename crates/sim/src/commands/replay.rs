@@ -1,6 +1,6 @@
 //! `sim replay`: a recording drives a scene.
 
-use super::print;
+use super::{Format, print};
 use anyhow::{Context, Result, anyhow};
 use recording::read::{ReadOptions, Recording};
 use recording::topics::{BEAT, FORCES, PHASES, STATE};
@@ -55,12 +55,6 @@ enum What {
     Shoulders,
     /// The beat alone, from `/beat`: the scene's oscillators follow it.
     Beat,
-}
-
-#[derive(Clone, Copy, clap::ValueEnum)]
-enum Format {
-    Table,
-    Json,
 }
 
 const HELP: &str = "What drives is read from /carriers/phases, /tf and /beat. A field recording, in which the carriers wore inertial
@@ -283,11 +277,7 @@ impl Measured {
             for (k, c) in all.filter(|(_, c)| c.topic == from) {
                 let channel = writer.raw_channel(&RawChannel {
                     topic: &format!("/measured{to}"),
-                    message_encoding: &c.encoding,
-                    schema_name: &c.schema,
-                    schema_encoding: &c.schema_encoding,
-                    schema_data: &c.schema_data,
-                    metadata: &c.metadata,
+                    ..RawChannel::from(c)
                 })?;
                 channels.insert(k, channel);
             }

@@ -3,8 +3,8 @@
 mod figure;
 mod hard;
 
+use super::{Format, number};
 use anyhow::{Context, Result, anyhow};
-use clap::ValueEnum;
 use indicatif::{ProgressBar, ProgressStyle};
 use serde_json::{Value, json};
 use sim::accuracy::{Judge, Quoted, REFERENCE, Rung, SECOND, Study, study};
@@ -44,12 +44,6 @@ const EXAMPLES: &str = "Examples:
   sim accuracy music --set effects.contact.stiffness_n_per_m=3e6 --set effects.contact.damping_n_s_per_m=12650
   sim accuracy mine.toml --format json
   sim accuracy --hard";
-
-#[derive(Clone, Copy, PartialEq, ValueEnum)]
-enum Format {
-    Table,
-    Json,
-}
 
 /// Runs the study and prints it.
 pub fn run(args: &Args) -> Result<()> {
@@ -223,11 +217,6 @@ fn capital(sentence: &str) -> String {
     let mut letters = sentence.chars();
     let first = letters.next().map(|c| c.to_ascii_uppercase());
     first.into_iter().chain(letters).collect()
-}
-
-/// What is no number has none in JSON.
-fn number(x: f64) -> Value {
-    if x.is_finite() { json!(x) } else { Value::Null }
 }
 
 fn quoted(q: &Quoted) -> Value {
