@@ -79,6 +79,9 @@ pub trait Freedoms: Send + Sync {
     }
     /// What counts as one unit of each state in an error norm.
     fn scales(&self) -> &[f64];
+    /// −∂v̇/∂v of each velocity, 1/s, that vertical dampers of `damping` (N·s/m) at the handles make where `contact_gain` lets them act.
+    /// Zero where it is not worth knowing.
+    fn damping_per_s(&self, _y: &[f64], _pairs: &[Pair], _damping: &[f64x2], _rates: &mut [f64]) {}
 }
 
 /// All six freedoms: r (world), q = (x, y, z, w) body → world, v (world), ω (body); 13 states.
@@ -260,6 +263,24 @@ impl Freedoms for Six {
         &[
             0.1, 0.1, 0.1, 0.1, 0.1, 0.1, 0.1, 1.0, 1.0, 1.0, 1.0, 1.0, 1.0,
         ]
+    }
+
+    fn damping_per_s(&self, y: &[f64], pairs: &[Pair], damping: &[f64x2], rates: &mut [f64]) {
+        let up = rotation(&y[3..7])[2].map(f64x2::splat);
+        let (mut straight, mut turning) = (f64x2::ZERO, [f64x2::ZERO; 3]);
+        for ((p, h), damping) in pairs.iter().zip(&self.handle).zip(damping) {
+            let damping = *damping * p.contact_gain;
+            straight += damping;
+            for a in 0..3 {
+                let (b, c) = ((a + 1) % 3, (a + 2) % 3);
+                let lever = h[b] * up[c] - h[c] * up[b];
+                turning[a] += damping * lever * lever;
+            }
+        }
+        rates[9] = sum(straight) * self.inverse_mass;
+        for a in 0..3 {
+            rates[10 + a] = sum(turning[a]) * self.inverse_inertia.moments[a];
+        }
     }
 
     fn place(&self, start: &Start, height_m: f64, y: &mut [f64]) {

@@ -118,6 +118,10 @@ pub struct Workspace {
     pub rotation: [[f64; 3]; 3],
     /// Angular velocity in the body, rad/s.
     pub spin: [f64; 3],
+    /// What a law in proportion to the load of a unilateral contact takes for the least load, N: 0, or −∞ where a method freezes contacts
+    /// within a step and wants the law to go on as it was behind a lift-off that is still to be located. A kink there would be taken for
+    /// an error.
+    pub least_load_n: f64,
     /// Torque on the body beside that of the handle forces, body axes, N·m.
     pub body_torque: [f64; 3],
     /// States of the effects' own.
@@ -176,6 +180,11 @@ impl Layout {
     }
 }
 
+/// The unit of a coordinate of the body, m or rad.
+const COORDINATE: f64 = 0.1;
+/// So much of an acceleration, m/s² or rad/s², one unit of a velocity may make where it is more than its scale.
+const LOOSEST: f64 = 2400.0;
+
 /// The equations of one scene.
 pub struct Model {
     /// The scene it was made from.
@@ -200,6 +209,7 @@ pub struct Model {
     beat: Option<Beat>,
     contact_stiffness: Vec<f64>,
     contact_exponent: f64,
+    contact_damping: Vec<f64x2>,
     watches_contact: bool,
     sensor_clocks: Vec<Clock>,
     imus: Vec<Imu>,
@@ -247,6 +257,7 @@ impl Model {
             beat: None,
             contact_stiffness: Vec::new(),
             contact_exponent: 1.0,
+            contact_damping: Vec::new(),
             extra: Vec::new(),
             watches_contact: false,
             sensor_clocks: Vec::new(),
@@ -344,6 +355,11 @@ impl Model {
         self.watches_contact = !bilateral;
     }
 
+    /// N·s/m of every carrier's contact, where it is the same whatever the load.
+    pub(crate) fn set_contact_damping(&mut self, damping: Vec<f64x2>) {
+        self.contact_damping = damping;
+    }
+
     /// The clock that ticks at `rate_hz`; sensors of one rate share it.
     pub(crate) fn sensor_clock(&mut self, rate_hz: f64) -> usize {
         let clock = Clock { rate_hz };
@@ -394,6 +410,26 @@ impl Model {
     /// The body's coordinates.
     pub fn freedoms(&self) -> &dyn Freedoms {
         &*self.freedoms
+    }
+
+    /// What counts as one unit of each of the body's states in an error norm: [`Freedoms::scales`], and more for a velocity that the
+    /// contacts damp away before its error has moved anything.
+    ///
+    /// An error of a velocity that decays at rate λ moves its coordinate by 1/λ of it. Its unit is that of the coordinate times λ where that
+    /// is more than its scale. But forces show it undiminished, and a force that errs opens contacts that are closed: it is no more than
+    /// [`LOOSEST`]/λ, so nothing is loosened for stiff contacts.
+    pub fn units(&self, y: &[f64], w: &Workspace, units: &mut [f64]) {
+        units.fill(0.0);
+        if !self.contact_damping.is_empty() {
+            self.freedoms
+                .damping_per_s(y, &w.pair, &self.contact_damping, units);
+        }
+        for (unit, &scale) in units.iter_mut().zip(self.freedoms.scales()) {
+            let damping_per_s = *unit;
+            *unit = (COORDINATE * damping_per_s)
+                .min(LOOSEST / damping_per_s)
+                .max(scale);
+        }
     }
 
     /// Natural gait frequencies, rad/s.
@@ -475,6 +511,7 @@ impl Model {
             pair: (0..pairs(n)).map(pair).collect(),
             rotation: [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]],
             spin: [0.0; 3],
+            least_load_n: 0.0,
             body_torque: [0.0; 3],
             extra: self.extra.iter().map(|(_, first)| *first).collect(),
             extra_rate: vec![0.0; self.extra.len()],
@@ -556,24 +593,42 @@ impl Model {
     /// The right-hand side: dy = f(t, y).
     #[inline]
     pub fn rhs(&self, t_s: f64, y: &[f64], dy: &mut [f64], w: &mut Workspace) {
+        self.rhs_of_motion(t_s, y, dy, w);
+        self.powers(dy, w);
+    }
+
+    /// The same without the ledger, whose rates in `dy` stay as they were; nothing but the ledger feels it.
+    #[inline]
+    pub fn rhs_of_motion(&self, t_s: f64, y: &[f64], dy: &mut [f64], w: &mut Workspace) {
         if self.carried {
-            return self.rhs_of_all(t_s, y, dy, w);
+            self.forces(t_s, y, w);
+            return self.motion(y, dy, w);
         }
         // Nothing acts on the handles: nobody asks where they are until a sample does.
         let pairs = std::mem::take(&mut w.pair);
-        self.rhs_of_all(t_s, y, dy, w);
+        self.forces(t_s, y, w);
+        self.motion(y, dy, w);
         w.pair = pairs;
     }
 
+    /// The right-hand side where [`Self::forces`] has just been called.
+    pub fn rates(&self, y: &[f64], dy: &mut [f64], w: &mut Workspace) {
+        self.motion(y, dy, w);
+        self.powers(dy, w);
+    }
+
     #[inline(always)]
-    fn rhs_of_all(&self, t_s: f64, y: &[f64], dy: &mut [f64], w: &mut Workspace) {
-        self.forces(t_s, y, w);
+    fn motion(&self, y: &[f64], dy: &mut [f64], w: &mut Workspace) {
         self.freedoms.accelerate(y, w, dy);
         let phases = self.layout.phase_range();
         lanes::store(w.pair.iter().map(|p| p.rate), &mut dy[phases]);
         if !w.extra.is_empty() {
             dy[self.layout.extra_range()].copy_from_slice(&w.extra_rate);
         }
+    }
+
+    #[inline(always)]
+    fn powers(&self, dy: &mut [f64], w: &Workspace) {
         for ((_, account), out) in self
             .accounts
             .iter()

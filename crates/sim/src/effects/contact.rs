@@ -114,6 +114,7 @@ impl Contact {
         let exponent = match self.law {
             Law::SpringDamper => {
                 let damping = pack((0..n).map(|i| self.damping_n_s_per_m.get(i)));
+                model.set_contact_damping(damping.clone());
                 let law = SpringDampers(stiffness.into_iter().zip(damping).collect());
                 model.add(Stage::Handles, law.clone());
                 model.add_account("contact", law);

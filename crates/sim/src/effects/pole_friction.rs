@@ -43,9 +43,11 @@ impl PoleFriction {
         )
     }
 
-    pub(super) fn build(&self, _scene: &Scene, model: &mut Model) {
+    pub(super) fn build(&self, scene: &Scene, model: &mut Model) {
+        let bilateral = scene.effects.contact.as_ref().is_some_and(|c| c.bilateral);
         let law = Rub {
             arm_m: self.arm_m,
+            bilateral,
             rate2: self.regularising_rate_rad_per_s.powi(2),
         };
         model.add(Stage::Body, law.clone());
@@ -56,15 +58,20 @@ impl PoleFriction {
 #[derive(Clone, Debug)]
 struct Rub {
     arm_m: f64,
+    bilateral: bool,
     rate2: f64,
 }
 
 impl Rub {
     #[inline(always)]
     fn torque_n_m(&self, w: &Workspace) -> f64 {
-        let mut load = f64x2::ZERO;
+        let (mut load, least) = (f64x2::ZERO, f64x2::splat(w.least_load_n));
         for p in &w.pair {
-            load += p.normal.abs();
+            load += if self.bilateral {
+                p.normal.abs()
+            } else {
+                p.normal.fast_max(least)
+            };
         }
         let rate = w.spin[0];
         -self.arm_m * sum(load) * rate / (rate * rate + self.rate2).sqrt()

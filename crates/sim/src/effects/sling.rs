@@ -47,6 +47,7 @@ impl Sling {
         let law = Strap {
             per_length: 1.0 / self.length_m,
             damping_s: self.damping_s,
+            least_n: least_load_n(scene),
         };
         if scene.effects.hold.is_some() {
             // The hold has set its force already, and its account books all that there is sideways.
@@ -62,12 +63,22 @@ impl Sling {
 struct Strap {
     per_length: f64,
     damping_s: f64,
+    least_n: f64,
+}
+
+/// The least load that a strap may be under, N. A unilateral contact never pulls: there the workspace alone decides.
+fn least_load_n(scene: &Scene) -> f64 {
+    match &scene.effects.contact {
+        Some(contact) if contact.bilateral => 0.0,
+        _ => f64::NEG_INFINITY,
+    }
 }
 
 impl Strap {
     #[inline(always)]
-    fn force(&self, p: &Pair) -> [f64x2; 2] {
-        let load = p.normal.fast_max(f64x2::ZERO) * self.per_length;
+    fn force(&self, p: &Pair, least_n: f64) -> [f64x2; 2] {
+        let least = f64x2::splat(self.least_n.max(least_n));
+        let load = p.normal.fast_max(least) * self.per_length;
         [0, 1].map(|axis| load * (p.gap[axis] + p.gap_rate[axis] * self.damping_s))
     }
 }
@@ -75,7 +86,7 @@ impl Strap {
 impl Term for Strap {
     fn apply(&self, _t_s: f64, w: &mut Workspace) {
         for p in &mut w.pair {
-            p.tangential = self.force(p);
+            p.tangential = self.force(p, w.least_load_n);
         }
     }
 }
@@ -87,7 +98,7 @@ struct Beside(Strap);
 impl Term for Beside {
     fn apply(&self, _t_s: f64, w: &mut Workspace) {
         for p in &mut w.pair {
-            let [x, y] = self.0.force(p);
+            let [x, y] = self.0.force(p, w.least_load_n);
             p.tangential[0] += x;
             p.tangential[1] += y;
         }
@@ -98,7 +109,7 @@ impl Account for Strap {
     fn power(&self, w: &Workspace) -> Power {
         let (mut work, mut absorbed) = (f64x2::ZERO, f64x2::ZERO);
         for p in &w.pair {
-            for (axis, force) in self.force(p).into_iter().enumerate() {
+            for (axis, force) in self.force(p, w.least_load_n).into_iter().enumerate() {
                 work += force * p.base_rate[axis];
                 absorbed += force * p.gap_rate[axis];
             }

@@ -9,8 +9,8 @@
 
 use super::reduced::{Rails, Turning, cross, dot, sin_cos};
 use super::{place_handles, times};
-use crate::lanes::f64x2;
-use crate::model::Workspace;
+use crate::lanes::{f64x2, sum};
+use crate::model::{Pair, Workspace};
 use nalgebra::{Rotation3, Vector3};
 
 pub(super) struct Hinge {
@@ -103,6 +103,24 @@ impl Turning for Hinge {
             let turned = dot(self.in_world, torque) + dot(self.in_body, w.body_torque);
             dy[rails.free + p] = turned * self.inverse_moment;
         }
+    }
+
+    fn damping_per_s(
+        &self,
+        rails: &Rails,
+        y: &[f64],
+        pairs: &[Pair],
+        damping: &[f64x2],
+        rates: &mut [f64],
+    ) {
+        let Some(place) = self.place else { return };
+        let (sin, cos) = sin_cos(y[place]);
+        let mut taken = f64x2::ZERO;
+        for ((p, [_, b, c]), damping) in pairs.iter().zip(&self.handles).zip(damping) {
+            let lever = c[2] * cos - b[2] * sin;
+            taken += *damping * p.contact_gain * lever * lever;
+        }
+        rates[rails.free + place] = sum(taken) * self.inverse_moment;
     }
 
     fn columns(&self, _rails: &Rails, _y: &[f64]) -> [[f64; 3]; 3] {

@@ -15,8 +15,8 @@ use super::gimbal::Gimbal;
 use super::hinge::Hinge;
 use super::{Freedoms, Pose, Six, pull};
 use crate::body::Body;
-use crate::lanes::{f64x2, pack};
-use crate::model::Workspace;
+use crate::lanes::{f64x2, pack, sum};
+use crate::model::{Pair, Workspace};
 use crate::scene::{Freedom, Start};
 use nalgebra::{DMatrix, DVector, Matrix3, UnitQuaternion, Vector3};
 
@@ -102,6 +102,9 @@ impl Freedoms for Pinned {
     fn scales(&self) -> &[f64] {
         self.six.scales()
     }
+    fn damping_per_s(&self, y: &[f64], pairs: &[Pair], damping: &[f64x2], rates: &mut [f64]) {
+        self.six.damping_per_s(y, pairs, damping, rates);
+    }
 }
 
 /// Which coordinates are free and where the others are held, and the body that they place.
@@ -175,6 +178,16 @@ pub(super) trait Turning: Send + Sync {
     fn gaps(&self, rails: &Rails, y: &[f64], motion: [[f64; 3]; 2], w: &mut Workspace);
     /// Writes the second derivatives of the free angles; `torque` of the handle forces in the world (N·m).
     fn accelerate(&self, rails: &Rails, torque: [f64; 3], y: &[f64], w: &Workspace, dy: &mut [f64]);
+    /// What vertical dampers take from the rate of a free angle, as [`Freedoms::damping_per_s`].
+    fn damping_per_s(
+        &self,
+        _rails: &Rails,
+        _y: &[f64],
+        _pairs: &[Pair],
+        _damping: &[f64x2],
+        _rates: &mut [f64],
+    ) {
+    }
     /// Columns of J: what one rad/s of roll, of tilt, of yaw adds to ω; those of held angles are not read.
     fn columns(&self, rails: &Rails, y: &[f64]) -> [[f64; 3]; 3];
     /// J̇ (φ̇, θ̇, ψ̇)
@@ -220,6 +233,15 @@ impl<T: Turning> Freedoms for Reduced<T> {
 
     fn scales(&self) -> &[f64] {
         &self.rails.scales
+    }
+
+    fn damping_per_s(&self, y: &[f64], pairs: &[Pair], damping: &[f64x2], rates: &mut [f64]) {
+        let rails = &self.rails;
+        if let Some(height) = rails.place[2] {
+            let acting = pairs.iter().zip(damping).map(|(p, d)| *d * p.contact_gain);
+            rates[rails.free + height] = sum(acting.fold(f64x2::ZERO, |a, b| a + b)) / rails.mass;
+        }
+        self.turning.damping_per_s(rails, y, pairs, damping, rates);
     }
 
     fn place(&self, start: &Start, _height_m: f64, y: &mut [f64]) {

@@ -95,6 +95,8 @@ pub struct Course<'m> {
     /// Last event of each handle and how many came at nearly the same moment.
     recent: Vec<(f64, u32)>,
     most_evaluations: u64,
+    /// Whether the workspace holds the forces at the present moment, under the present contacts.
+    fresh: bool,
 }
 
 /// So many changes of one handle at the same moment, and it is treated as sitting on the edge.
@@ -130,6 +132,7 @@ impl<'m> Course<'m> {
             locate,
             recent: vec![(f64::NEG_INFINITY, 0); n],
             most_evaluations: settings.most_evaluations,
+            fresh: false,
         };
         course.begin_segment();
         for i in 0..n {
@@ -166,16 +169,24 @@ impl<'m> Course<'m> {
         (due <= t_s + SAME_MOMENT_S).then_some(due)
     }
 
-    /// Hands the state that [`Self::sample_due`] asked for to the observer.
-    pub fn sample(&mut self, y: &[f64], observer: &mut dyn Observer) -> Result<(), Stopped> {
+    /// Hands the state that [`Self::sample_due`] asked for to the observer. `evaluated`: the workspace holds the forces there already.
+    pub fn sample(
+        &mut self,
+        y: &[f64],
+        evaluated: bool,
+        observer: &mut dyn Observer,
+    ) -> Result<(), Stopped> {
+        self.fresh = false;
         let (who, t_s) = self.next_tick();
         let tick = self.tickers[who].advance();
         if who > 0 {
             observer.tick(who - 1, tick, t_s, y, &mut self.w);
             return Ok(());
         }
-        self.model.forces(t_s, y, &mut self.w);
-        self.stats.evaluations += 1;
+        if !evaluated {
+            self.model.forces(t_s, y, &mut self.w);
+            self.stats.evaluations += 1;
+        }
         // Within a rounding of an opening, N = N* can be a hair below zero.
         if self.model.watches_contact() {
             for p in &mut self.w.pair {
@@ -193,7 +204,7 @@ impl<'m> Course<'m> {
     pub fn begin_log(&mut self, observer: &mut dyn Observer) -> Result<(), Stopped> {
         let start = self.y.clone();
         while self.sample_due(self.t_s).is_some() {
-            self.sample(&start, observer)?;
+            self.sample(&start, false, observer)?;
         }
         Ok(())
     }
@@ -213,14 +224,26 @@ impl<'m> Course<'m> {
     /// The right-hand side at (t, y).
     #[inline]
     pub fn rhs(&mut self, t_s: f64, y: &[f64], dy: &mut [f64]) {
+        self.fresh = false;
         self.stats.evaluations += 1;
         self.model.rhs(t_s, y, dy, &mut self.w);
     }
 
+    /// The same without the ledger.
+    #[inline]
+    pub fn rhs_of_motion(&mut self, t_s: f64, y: &[f64], dy: &mut [f64]) {
+        self.fresh = false;
+        self.stats.evaluations += 1;
+        self.model.rhs_of_motion(t_s, y, dy, &mut self.w);
+    }
+
     /// The right-hand side at the present state.
     pub fn slope(&mut self, dy: &mut [f64]) {
-        self.stats.evaluations += 1;
-        self.model.rhs(self.t_s, &self.y, dy, &mut self.w);
+        if !std::mem::take(&mut self.fresh) {
+            self.stats.evaluations += 1;
+            self.model.forces(self.t_s, &self.y, &mut self.w);
+        }
+        self.model.rates(&self.y, dy, &mut self.w);
     }
 
     /// How far the contacts are from an event at the last evaluation: negative when one has happened, N.
@@ -236,6 +259,7 @@ impl<'m> Course<'m> {
 
     /// The margin at a state between steps, N.
     pub fn margin_at_n(&mut self, t_s: f64, y: &[f64]) -> f64 {
+        self.fresh = false;
         self.stats.evaluations += 1;
         self.model.forces(t_s, y, &mut self.w);
         self.margin_n()
@@ -274,6 +298,7 @@ impl<'m> Course<'m> {
     /// that is there change with it. A handle that changes again and again at one moment sits on its edge: it is clamped,
     /// which is exact for it, until it has left the edge.
     pub fn fire(&mut self, observer: &mut dyn Observer) {
+        self.fresh = false;
         self.model.forces(self.t_s, &self.y, &mut self.w);
         self.stats.evaluations += 1;
         // The located zero is one to rounding: its handle may be a hair short of it.
@@ -333,16 +358,23 @@ impl<'m> Course<'m> {
         self.model.forces(self.t_s, &self.y, &mut self.w);
         self.stats.evaluations += 1;
         if self.locate {
+            let mut changed = false;
             for i in 0..self.contacts.len() {
                 let contact = Self::standing(self.w.of(i, |p| p.unclamped));
+                changed |= contact != self.contacts[i];
                 self.set_contact(i, contact);
             }
-            self.model.forces(self.t_s, &self.y, &mut self.w);
+            if changed {
+                self.model.forces(self.t_s, &self.y, &mut self.w);
+                self.stats.evaluations += 1;
+            }
         }
+        self.fresh = true;
     }
 
     /// Takes handles off the edge once they have left it.
     fn settle(&mut self) {
+        self.fresh = false;
         self.edge_s = f64::INFINITY;
         self.model.forces(self.t_s, &self.y, &mut self.w);
         self.stats.evaluations += 1;
@@ -403,6 +435,7 @@ impl<'m> Course<'m> {
         if self.touching.is_empty() {
             return;
         }
+        self.fresh = false;
         self.model.forces(self.t_s, &self.y, &mut self.w);
         for i in 0..self.touching.len() {
             let now = self.w.of(i, |p| p.normal) > 0.0;

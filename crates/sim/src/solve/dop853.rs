@@ -90,6 +90,7 @@ impl Pair for Dop853 {
     const NAME: &'static str = "dop853";
     const STAGES: usize = 12;
     const DENSE_STAGES: usize = 3;
+    const PASSING: usize = 4;
     const EXPONENT: f64 = 1.0 / 8.0;
     const DENSE_ROWS: usize = 7;
     const SHARE: f64 = 7e-4;

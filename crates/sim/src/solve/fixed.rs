@@ -43,7 +43,7 @@ fn integrate<S: Step>(
     );
     let y0 = course.y.clone();
     while course.sample_due(0.0).is_some() {
-        course.sample(&y0, observer)?;
+        course.sample(&y0, false, observer)?;
     }
     while !course.finished() {
         let begin = course.t_s;
@@ -66,13 +66,13 @@ fn integrate<S: Step>(
                     hermite((t - t0) / h, h, &course.y, &f0, &y1, &f1, &mut at);
                     course.model.freedoms().project(&mut at);
                     finite(course, t, &at)?;
-                    course.sample(&at, observer)?;
+                    course.sample(&at, false, observer)?;
                 }
             }
             course.y.copy_from_slice(&y1);
             finite(course, t1, &y1)?;
             while course.sample_due(t1).is_some() {
-                course.sample(&y1, observer)?;
+                course.sample(&y1, false, observer)?;
             }
             course.arrive(t1, observer)?;
         }

@@ -21,7 +21,7 @@ use crate::model::Model;
 pub type Row = &'static [(usize, f64)];
 
 /// Numbers that are treated together.
-pub const TILE: usize = 16;
+pub const TILE: usize = 8;
 type Tile = [f64; TILE];
 
 /// Most stages that a method may have, those for dense output and the slope at the end included.
@@ -76,6 +76,8 @@ pub trait Pair {
     const A_DENSE: &'static [Row];
     /// c_i of the dense stages.
     const C_DENSE: &'static [f64];
+    /// Stages up to this one have no part in the step's end, its error or its dense polynomial: only later stages read their slopes.
+    const PASSING: usize;
     /// The exponent of the step-size law: one over the order of the error estimate.
     const EXPONENT: f64;
     /// Coefficients of the dense polynomial needed per state.
@@ -189,11 +191,16 @@ struct Run<'m, P, const EVENTS: bool> {
     y1: Vec<f64>,
     /// A state between steps.
     at: Vec<f64>,
-    /// 1/unit of each state that the error norm watches, 0 for the others.
+    /// 1/unit of each state that the error norm watches, 0 for padding.
     weight: Vec<Tile>,
     /// How far the unit grows with the state: 1 or 0.
     relative: Vec<Tile>,
-    watched: f64,
+    /// How many states come before the ledger.
+    watched: usize,
+    /// Units of the body's states.
+    units: Vec<f64>,
+    /// How many tiles hold the states that feed something back; what lies beyond is ledger alone.
+    moving: usize,
     looks: Looks,
     /// The margin at the start of the step.
     margin_n: f64,
@@ -254,19 +261,8 @@ impl<'m, P: Pair, const EVENTS: bool> Run<'m, P, EVENTS> {
         let count = size / TILE;
         let (mut weight, mut relative) = (vec![[0.0; TILE]; count], vec![[0.0; TILE]; count]);
         let (body, watched) = (model.layout().body, model.layout().ledger_range().start);
-        for d in 0..watched {
-            // Phases grow without bound and mean nothing modulo a turn: they are held absolutely, the body relatively too.
-            weight.as_flattened_mut()[d] = if d < body {
-                1.0 / model.freedoms().scales()[d]
-            } else {
-                1.0
-            };
-            relative.as_flattened_mut()[d] = if d < body {
-                weight.as_flattened()[d]
-            } else {
-                0.0
-            };
-        }
+        // Phases grow without bound and mean nothing modulo a turn: they are held absolutely, the body (see `weigh`) relatively too.
+        weight.as_flattened_mut()[body..watched].fill(1.0);
         // The ledger feeds nothing back, yet a rest that is quadrature's own would accuse the motion. Its unit: lifted by 1 m.
         let gravity: f64 = model
             .scene
@@ -293,7 +289,9 @@ impl<'m, P: Pair, const EVENTS: bool> Run<'m, P, EVENTS> {
             at: vec![0.0; size],
             weight,
             relative,
-            watched: watched as f64,
+            watched,
+            units: vec![0.0; body],
+            moving: watched.div_ceil(TILE),
             looks: Looks::new(),
             margin_n: 0.0,
             watch,
@@ -302,6 +300,7 @@ impl<'m, P: Pair, const EVENTS: bool> Run<'m, P, EVENTS> {
             method: std::marker::PhantomData,
         };
         run.course.y.resize(size, 0.0);
+        run.course.w.least_load_n = if EVENTS { f64::NEG_INFINITY } else { 0.0 };
         run
     }
 
@@ -309,6 +308,9 @@ impl<'m, P: Pair, const EVENTS: bool> Run<'m, P, EVENTS> {
     fn integrate<F: Arithmetic>(&mut self, observer: &mut dyn Observer) -> Result<End, Stopped> {
         self.begin();
         let mut h_next = self.first_step();
+        // What a first step after a switch could have been, the last time: the jump excites what the step before it has not met.
+        let mut after_switch = f64::INFINITY;
+        let mut switched = false;
         let mut error_before: f64 = 1e-4;
         let mut rejected_before = false;
         while !self.course.finished() {
@@ -365,6 +367,9 @@ impl<'m, P: Pair, const EVENTS: bool> Run<'m, P, EVENTS> {
                 }
             };
             let e = error.max(1e-10);
+            if std::mem::take(&mut switched) {
+                after_switch = h * (SAFETY * e.powf(-P::EXPONENT)).clamp(SHRINK, GROW);
+            }
             let factor = SAFETY * e.powf(-P::EXPONENT * 0.8) * error_before.powf(P::EXPONENT * 0.2);
             let factor = factor.clamp(
                 SHRINK,
@@ -385,6 +390,10 @@ impl<'m, P: Pair, const EVENTS: bool> Run<'m, P, EVENTS> {
             if moved != Moved::On && !self.course.finished() {
                 self.begin();
                 self.stiff_in_row = 0;
+                if moved == Moved::Switched {
+                    h_next = h_next.min(after_switch);
+                    switched = true;
+                }
             }
             if self.stiff_in_row > MANY {
                 let (t_s, evaluations) = self.row_began;
@@ -400,13 +409,11 @@ impl<'m, P: Pair, const EVENTS: bool> Run<'m, P, EVENTS> {
     /// Hairer & Wanner, Solving Ordinary Differential Equations II (1996), IV.2.
     fn note_stiffness(&mut self, h: f64) {
         let (mut rates, mut states) = (0.0, 0.0);
-        let pairs = tiles(&self.y1).iter().zip(tiles(&self.trial));
-        for ((k, (y1, trial)), weight) in self.k.iter().zip(pairs).zip(&self.weight) {
-            for l in 0..TILE {
-                let w = weight[l];
-                rates += ((k[P::STAGES][l] - k[P::STAGES - 1][l]) * w).powi(2);
-                states += ((y1[l] - trial[l]) * w).powi(2);
-            }
+        for d in 0..self.watched {
+            let (tile, l) = (d / TILE, d % TILE);
+            let (k, w) = (&self.k[tile], self.weight[tile][l]);
+            rates += ((k[P::STAGES][l] - k[P::STAGES - 1][l]) * w).powi(2);
+            states += ((self.y1[d] - self.trial[d]) * w).powi(2);
         }
         if self.stiff_in_row == 0 {
             self.row_began = (self.course.t_s, self.course.stats.evaluations);
@@ -418,8 +425,20 @@ impl<'m, P: Pair, const EVENTS: bool> Run<'m, P, EVENTS> {
         }
     }
 
+    /// Gives each of the body's states the unit that it has at the present state.
+    #[inline(always)]
+    fn weigh(&mut self) {
+        let course = &self.course;
+        course.model.units(&course.y, &course.w, &mut self.units);
+        for (d, unit) in self.units.iter().enumerate() {
+            self.weight.as_flattened_mut()[d] = 1.0 / unit;
+            self.relative.as_flattened_mut()[d] = 1.0 / unit;
+        }
+    }
+
     /// The first slope after a switch or an event.
     fn begin(&mut self) {
+        self.weigh();
         self.course.slope(&mut self.slope);
         self.margin_n = self.course.margin_n();
         for (k, slope) in self.k.iter_mut().zip(tiles(&self.slope)) {
@@ -445,19 +464,19 @@ impl<'m, P: Pair, const EVENTS: bool> Run<'m, P, EVENTS> {
                 total += x * x;
             }
         }
-        (total / self.watched).sqrt() / tolerance
+        (total / self.watched as f64).sqrt() / tolerance
     }
 
     /// Stage `I` of a step of size h: its state from the earlier stages, its slope from the model.
     #[inline(always)]
     fn stage<F: Arithmetic, const I: usize>(&mut self, h: f64) {
-        let into = if I == P::STAGES {
-            &mut self.y1
+        // The ledger feeds nothing back: its state is not asked for before the step's end.
+        let (into, tiled) = if I == P::STAGES {
+            (&mut self.y1, self.k.len())
         } else {
-            &mut self.trial
+            (&mut self.trial, self.moving)
         };
-        for ((k, y), out) in self
-            .k
+        for ((k, y), out) in self.k[..tiled]
             .iter()
             .zip(tiles(&self.course.y))
             .zip(tiles_mut(into))
@@ -468,8 +487,14 @@ impl<'m, P: Pair, const EVENTS: bool> Run<'m, P, EVENTS> {
             }
         }
         let t = self.course.t_s + const { time::<P>(I) } * h;
-        self.course.rhs(t, into, &mut self.slope);
-        for (k, slope) in self.k.iter_mut().zip(tiles(&self.slope)) {
+        let kept = if I <= P::PASSING {
+            self.course.rhs_of_motion(t, into, &mut self.slope);
+            self.moving
+        } else {
+            self.course.rhs(t, into, &mut self.slope);
+            self.k.len()
+        };
+        for (k, slope) in self.k[..kept].iter_mut().zip(tiles(&self.slope)) {
             k[I] = *slope;
         }
         if EVENTS && I <= P::STAGES {
@@ -505,7 +530,7 @@ impl<'m, P: Pair, const EVENTS: bool> Run<'m, P, EVENTS> {
                 *square += tile.into_iter().sum::<f64>();
             }
         }
-        P::error(h, squares, self.watched) / self.tolerance
+        P::error(h, squares, self.watched as f64) / self.tolerance
     }
 
     /// Hands over what lies within an accepted step and moves to its end, or to the first event.
@@ -521,21 +546,29 @@ impl<'m, P: Pair, const EVENTS: bool> Run<'m, P, EVENTS> {
         if suspicious || self.course.sample_due(inner).is_some() {
             return self.close_with_care::<F>(h, t1, suspicious, observer);
         }
-        self.arrive_at_y1(t1, observer)
+        // The last stage was at the end.
+        self.arrive_at_y1(t1, true, observer)
     }
 
     #[inline(always)]
-    fn arrive_at_y1(&mut self, t1: f64, observer: &mut dyn Observer) -> Result<Moved, Stopped> {
+    fn arrive_at_y1(
+        &mut self,
+        t1: f64,
+        mut evaluated: bool,
+        observer: &mut dyn Observer,
+    ) -> Result<Moved, Stopped> {
         std::mem::swap(&mut self.course.y, &mut self.y1);
         let switched = t1 >= self.course.stop_s();
         while self.course.sample_due(t1).is_some() {
             self.at.copy_from_slice(&self.course.y);
-            self.course.sample(&self.at, observer)?;
+            self.course
+                .sample(&self.at, std::mem::take(&mut evaluated), observer)?;
         }
         self.course.arrive(t1, observer)?;
         if switched {
             return Ok(Moved::Switched);
         }
+        self.weigh();
         for k in &mut self.k {
             k[0] = k[P::STAGES];
         }
@@ -584,14 +617,14 @@ impl<'m, P: Pair, const EVENTS: bool> Run<'m, P, EVENTS> {
         while let Some(t) = self.course.sample_due(end) {
             self.between::<F>(((t - t0) / h).clamp(0.0, 1.0), h, last);
             self.course.model.freedoms().project(&mut self.at);
-            self.course.sample(&self.at, observer)?;
+            self.course.sample(&self.at, false, observer)?;
         }
         let Some(theta) = event else {
             // Stepping to a sample leaves another end behind.
             if self.looks.spoilt() {
                 self.step::<F>(h);
             }
-            return self.arrive_at_y1(t1, observer);
+            return self.arrive_at_y1(t1, false, observer);
         };
         interpolate::<P, F>(theta, &self.course.y, &self.dense, &mut self.at);
         std::mem::swap(&mut self.course.y, &mut self.at);

@@ -136,6 +136,8 @@ pub fn integrate<const EVENTS: bool>(
             most: MOST_STATES,
         });
     }
+    // Frozen behind a lift-off, a stiff contact pulls with many times the weight: what goes with the load must not follow it there.
+    course.w.least_load_n = 0.0;
     let mut radau = Radau::new(course, settings);
     let (began_s, began) = (course.t_s, course.stats);
     while !course.finished() {
@@ -463,7 +465,7 @@ impl Radau {
         while let Some(t) = course.sample_due(t0 + end_s - 2.0 * SAME_MOMENT_S) {
             self.between(course, (t - t0) / h);
             course.model.freedoms().project(&mut self.at);
-            course.sample(&self.at, observer)?;
+            course.sample(&self.at, false, observer)?;
         }
         self.between(course, end_s / h);
         course.y.copy_from_slice(&self.at);
@@ -475,7 +477,7 @@ impl Radau {
         let switched = t1 >= course.stop_s();
         if event.is_none() {
             while course.sample_due(t1).is_some() {
-                course.sample(&self.at, observer)?;
+                course.sample(&self.at, false, observer)?;
             }
         }
         course.arrive(t1, observer)?;
