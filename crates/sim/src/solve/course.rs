@@ -209,6 +209,12 @@ impl<'m> Course<'m> {
         Ok(())
     }
 
+    /// How many handles are in contact, as far as contacts open and close.
+    pub fn resting_handles(&self) -> usize {
+        let resting = |c: &&Contact| **c == Contact::Closed;
+        self.contacts.iter().filter(resting).count()
+    }
+
     /// Whether the work is still within what is allowed.
     pub fn check_work(&self) -> Result<(), Stopped> {
         if self.stats.evaluations > self.most_evaluations {
@@ -298,7 +304,6 @@ impl<'m> Course<'m> {
     /// that is there change with it. A handle that changes again and again at one moment sits on its edge: it is clamped,
     /// which is exact for it, until it has left the edge.
     pub fn fire(&mut self, observer: &mut dyn Observer) {
-        self.fresh = false;
         self.model.forces(self.t_s, &self.y, &mut self.w);
         self.stats.evaluations += 1;
         // The located zero is one to rounding: its handle may be a hair short of it.
@@ -335,8 +340,12 @@ impl<'m> Course<'m> {
             let (sense, zero) = &mut self.watch[i / LANES];
             let short = (sense.as_array()[i % LANES] * free).min(0.0);
             zero.as_mut_array()[i % LANES] -= short;
+            let pair = &mut self.w.pair[i / LANES];
+            pair.normal = (pair.unclamped * pair.contact_gain).fast_max(pair.contact_floor);
             self.changed(i, kind, observer);
         }
+        // The laws agree at the zero: nothing that goes with N has to be asked again.
+        self.fresh = true;
     }
 
     fn changed(&mut self, handle: usize, kind: EventKind, observer: &mut dyn Observer) {

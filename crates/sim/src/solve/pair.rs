@@ -308,9 +308,10 @@ impl<'m, P: Pair, const EVENTS: bool> Run<'m, P, EVENTS> {
     fn integrate<F: Arithmetic>(&mut self, observer: &mut dyn Observer) -> Result<End, Stopped> {
         self.begin();
         let mut h_next = self.first_step();
-        // What a first step after a switch could have been, the last time: the jump excites what the step before it has not met.
-        let mut after_switch = f64::INFINITY;
-        let mut switched = false;
+        // What a first step after a switch could have been, the last time that as many handles rested: the jump excites what the step
+        // before it has not met.
+        let mut after_switch = [f64::INFINITY; 3];
+        let mut switched: Option<usize> = None;
         let mut error_before: f64 = 1e-4;
         let mut rejected_before = false;
         while !self.course.finished() {
@@ -367,8 +368,8 @@ impl<'m, P: Pair, const EVENTS: bool> Run<'m, P, EVENTS> {
                 }
             };
             let e = error.max(1e-10);
-            if std::mem::take(&mut switched) {
-                after_switch = h * (SAFETY * e.powf(-P::EXPONENT)).clamp(SHRINK, GROW);
+            if let Some(resting) = switched.take() {
+                after_switch[resting] = h * (SAFETY * e.powf(-P::EXPONENT)).clamp(SHRINK, GROW);
             }
             let factor = SAFETY * e.powf(-P::EXPONENT * 0.8) * error_before.powf(P::EXPONENT * 0.2);
             let factor = factor.clamp(
@@ -391,8 +392,9 @@ impl<'m, P: Pair, const EVENTS: bool> Run<'m, P, EVENTS> {
                 self.begin();
                 self.stiff_in_row = 0;
                 if moved == Moved::Switched {
-                    h_next = h_next.min(after_switch);
-                    switched = true;
+                    let resting = self.course.resting_handles().min(2);
+                    h_next = h_next.min(after_switch[resting]);
+                    switched = Some(resting);
                 }
             }
             if self.stiff_in_row > MANY {
@@ -409,11 +411,15 @@ impl<'m, P: Pair, const EVENTS: bool> Run<'m, P, EVENTS> {
     /// Hairer & Wanner, Solving Ordinary Differential Equations II (1996), IV.2.
     fn note_stiffness(&mut self, h: f64) {
         let (mut rates, mut states) = (0.0, 0.0);
-        for d in 0..self.watched {
-            let (tile, l) = (d / TILE, d % TILE);
-            let (k, w) = (&self.k[tile], self.weight[tile][l]);
-            rates += ((k[P::STAGES][l] - k[P::STAGES - 1][l]) * w).powi(2);
-            states += ((self.y1[d] - self.trial[d]) * w).powi(2);
+        let ends = tiles(&self.y1).iter().zip(tiles(&self.trial));
+        let moving = self.k[..self.moving].iter().zip(ends).zip(&self.weight);
+        for (tile, ((k, (y1, trial)), weight)) in moving.enumerate() {
+            // The ledger, which may share the last of these tiles, is not in `trial`.
+            for l in 0..TILE.min(self.watched - tile * TILE) {
+                let w = weight[l];
+                rates += ((k[P::STAGES][l] - k[P::STAGES - 1][l]) * w).powi(2);
+                states += ((y1[l] - trial[l]) * w).powi(2);
+            }
         }
         if self.stiff_in_row == 0 {
             self.row_began = (self.course.t_s, self.course.stats.evaluations);
