@@ -3,7 +3,7 @@
 use std::io::{Read, Write};
 use std::path::Path;
 
-use analyze::examine::{Analysis, Request, examine};
+use analyze::examine::{Analysis, Quality, Request, examine};
 use analyze::report;
 use analyze::roles::RolesFile;
 use anyhow::{Context, bail};
@@ -113,13 +113,17 @@ pub(super) fn open(path: &Path) -> anyhow::Result<Recording> {
 }
 
 fn one(path: &Path, args: &AnalyzeArgs, request: &Request) -> anyhow::Result<Analysis> {
-    let recording = open(path)?;
+    let mut recording = open(path)?;
     let name = if path.as_os_str() == "-" {
         "standard input".to_owned()
     } else {
         path.display().to_string()
     };
-    let analysis = examine(&name, &recording, request)?;
+    let mut analysis = examine(&name, &recording, request)?;
+    if recording.contradicts_its_summary() {
+        recording = recording.searched();
+        analysis = examine(&name, &recording, request)?;
+    }
     if analysis.is_empty() {
         bail!("{}", nothing(&analysis, request));
     }
@@ -209,35 +213,48 @@ fn nothing(a: &Analysis, request: &Request) -> String {
             topics.join(", ")
         );
     }
+    let why: Vec<String> = (a.quality.iter())
+        .filter(|q| q.loss || q.kind == "no_decoder")
+        .take(20)
+        .map(told)
+        .collect();
+    let why = if why.is_empty() {
+        String::new()
+    } else {
+        format!("; {}", why.join("; "))
+    };
     if a.messages == 0 {
-        return format!("{}: holds no messages", a.file);
+        return format!("{}: holds no messages{why}", a.file);
     }
     let found: Vec<String> = a
         .topics
         .iter()
         .take(20)
-        .map(|t| format!("{} ({}, {})", t.name, t.schema, t.encoding))
+        .map(|t| {
+            let schema = match t.schema.as_str() {
+                "" => "no schema",
+                schema => schema,
+            };
+            format!("{} ({schema}, {})", t.name, t.encoding)
+        })
         .collect();
     format!(
-        "{}: holds no numeric signal that can be used; found {}",
+        "{}: holds no numeric signal that can be used; found {}{why}",
         a.file,
         found.join(", ")
     )
 }
 
+/// A remark with its topic.
+fn told(q: &Quality) -> String {
+    match q.topic.as_str() {
+        "" => q.text.clone(),
+        topic => format!("{topic}: {}", q.text),
+    }
+}
+
 fn loss(a: &Analysis) -> String {
-    let told: Vec<String> = a
-        .quality
-        .iter()
-        .filter(|q| q.loss)
-        .map(|q| {
-            if q.topic.is_empty() {
-                q.text.clone()
-            } else {
-                format!("{}: {}", q.topic, q.text)
-            }
-        })
-        .collect();
+    let told: Vec<String> = a.quality.iter().filter(|q| q.loss).map(told).collect();
     let lost = match a.skipped_messages {
         0 => "no whole message is known to be lost".to_owned(),
         1 => "1 message is lost".to_owned(),
