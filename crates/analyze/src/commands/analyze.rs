@@ -9,7 +9,7 @@ use analyze::roles::RolesFile;
 use anyhow::{Context, bail};
 use recording::read::{ReadOptions, Recording};
 
-use super::{AnalyzeArgs, Done, Format, annotate, complain, print};
+use super::{AnalyzeArgs, Done, Format, Limits, annotate, complain, print};
 
 pub(super) fn run(args: &AnalyzeArgs) -> anyhow::Result<Done> {
     let request = request(args)?;
@@ -87,8 +87,13 @@ fn roles(path: &Path) -> anyhow::Result<RolesFile> {
 }
 
 /// Opens a recording, or what comes through standard input.
-pub(super) fn open(path: &Path) -> anyhow::Result<Recording> {
-    let options = ReadOptions::default();
+fn open(path: &Path, limits: &Limits) -> anyhow::Result<Recording> {
+    let options = ReadOptions {
+        max_chunk_bytes: limits.max_chunk_bytes,
+        max_message_bytes: limits.max_message_bytes,
+        max_items: limits.max_items,
+        ..ReadOptions::default()
+    };
     if path.as_os_str() == "-" {
         let mut bytes = Vec::new();
         std::io::stdin()
@@ -113,7 +118,7 @@ pub(super) fn open(path: &Path) -> anyhow::Result<Recording> {
 }
 
 fn one(path: &Path, args: &AnalyzeArgs, request: &Request) -> anyhow::Result<Analysis> {
-    let mut recording = open(path)?;
+    let mut recording = open(path, &args.limits)?;
     let name = if path.as_os_str() == "-" {
         "standard input".to_owned()
     } else {

@@ -90,9 +90,7 @@ pub fn read(
 }
 
 /// What is averaged.
-const COLUMNS: [&str; 6] = [
-    GYRO[0], GYRO[1], GYRO[2], ACCEL[0], ACCEL[1], ACCEL[2],
-];
+const COLUMNS: [&str; 6] = [GYRO[0], GYRO[1], GYRO[2], ACCEL[0], ACCEL[1], ACCEL[2]];
 
 /// One sensor on the way.
 struct Sensor {
@@ -151,8 +149,10 @@ impl Sensor {
             }
             if self.count == self.factor {
                 // OK because a factor is far below 2⁶³.
-                self.times_ns
-                    .push(self.first_ns.wrapping_add(self.since_ns / self.factor as i64));
+                self.times_ns.push(
+                    self.first_ns
+                        .wrapping_add(self.since_ns / self.factor as i64),
+                );
                 for (column, sum) in self.columns.iter_mut().zip(self.sums) {
                     column.push(sum / self.factor as f64);
                 }

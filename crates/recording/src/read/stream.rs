@@ -423,7 +423,7 @@ impl<'a> Taker<'a> {
             let info = &recording.info;
             for (channel, &found) in info.channels.iter().zip(&self.per_channel) {
                 if channel.messages != found {
-                            let text = format!(
+                    let text = format!(
                         "the summary counts {} messages of channel {}, {found} were found",
                         channel.messages, channel.id
                     );
@@ -432,7 +432,7 @@ impl<'a> Taker<'a> {
             }
             let told = (info.start_ns, info.end_ns);
             if let Some(found) = self.times.filter(|found| *found != told) {
-                    let text = format!(
+                let text = format!(
                     "the summary says that log times go from {:.3} s to {:.3} s after the first, they go from 0 s to {:.3} s",
                     seconds(told.0, found.0),
                     seconds(told.1, found.0),
@@ -561,8 +561,7 @@ impl<'a> Taker<'a> {
                 Kind::NoDecoder | Kind::UnknownChannel | Kind::BadSchema
             ) {
                 let s = if finding.count == 1 { "" } else { "s" };
-                finding.text =
-                    format!("skipped {} message{s}: {}", finding.count, finding.text);
+                finding.text = format!("skipped {} message{s}: {}", finding.count, finding.text);
             }
         }
         self.recording.skipped.store(self.lost, Ordering::Relaxed);
