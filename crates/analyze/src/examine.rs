@@ -243,41 +243,25 @@ pub fn examine(
     })
 }
 
-/// Inertial samples up to which motion is estimated: estimates hold all of them in memory, the rest of the reading does not.
-const MOST_INERTIAL: u64 = 4_000_000;
-
 /// Whether motion is estimated from inertial sensors; where there are some and it is not, the reason.
 fn estimates(
     recording: &Recording,
     roles: &Roles,
     request: &Request,
 ) -> Result<(), Option<String>> {
-    let sensors = |topic: &str| {
-        roles
-            .patterns(Role::Imu)
-            .iter()
-            .chain(roles.patterns(Role::Carriers))
-            .any(|t| t == topic)
-    };
-    let samples: u64 = recording
-        .info()
-        .channels
+    let mut sensors = roles
+        .patterns(Role::Imu)
         .iter()
-        .filter(|c| sensors(&c.topic))
-        .map(|c| c.messages)
-        .sum();
-    match samples {
-        0 => Ok(()),
-        _ if request.truth => Ok(()),
-        _ if !request.signals.is_empty() => Err(Some(
+        .chain(roles.patterns(Role::Carriers));
+    let channels = &recording.info().channels;
+    let any = sensors.any(|t| channels.iter().any(|c| c.topic == *t && c.messages > 0));
+    if any && !request.truth && !request.signals.is_empty() {
+        return Err(Some(
             "motion is not estimated from the inertial sensors where --signal narrows what is read"
                 .into(),
-        )),
-        n if n > MOST_INERTIAL => Err(Some(format!(
-            "motion is not estimated from {n} inertial samples (at most {MOST_INERTIAL}): name fewer sensors in a roles file"
-        ))),
-        _ => Ok(()),
+        ));
     }
+    Ok(())
 }
 
 /// Whether a field has to be decoded: it is listed, plays a role, or is part of a quaternion whose angles are or do.

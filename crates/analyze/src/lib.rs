@@ -28,7 +28,7 @@ pub mod spectrum;
 pub mod steps;
 pub mod summary;
 pub mod table;
-pub mod whole;
 
 pub use inputs::{Inputs, Window};
 pub use metrics::{Metrics, metrics, metrics_of};
+pub use recording::whole;

@@ -43,14 +43,24 @@ pub enum TableError {
     },
 }
 
-/// Columns on one time axis: the union of the signals' times. NaN stands for "no value" and "not a number" alike.
-pub struct Columns {
+/// Signals on one time axis, the union of their times. They are put on it block by block of rows, so that nothing is held but them.
+struct Table {
     /// Log time of each row, nanoseconds, ascending.
-    pub time_ns: Vec<i64>,
-    /// The same in seconds after the recording's first message.
-    pub t_s: Vec<f64>,
-    /// Path, unit and values; `None` where the signal has no value at that time.
-    pub columns: Vec<(String, String, Vec<Option<f64>>)>,
+    time_ns: Vec<i64>,
+    start_ns: i64,
+    signals: Vec<Signal>,
+}
+
+impl Table {
+    /// How many rows are put on the axis at a time: so many that a block has about four million cells.
+    fn block_rows(&self) -> usize {
+        ((1 << 22) / self.signals.len().max(1)).clamp(1 << 10, 1 << 20)
+    }
+
+    /// Seconds after the recording's first message.
+    fn seconds(&self, time_ns: i64) -> f64 {
+        (i128::from(time_ns) - i128::from(self.start_ns)) as f64 / 1e9
+    }
 }
 
 /// Writes the signals that `request` names, all of them where it names none, in the window it names; one row in `downsample`.
@@ -72,8 +82,8 @@ pub fn write(
     if !matches!(kind.as_str(), "csv" | "parquet") {
         return Err(TableError::Kind(name));
     }
-    let columns = collect(recording, request, downsample)?;
-    if columns.columns.is_empty() {
+    let table = collect(recording, request, downsample)?;
+    if table.signals.is_empty() {
         return Err(TableError::Empty(name));
     }
     let io = |source| TableError::Io {
@@ -82,8 +92,8 @@ pub fn write(
     };
     // Both kinds of failure in one type, sorted out afterwards.
     let written: Result<(), Trouble> = crate::whole::write_whole(out, |file| match kind.as_str() {
-        "csv" => Ok(csv(&columns, file)?),
-        _ => parquet(&columns, file, &name).map_err(Trouble::Table),
+        "csv" => Ok(csv(&table, file)?),
+        _ => parquet(&table, file, &name).map_err(Trouble::Table),
     });
     written.map_err(|trouble| match trouble {
         Trouble::Io(source) => io(source),
@@ -104,11 +114,7 @@ impl From<std::io::Error> for Trouble {
 }
 
 /// Reads the wanted signals and joins them by time.
-fn collect(
-    recording: &Recording,
-    request: &Request,
-    downsample: u64,
-) -> Result<Columns, ReadError> {
+fn collect(recording: &Recording, request: &Request, downsample: u64) -> Result<Table, ReadError> {
     let lists = |path: &str| {
         let topic = request.topics.is_empty()
             || request
@@ -153,21 +159,18 @@ fn collect(
     time_ns.dedup();
     let step = usize::try_from(downsample).unwrap_or(usize::MAX).max(1);
     let time_ns: Vec<i64> = time_ns.into_iter().step_by(step).collect();
-    let columns = signals
-        .into_iter()
-        .map(|s| (s.path.clone(), s.unit.clone(), on_axis(&s, &time_ns)))
-        .collect();
-    Ok(Columns {
-        t_s: time_ns.iter().map(|t| seconds(*t)).collect(),
+    Ok(Table {
         time_ns,
-        columns,
+        start_ns,
+        signals,
     })
 }
 
-/// The signal's last value at each time of the axis, where it has one there.
-fn on_axis(s: &Signal, axis: &[i64]) -> Vec<Option<f64>> {
-    let mut k = 0;
-    axis.iter()
+/// The signal's last value at each time of a stretch of the axis, where it has one there; `next` is where the signal goes on.
+fn on_axis(s: &Signal, next: &mut usize, axis: &[i64]) -> Vec<Option<f64>> {
+    let mut k = *next;
+    let values = axis
+        .iter()
         .map(|at| {
             while k < s.times_ns.len() && s.times_ns[k] < *at {
                 k += 1;
@@ -179,7 +182,9 @@ fn on_axis(s: &Signal, axis: &[i64]) -> Vec<Option<f64>> {
             }
             value.filter(|x| x.is_finite())
         })
-        .collect()
+        .collect();
+    *next = k;
+    values
 }
 
 /// Roll, pitch and yaw of every quaternion among the signals.
@@ -219,38 +224,44 @@ fn quaternions(signals: &[Signal]) -> Vec<Signal> {
     out
 }
 
-fn csv(table: &Columns, out: &mut impl Write) -> std::io::Result<()> {
+fn csv(table: &Table, out: &mut impl Write) -> std::io::Result<()> {
     let mut out = std::io::BufWriter::with_capacity(1 << 20, out);
     write!(out, "time_ns,t_s")?;
-    for (path, unit, _) in &table.columns {
-        let name = if unit.is_empty() {
-            path.clone()
+    for s in &table.signals {
+        let name = if s.unit.is_empty() {
+            s.path.clone()
         } else {
-            format!("{path} [{unit}]")
+            format!("{} [{}]", s.path, s.unit)
         };
         write!(out, ",{}", quoted(&name))?;
     }
     writeln!(out)?;
-    for (row, (time_ns, t_s)) in table.time_ns.iter().zip(&table.t_s).enumerate() {
-        write!(out, "{time_ns},{t_s}")?;
-        for (_, _, values) in &table.columns {
-            match values[row] {
-                Some(x) => write!(out, ",{x}")?,
-                None => write!(out, ",")?,
+    let mut next = vec![0; table.signals.len()];
+    for axis in table.time_ns.chunks(table.block_rows()) {
+        let columns: Vec<Vec<Option<f64>>> = (table.signals.iter().zip(&mut next))
+            .map(|(s, next)| on_axis(s, next, axis))
+            .collect();
+        for (row, time_ns) in axis.iter().enumerate() {
+            write!(out, "{time_ns},{}", table.seconds(*time_ns))?;
+            for values in &columns {
+                match values[row] {
+                    Some(x) => write!(out, ",{x}")?,
+                    None => write!(out, ",")?,
+                }
             }
+            writeln!(out)?;
         }
-        writeln!(out)?;
     }
     out.flush()
 }
 
 #[cfg(not(feature = "tables"))]
-fn parquet(_: &Columns, _: &mut impl Write, name: &str) -> Result<(), TableError> {
+fn parquet(_: &Table, _: &mut impl Write, name: &str) -> Result<(), TableError> {
     Err(TableError::Without(name.to_owned()))
 }
 
 #[cfg(feature = "tables")]
-fn parquet(table: &Columns, out: &mut (impl Write + Send), name: &str) -> Result<(), TableError> {
+fn parquet(table: &Table, out: &mut (impl Write + Send), name: &str) -> Result<(), TableError> {
     use std::sync::Arc;
 
     use parquet::basic::{Compression, Repetition, Type as Physical, ZstdLevel};
@@ -274,8 +285,8 @@ fn parquet(table: &Columns, out: &mut (impl Write + Send), name: &str) -> Result
         field("time_ns", Physical::INT64, Repetition::REQUIRED).map_err(problem)?,
         field("t_s", Physical::DOUBLE, Repetition::REQUIRED).map_err(problem)?,
     ];
-    for (path, _, _) in &table.columns {
-        fields.push(field(path, Physical::DOUBLE, Repetition::OPTIONAL).map_err(problem)?);
+    for s in &table.signals {
+        fields.push(field(&s.path, Physical::DOUBLE, Repetition::OPTIONAL).map_err(problem)?);
     }
     let schema = Arc::new(
         Type::group_type_builder("signals")
@@ -285,10 +296,10 @@ fn parquet(table: &Columns, out: &mut (impl Write + Send), name: &str) -> Result
     );
     // Units travel as metadata of the file, so that columns are named by their paths alone.
     let units = table
-        .columns
+        .signals
         .iter()
-        .filter(|(_, unit, _)| !unit.is_empty())
-        .map(|(path, unit, _)| KeyValue::new(format!("unit:{path}"), unit.clone()))
+        .filter(|s| !s.unit.is_empty())
+        .map(|s| KeyValue::new(format!("unit:{}", s.path), s.unit.clone()))
         .collect();
     let properties = WriterProperties::builder()
         .set_compression(Compression::ZSTD(ZstdLevel::default()))
@@ -297,10 +308,12 @@ fn parquet(table: &Columns, out: &mut (impl Write + Send), name: &str) -> Result
         .build();
     let mut file = SerializedFileWriter::new(out, schema, Arc::new(properties)).map_err(problem)?;
     let rows = table.time_ns.len();
-    // Row groups of a size that readers like; an empty table still has one.
-    let group_rows = 1 << 20;
+    // An empty table still has a row group.
+    let group_rows = table.block_rows();
+    let mut next = vec![0; table.signals.len()];
     for start in (0..rows.max(1)).step_by(group_rows) {
-        let range = start..(start + group_rows).min(rows);
+        let axis = &table.time_ns[start..(start + group_rows).min(rows)];
+        let t_s: Vec<f64> = axis.iter().map(|t| table.seconds(*t)).collect();
         let mut group = file.next_row_group().map_err(problem)?;
         let mut column = 0;
         while let Some(mut writer) = group.next_column().map_err(problem)? {
@@ -308,17 +321,17 @@ fn parquet(table: &Columns, out: &mut (impl Write + Send), name: &str) -> Result
                 0 => drop(
                     writer
                         .typed::<Int64Type>()
-                        .write_batch(&table.time_ns[range.clone()], None, None)
+                        .write_batch(axis, None, None)
                         .map_err(problem)?,
                 ),
                 1 => drop(
                     writer
                         .typed::<DoubleType>()
-                        .write_batch(&table.t_s[range.clone()], None, None)
+                        .write_batch(&t_s, None, None)
                         .map_err(problem)?,
                 ),
                 k => {
-                    let values = &table.columns[k - 2].2[range.clone()];
+                    let values = on_axis(&table.signals[k - 2], &mut next[k - 2], axis);
                     let present: Vec<f64> = values.iter().flatten().copied().collect();
                     let levels: Vec<i16> = values.iter().map(|v| i16::from(v.is_some())).collect();
                     writer

@@ -1,6 +1,8 @@
 //! The paper's archive, where `../shared/reference/archive` exists beside the workspace: every statistic of every
 //! `stats.json` but `envelope_growth_rate`, to a relative 1e-9, and what findings.md says of the mechanism.
 
+mod archive_names;
+
 use std::path::{Path, PathBuf};
 
 use analyze::metrics::{Context, mechanism_evidence};
@@ -58,30 +60,14 @@ fn check(m: &Metrics, stats: &serde_json::Value, run: &str) {
         m.number(name)
             .unwrap_or_else(|| panic!("{run} {name}: {:?}", m.get(name)))
     };
-    for (ours, theirs) in [
-        ("z_mean_m", "y_mean_m"),
-        ("rms_z_m", "rms_y_m"),
-        ("dz_pp_m", "p2p_y_m"),
-        ("rms_roll_deg", "rms_roll_deg"),
-        ("rms_yaw_deg", "rms_pitch_deg"),
-        ("growth_ratio", "growth_ratio_y"),
-        ("contact_loss_mean", "contact_loss_avg"),
-        ("peak_hz", "peak_freq_hz"),
-        ("h2_ratio", "H2_ratio"),
-        ("synchrony", "synchrony_index"),
-        ("roll_excess_s", "time_roll_excess_s"),
-    ] {
+    for (ours, theirs) in archive_names::NUMBERS {
         close(
             number(ours),
             stats[theirs].as_f64().unwrap(),
             &format!("{run} {ours}"),
         );
     }
-    for (ours, theirs) in [
-        ("contact_loss_mean", "contact_loss_per_carrier"),
-        ("force_mean_n", "Fy_mean_per_carrier_N"),
-        ("force_sd_n", "Fy_std_per_carrier_N"),
-    ] {
+    for (ours, theirs) in archive_names::PER_HANDLE {
         for (a, b) in m
             .get(ours)
             .unwrap()

@@ -1,5 +1,7 @@
 //! The command as a person types it: output, exit codes, files.
 
+mod archive_names;
+
 use std::path::{Path, PathBuf};
 use std::process::{Command, Output};
 
@@ -484,19 +486,7 @@ fn archive_logs_survive_being_ingested() {
                 serde_json::from_str(&std::fs::read_to_string(run.join("stats.json")).unwrap())
                     .unwrap();
             let m = &v["metrics"];
-            for (ours, theirs) in [
-                ("z_mean_m", "y_mean_m"),
-                ("rms_z_m", "rms_y_m"),
-                ("dz_pp_m", "p2p_y_m"),
-                ("rms_roll_deg", "rms_roll_deg"),
-                ("rms_yaw_deg", "rms_pitch_deg"),
-                ("growth_ratio", "growth_ratio_y"),
-                ("contact_loss_mean", "contact_loss_avg"),
-                ("peak_hz", "peak_freq_hz"),
-                ("h2_ratio", "H2_ratio"),
-                ("synchrony", "synchrony_index"),
-                ("roll_excess_s", "time_roll_excess_s"),
-            ] {
+            for (ours, theirs) in archive_names::NUMBERS {
                 let (a, b) = (
                     m[ours]["value"].as_f64().unwrap(),
                     stats[theirs].as_f64().unwrap(),
@@ -507,11 +497,7 @@ fn archive_logs_survive_being_ingested() {
                     run.display()
                 );
             }
-            for (ours, theirs) in [
-                ("contact_loss_mean", "contact_loss_per_carrier"),
-                ("force_mean_n", "Fy_mean_per_carrier_N"),
-                ("force_sd_n", "Fy_std_per_carrier_N"),
-            ] {
+            for (ours, theirs) in archive_names::PER_HANDLE {
                 for (a, b) in m[ours]["per"]
                     .as_array()
                     .unwrap()

@@ -35,12 +35,18 @@ pub enum Kind {
     BadRecord,
     /// The summary at the end of the file is missing or disagrees with the content.
     BadSummary,
+    /// The summary gives another first or last log time than the messages have.
+    SummaryTimes,
+    /// A schema or channel that is defined a second time, differently.
+    Redefined,
     /// Messages that do not fit their schema.
     Undecodable,
     /// A channel for whose encoding or schema there is no decoder.
     NoDecoder,
-    /// A channel whose schema cannot be understood.
+    /// A channel whose schema cannot be understood, so that its messages cannot be read.
     BadSchema,
+    /// A schema that is not what it should be, though the messages are read.
+    OddSchema,
     /// Messages of a channel that nothing in the file defines.
     UnknownChannel,
     /// Messages with bytes left over after the last field of the schema.
@@ -68,9 +74,12 @@ impl Kind {
             Kind::Truncated => "truncated",
             Kind::BadRecord => "bad_record",
             Kind::BadSummary => "bad_summary",
+            Kind::SummaryTimes => "summary_times",
+            Kind::Redefined => "redefined",
             Kind::Undecodable => "undecodable",
             Kind::NoDecoder => "no_decoder",
             Kind::BadSchema => "bad_schema",
+            Kind::OddSchema => "odd_schema",
             Kind::UnknownChannel => "unknown_channel",
             Kind::TrailingBytes => "trailing_bytes",
             Kind::LongSequence => "long_sequence",
@@ -89,6 +98,8 @@ impl Kind {
                 | Kind::Truncated
                 | Kind::BadRecord
                 | Kind::BadSummary
+                | Kind::Redefined
+                | Kind::BadSchema
                 | Kind::Undecodable
                 | Kind::UnknownChannel
                 | Kind::TimeOutOfRange

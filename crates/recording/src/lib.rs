@@ -13,6 +13,7 @@ pub mod read;
 pub mod schema;
 pub mod signal;
 pub mod topics;
+pub mod whole;
 pub mod write;
 
 pub use finding::{Finding, Kind};

@@ -421,20 +421,18 @@ fn what_is_wrong_is_named() {
         (
             vec![channel(1, "json"), message(2, 5, b"1"), message(1, 6, b"1")],
             1,
-            vec![
-                "unknown_channel skipped 1 messages: messages of channel 2, which nothing defines",
-            ],
+            vec!["unknown_channel skipped 1 message: messages of channel 2, which nothing defines"],
         ),
         (
             vec![
                 channel(1, "json"),
                 message(1, 5, b"{\"x\": "),
                 message(1, 6, b"1"),
-                message(1, 7, b"NaN"),
+                message(1, 7, b"nan"),
             ],
             1,
             vec![
-                "undecodable /a: 2 messages could not be decoded; the first: JSON message of 6 bytes: EOF while parsing a value at line 1 column 6",
+                "undecodable /a: 2 messages could not be decoded; the first, at 0.000 s: JSON message of 6 bytes: EOF while parsing a value at line 1 column 6",
             ],
         ),
         (
@@ -576,4 +574,196 @@ fn what_is_no_recording_is_refused_in_a_sentence() {
         .expect_err("refused")
         .to_string();
     assert_eq!(error, ".: cannot be read: it is a folder");
+}
+
+/// A sound file but for its summary, which holds the records given.
+fn summarised(data: &[Vec<u8>], summary: &[Vec<u8>]) -> Vec<u8> {
+    let mut bytes = b"\x89MCAP0\r\n".to_vec();
+    bytes.extend(data.concat());
+    bytes.extend(record(0x0f, &[0; 4]));
+    let start = bytes.len() as u64;
+    let mut closing = summary.concat();
+    closing.extend([0x02, 20, 0, 0, 0, 0, 0, 0, 0]);
+    closing.extend(start.to_le_bytes());
+    closing.extend([0; 8]);
+    let crc = crc32fast::hash(&closing);
+    bytes.extend(closing);
+    bytes.extend(crc.to_le_bytes());
+    bytes.extend(b"\x89MCAP0\r\n");
+    bytes
+}
+
+fn statistics(chunks: u32, times: [u64; 2], per_channel: &[(u16, u64)]) -> Vec<u8> {
+    let messages: u64 = per_channel.iter().map(|(_, count)| count).sum();
+    let mut body = messages.to_le_bytes().to_vec();
+    body.extend([0, 0]);
+    body.extend((per_channel.len() as u32).to_le_bytes());
+    body.extend([0; 8]);
+    body.extend(chunks.to_le_bytes());
+    body.extend(times.iter().flat_map(|time| time.to_le_bytes()));
+    body.extend((10 * per_channel.len() as u32).to_le_bytes());
+    for (id, count) in per_channel {
+        body.extend(id.to_le_bytes());
+        body.extend(count.to_le_bytes());
+    }
+    record(0x0b, &body)
+}
+
+/// A JSON channel of a topic of its own.
+fn topic(id: u16, name: &str) -> Vec<u8> {
+    let mut body = id.to_le_bytes().to_vec();
+    body.extend([0, 0]);
+    body.extend(text(name));
+    body.extend(text("json"));
+    body.extend([0; 4]);
+    record(0x04, &body)
+}
+
+/// What the summary says is believed only as long as the data do not contradict it.
+#[test]
+fn a_summary_that_lies_is_found_out() {
+    let inner = [
+        topic(1, "/a"),
+        topic(2, "/b"),
+        message(1, 5, b"1"),
+        message(2, 6, b"2"),
+        message(1, 9, b"3"),
+    ]
+    .concat();
+    let data = [chunk(
+        "",
+        inner.len() as u64,
+        crc32fast::hash(&inner),
+        &inner,
+    )];
+    let honest = [topic(1, "/a"), topic(2, "/b")].concat();
+    for (summary, said) in [
+        (
+            vec![honest.clone(), statistics(1, [5, 9], &[(1, 2), (2, 1)])],
+            vec![],
+        ),
+        (
+            vec![
+                honest.clone(),
+                statistics(1, [0, 1 << 40], &[(1, 2), (2, 1)]),
+            ],
+            vec![
+                "summary_times the summary says that log times go from -0.000 s to 1099.512 s after the first, they go from 0 s to 0.000 s",
+            ],
+        ),
+        (
+            vec![honest.clone(), statistics(1, [5, 9], &[(1, 1), (2, 2)])],
+            vec![
+                "bad_summary /a: the summary counts 1 messages of channel 1, 2 were found",
+                "bad_summary /b: the summary counts 2 messages of channel 2, 1 were found",
+            ],
+        ),
+        (
+            vec![topic(1, "/a"), statistics(1, [5, 9], &[(1, 3)])],
+            vec![
+                "bad_summary the summary has other schemas or channels than the data, in 1 places",
+            ],
+        ),
+        (
+            vec![
+                topic(1, "/b"),
+                topic(2, "/a"),
+                statistics(1, [5, 9], &[(1, 2), (2, 1)]),
+            ],
+            vec![
+                "bad_summary the summary has other schemas or channels than the data, in 2 places",
+                "redefined /a: its channel 1 of schema 0 is defined again and differently, as /b of schema 0: the first definition counts, and messages after the second may be wrong",
+                "redefined /b: its channel 2 of schema 0 is defined again and differently, as /a of schema 0: the first definition counts, and messages after the second may be wrong",
+            ],
+        ),
+    ] {
+        let bytes = summarised(&data, &summary);
+        let recording = Recording::from_bytes(bytes, &options()).expect("opens");
+        recording.signals(&|_| true).expect("reads");
+        assert_eq!(recording.contradicts_its_summary(), !said.is_empty());
+        let recording = recording.searched();
+        let (signals, findings) = recording.signals(&|_| true).expect("reads");
+        let found: Vec<_> = signals
+            .iter()
+            .map(|signal| (signal.path.as_str(), signal.values.as_slice()))
+            .collect();
+        assert_eq!(found, [("/a", &[1.0, 3.0][..]), ("/b", &[2.0][..])]);
+        let info = recording.info();
+        assert_eq!((info.start_ns, info.end_ns, info.messages), (5, 9, 3));
+        assert!(!recording.contradicts_its_summary());
+        let lines: Vec<String> = findings
+            .iter()
+            .filter(|finding| summary.len() > 2 || finding.kind != Kind::Redefined)
+            .map(|finding| format!("{} {finding}", finding.kind))
+            .collect();
+        assert_eq!(lines, said);
+    }
+}
+
+#[test]
+fn a_second_definition_is_named_with_its_topic() {
+    let (_, lines) = lines(file(&[
+        topic(1, "/a"),
+        message(1, 5, b"1"),
+        topic(1, "/b"),
+        message(1, 6, b"2"),
+    ]));
+    assert_eq!(
+        lines,
+        [
+            "redefined /a: its channel 1 of schema 0 is defined again and differently, as /b of schema 0: the first definition counts, and messages after the second may be wrong"
+        ]
+    );
+}
+
+#[test]
+fn what_no_chunk_should_hold_is_said() {
+    let inner = [
+        record(0x33, b"?"),
+        message(1, 5, b"1"),
+        vec![0; 1000],
+        record(0x06, &[7; 50]),
+        record(0x90, b"private"),
+        message(1, 6, b"2"),
+    ]
+    .concat();
+    let chunk = chunk("", inner.len() as u64, crc32fast::hash(&inner), &inner);
+    assert_eq!(
+        lines(file(&[channel(1, "json"), chunk])),
+        (
+            2,
+            vec![
+                "bad_record records of the kind 0x06, which no chunk should hold, were stepped over".to_owned(),
+                "bad_record records of the kind 0x33, which no chunk should hold, were stepped over".to_owned(),
+                "bad_record zero bytes in a chunk, where a record should begin, were stepped over".to_owned(),
+            ]
+        )
+    );
+}
+
+/// The mcap crate (0.26) and Foxglove's SDK leave what chunks without a checksum hold out of the data's checksum too.
+#[test]
+fn a_checksum_over_all_but_the_chunks_is_taken() {
+    let inner = message(1, 5, b"1");
+    for (skipped, expected) in [
+        (inner.len(), vec![]),
+        (
+            inner.len() - 1,
+            vec!["bad_crc the data do not match their checksum: numbers in messages outside chunks may be wrong".to_owned()],
+        ),
+    ] {
+        let chunk = chunk("", inner.len() as u64, 0, &inner);
+        let mut bytes = [
+            b"\x89MCAP0\r\n".to_vec(),
+            record(1, &[0; 8]),
+            channel(1, "json"),
+            chunk,
+        ]
+        .concat();
+        let crc = crc32fast::hash(&bytes[..bytes.len() - skipped]);
+        bytes.extend(record(0x0f, &crc.to_le_bytes()));
+        bytes.extend(record(0x02, &[0; 20]));
+        bytes.extend(b"\x89MCAP0\r\n");
+        assert_eq!(lines(bytes), (1, expected));
+    }
 }

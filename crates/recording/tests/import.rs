@@ -242,6 +242,38 @@ fn movella_dot_wraps_and_turns_free_acceleration() {
 }
 
 #[test]
+fn a_device_without_a_date_beside_one_with_is_told() {
+    let folder = folder();
+    let dot =
+        "PacketCounter,SampleTimeFine,Acc_X,Acc_Y,Acc_Z,Gyr_X,Gyr_Y,Gyr_Z\n1,5,0,0,9.8,0,0,0\n";
+    let dot = file(folder.path(), "dot.csv", dot);
+    let acceleration = "Time (s),Acceleration x (m/s^2),Acceleration y (m/s^2),Acceleration z (m/s^2)\n0.5,0,0,9.8\n";
+    let start = "event,experiment time,system time\nSTART,0.0,1700000000.5\n";
+    let phone = zipped(
+        folder.path(),
+        "phone.zip",
+        &[
+            ("Accelerometer.csv", acceleration.to_owned()),
+            ("meta/time.csv", start.to_owned()),
+        ],
+    );
+    let told = |paths: &[PathBuf]| {
+        let got = ingest(folder.path(), paths, None).expect("ingests");
+        let notes = got.ingested.notes.into_iter();
+        notes
+            .filter(|note| note.contains("1970"))
+            .collect::<Vec<_>>()
+    };
+    assert_eq!(
+        told(&[dot.clone(), phone]),
+        [
+            "dot: its times count from the device's start, not from 1970 as those of others here: the clocks are not on each other"
+        ]
+    );
+    assert!(told(&[dot]).is_empty());
+}
+
+#[test]
 fn several_devices_by_layout() {
     let folder = folder();
     let text = "Time (s),Gyroscope X (deg/s),Gyroscope Y (deg/s),Gyroscope Z (deg/s),Accelerometer X (g),Accelerometer Y (g),Accelerometer Z (g)\n\

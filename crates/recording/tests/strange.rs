@@ -213,3 +213,47 @@ fn wide_text_of_either_width() {
         );
     }
 }
+
+/// Words that Python and others write though JSON does not have them are numbers that are not finite; in texts they are text.
+#[test]
+fn json_with_bare_words() {
+    let found = recording(&WriterOptions::default(), |writer| {
+        let channel = RawChannel {
+            topic: "/j",
+            message_encoding: "json",
+            schema_name: "",
+            schema_encoding: "",
+            schema_data: b"",
+            metadata: &BTreeMap::new(),
+        };
+        let channel = writer.raw_channel(&channel).expect("opens");
+        for (t_ns, text) in [
+            r#"{"x": 1, "y": [1, 2]}"#,
+            r#"{"x": NaN, "y": [Infinity, -Infinity], "s": "a \"NaN\" \\"}"#,
+            r#"{"x": 3, "y": [5, 6], "s": "NaN"}"#,
+        ]
+        .iter()
+        .enumerate()
+        {
+            let message = text.as_bytes();
+            writer
+                .message(channel, t_ns as i64, message)
+                .expect("writes");
+        }
+    });
+    let (signals, _) = found.signals(&|_| true).expect("reads");
+    let paths: Vec<&str> = signals.iter().map(|signal| signal.path.as_str()).collect();
+    assert_eq!(paths, ["/j.x", "/j.y[0]", "/j.y[1]"]);
+    assert!(signals[0].values[1].is_nan());
+    assert_eq!(signals[0].values[2], 3.0);
+    assert_eq!(signals[1].values, [1.0, f64::INFINITY, 5.0]);
+    assert_eq!(signals[2].values, [2.0, f64::NEG_INFINITY, 6.0]);
+    assert_eq!(
+        lines(&found),
+        [
+            "nan /j: 1 values of x are NaN or infinite, first at 0.000 s",
+            "nan /j: 1 values of y[0] are NaN or infinite, first at 0.000 s",
+            "nan /j: 1 values of y[1] are NaN or infinite, first at 0.000 s",
+        ]
+    );
+}

@@ -3,13 +3,13 @@
 use std::io::{Read, Write};
 use std::path::Path;
 
-use analyze::examine::{Analysis, Request, examine};
+use analyze::examine::{Analysis, Quality, Request, examine};
 use analyze::report;
 use analyze::roles::RolesFile;
 use anyhow::{Context, bail};
 use recording::read::{ReadOptions, Recording};
 
-use super::{AnalyzeArgs, Done, Format, annotate, complain, print};
+use super::{AnalyzeArgs, Done, Format, Limits, annotate, complain, print};
 
 pub(super) fn run(args: &AnalyzeArgs) -> anyhow::Result<Done> {
     let request = request(args)?;
@@ -87,8 +87,13 @@ fn roles(path: &Path) -> anyhow::Result<RolesFile> {
 }
 
 /// Opens a recording, or what comes through standard input.
-pub(super) fn open(path: &Path) -> anyhow::Result<Recording> {
-    let options = ReadOptions::default();
+fn open(path: &Path, limits: &Limits) -> anyhow::Result<Recording> {
+    let options = ReadOptions {
+        max_chunk_bytes: limits.max_chunk_bytes,
+        max_message_bytes: limits.max_message_bytes,
+        max_items: limits.max_items,
+        ..ReadOptions::default()
+    };
     if path.as_os_str() == "-" {
         let mut bytes = Vec::new();
         std::io::stdin()
@@ -113,13 +118,17 @@ pub(super) fn open(path: &Path) -> anyhow::Result<Recording> {
 }
 
 fn one(path: &Path, args: &AnalyzeArgs, request: &Request) -> anyhow::Result<Analysis> {
-    let recording = open(path)?;
+    let mut recording = open(path, &args.limits)?;
     let name = if path.as_os_str() == "-" {
         "standard input".to_owned()
     } else {
         path.display().to_string()
     };
-    let analysis = examine(&name, &recording, request)?;
+    let mut analysis = examine(&name, &recording, request)?;
+    if recording.contradicts_its_summary() {
+        recording = recording.searched();
+        analysis = examine(&name, &recording, request)?;
+    }
     if analysis.is_empty() {
         bail!("{}", nothing(&analysis, request));
     }
@@ -209,35 +218,48 @@ fn nothing(a: &Analysis, request: &Request) -> String {
             topics.join(", ")
         );
     }
+    let why: Vec<String> = (a.quality.iter())
+        .filter(|q| q.loss || q.kind == "no_decoder")
+        .take(20)
+        .map(told)
+        .collect();
+    let why = if why.is_empty() {
+        String::new()
+    } else {
+        format!("; {}", why.join("; "))
+    };
     if a.messages == 0 {
-        return format!("{}: holds no messages", a.file);
+        return format!("{}: holds no messages{why}", a.file);
     }
     let found: Vec<String> = a
         .topics
         .iter()
         .take(20)
-        .map(|t| format!("{} ({}, {})", t.name, t.schema, t.encoding))
+        .map(|t| {
+            let schema = match t.schema.as_str() {
+                "" => "no schema",
+                schema => schema,
+            };
+            format!("{} ({schema}, {})", t.name, t.encoding)
+        })
         .collect();
     format!(
-        "{}: holds no numeric signal that can be used; found {}",
+        "{}: holds no numeric signal that can be used; found {}{why}",
         a.file,
         found.join(", ")
     )
 }
 
+/// A remark with its topic.
+fn told(q: &Quality) -> String {
+    match q.topic.as_str() {
+        "" => q.text.clone(),
+        topic => format!("{topic}: {}", q.text),
+    }
+}
+
 fn loss(a: &Analysis) -> String {
-    let told: Vec<String> = a
-        .quality
-        .iter()
-        .filter(|q| q.loss)
-        .map(|q| {
-            if q.topic.is_empty() {
-                q.text.clone()
-            } else {
-                format!("{}: {}", q.topic, q.text)
-            }
-        })
-        .collect();
+    let told: Vec<String> = a.quality.iter().filter(|q| q.loss).map(told).collect();
     let lost = match a.skipped_messages {
         0 => "no whole message is known to be lost".to_owned(),
         1 => "1 message is lost".to_owned(),

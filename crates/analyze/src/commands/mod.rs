@@ -10,6 +10,7 @@ use std::path::PathBuf;
 use std::process::ExitCode;
 
 use clap::{Args, Parser, Subcommand, ValueEnum};
+use recording::read::ReadOptions;
 
 const EXAMPLES: &str = "\
 Examples:
@@ -96,6 +97,23 @@ struct AnalyzeArgs {
     /// All sensors were stamped by one clock: leave the carriers' clocks as they are
     #[arg(long)]
     one_clock: bool,
+    #[command(flatten)]
+    limits: Limits,
+}
+
+/// What the reader takes; what is beyond is left out and said.
+#[derive(Args)]
+#[command(next_help_heading = "Limits of the reader")]
+struct Limits {
+    /// Leave out chunks that claim more bytes than this, unpacked
+    #[arg(long, value_name = "BYTES", default_value_t = ReadOptions::default().max_chunk_bytes)]
+    max_chunk_bytes: u64,
+    /// Leave out longer messages in large chunks
+    #[arg(long, value_name = "BYTES", default_value_t = ReadOptions::default().max_message_bytes)]
+    max_message_bytes: u64,
+    /// List the items of a sequence that has at most so many
+    #[arg(long, value_name = "N", default_value_t = ReadOptions::default().max_items)]
+    max_items: usize,
 }
 
 impl AnalyzeArgs {

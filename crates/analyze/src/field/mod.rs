@@ -7,6 +7,7 @@ mod carriers;
 mod judge;
 mod place;
 mod sound;
+mod thin;
 
 use std::collections::BTreeMap;
 
@@ -88,9 +89,22 @@ impl Field {
         if topics.is_empty() || (imus.clone().next().is_none() && !truth) {
             return Ok(field);
         }
+        let factors = match thin::factors(recording, roles) {
+            Ok(factors) => factors,
+            Err(samples) => {
+                field.quality.push(remark(
+                    "",
+                    "too_long",
+                    format!("motion is not estimated from {samples} inertial samples, which would take too much memory: name fewer sensors in a roles file"),
+                ));
+                return Ok(field);
+            }
+        };
+        let thinned = |topic: &str| factors.get(topic).is_some_and(|factor| *factor > 1);
         let wanted = |path: &str| {
             let of = |t: &&str| path.strip_prefix(*t).and_then(|p| p.strip_prefix('.'));
-            topics.iter().find_map(of).is_some_and(|field| {
+            let mut whole = topics.iter().filter(|t| !thinned(t));
+            whole.find_map(of).is_some_and(|field| {
                 GYRO.contains(&field)
                     || ACCEL.contains(&field)
                     || field == GYRO_MARK
@@ -98,7 +112,15 @@ impl Field {
                     || field == "number"
             }) || (truth && path.starts_with(judge::STEP_TOPIC))
         };
-        let (signals, _) = recording.signals(&wanted)?;
+        let (mut signals, _) = recording.signals(&wanted)?;
+        signals.extend(thin::read(recording, &factors)?);
+        for (topic, factor) in factors.iter().filter(|(_, factor)| **factor > 1) {
+            field.quality.push(remark(
+                topic,
+                "thinned",
+                format!("motion is estimated from means over {factor} samples each, so that memory stays small"),
+            ));
+        }
         let start_ns = recording.info().start_ns;
         let columns = Columns { signals, start_ns };
         let places = place::places(recording);

@@ -139,6 +139,7 @@ pub fn ingest(
             metadata.insert(format!("notes.{}", log.name), log.notes.join("; "));
         }
     }
+    notes.extend(undated(&logs));
     writer.metadata("rath", &metadata)?;
     let topics = imu::write(&logs, writer)?;
     Ok(Ingested { topics, notes })
@@ -282,4 +283,25 @@ fn open(path: &Path) -> Result<Files, ImportError> {
 fn is_text(name: &str) -> bool {
     let name = name.to_lowercase();
     name.ends_with(".csv") || name.ends_with(".txt")
+}
+
+/// Devices that count from their own start cannot be put beside those that know the date: a note for each, where both are there.
+fn undated(logs: &[imu::Log]) -> Vec<String> {
+    // Nobody dates a log of this kind before 2001.
+    let dated = |log: &&imu::Log| {
+        let first = log.samples.first();
+        first.is_some_and(|sample| sample.t_ns >= 1_000_000_000_000_000_000)
+    };
+    if !logs.iter().any(|log| dated(&log)) {
+        return Vec::new();
+    }
+    let undated = logs.iter().filter(|log| !dated(log));
+    undated
+        .map(|log| {
+            format!(
+                "{}: its times count from the device's start, not from 1970 as those of others here: the clocks are not on each other",
+                log.name
+            )
+        })
+        .collect()
 }

@@ -1,9 +1,9 @@
 //! One block of a recording, a chunk or a stretch of loose records, turned into rows of numbers; the work of one thread.
 
-use std::{ops::Range, sync::Arc};
+use std::{collections::BTreeMap, ops::Range, sync::Arc};
 
 use super::{
-    ReadError, ReadOptions, Recording, Tally,
+    ReadOptions, Recording, Tally,
     chunk::{self, Loss, Unpacker, WHOLE_BYTES},
     container::{Block, Definitions, Fields, op},
     decode::{self, Decoder, NoDecoder, Place, SchemaRef},
@@ -55,8 +55,23 @@ pub(super) struct BlockResult {
     pub troubles: Vec<Trouble>,
     /// Messages seen, usable or not.
     pub messages: u64,
+    /// The same by index of the channel, where it is known.
+    pub per_channel: Vec<(usize, u64)>,
+    /// The earliest and the latest log time, ns.
+    pub times: Option<(i64, i64)>,
+    /// Schemas and channels that are defined here otherwise than they are used.
+    pub contradictions: u64,
     /// The chunk is too large to be decoded in one go: the caller reads it in pieces.
     pub large: bool,
+}
+
+impl BlockResult {
+    #[inline]
+    fn see(&mut self, time: i64) {
+        let (first, last) = self.times.get_or_insert((time, time));
+        *first = time.min(*first);
+        *last = time.max(*last);
+    }
 }
 
 enum State {
@@ -76,6 +91,8 @@ struct ChannelState<'a> {
     failed: Option<(u64, i64, String)>,
     closed: u64,
     out_of_range: u64,
+    /// Messages of the block.
+    seen: u64,
 }
 
 /// The memory of one thread.
@@ -86,6 +103,10 @@ pub(super) struct Worker<'a> {
     /// By channel index.
     channels: Vec<Option<Box<ChannelState<'a>>>>,
     touched: Vec<usize>,
+    /// Messages of channels that nothing defines: how many, and the first one's log time.
+    unknown: BTreeMap<u16, (u64, u64)>,
+    /// Message records too short for their header.
+    short: u64,
 }
 
 impl<'a> Worker<'a> {
@@ -98,6 +119,8 @@ impl<'a> Worker<'a> {
             unpacker: Unpacker::new(),
             channels,
             touched: Vec::new(),
+            unknown: BTreeMap::new(),
+            short: 0,
         }
     }
 
@@ -141,13 +164,9 @@ impl<'a> Worker<'a> {
     }
 
     /// Decodes a large chunk in pieces and gives each piece's result away at once.
-    pub fn large(
-        &mut self,
-        block: &Block,
-        give: &mut dyn FnMut(BlockResult),
-    ) -> Result<(), ReadError> {
+    pub fn large(&mut self, block: &Block, give: &mut dyn FnMut(BlockResult)) {
         let Block::Chunk { body, indexed } = block else {
-            return Ok(());
+            return;
         };
         let recording = self.recording;
         let loss = match chunk::open(&recording.data[body.clone()], &recording.options) {
@@ -158,8 +177,7 @@ impl<'a> Worker<'a> {
                     self.records(records, &mut result);
                     self.harvest(&mut result);
                     give(result);
-                    Ok(())
-                })?;
+                });
                 match pieces {
                     Ok(0) => None,
                     Ok(count) => {
@@ -193,17 +211,25 @@ impl<'a> Worker<'a> {
                 ..BlockResult::default()
             });
         }
-        Ok(())
     }
 
     /// Reads records that stand one after the other.
     fn records(&mut self, block: &[u8], result: &mut BlockResult) {
-        let mut bytes = block;
-        while let Some((opcode, body, rest)) = split_record(bytes) {
-            bytes = rest;
-            if opcode == op::MESSAGE {
-                result.messages += 1;
-                self.message(body, block.len() - rest.len(), result);
+        let mut records = Records::new(block);
+        let mut misplaced: BTreeMap<u8, u64> = BTreeMap::new();
+        while let Some((opcode, body)) = records.next() {
+            match opcode {
+                op::MESSAGE => {
+                    result.messages += 1;
+                    self.message(body, block.len() - records.rest.len(), result);
+                }
+                op::SCHEMA | op::CHANNEL => {
+                    let known = self.recording.definitions.knows(opcode, body);
+                    result.contradictions += u64::from(!known);
+                }
+                // Private to whoever wrote them.
+                0x80.. => {}
+                _ => *misplaced.entry(opcode).or_default() += 1,
             }
         }
         for &index in &self.touched {
@@ -211,17 +237,46 @@ impl<'a> Worker<'a> {
                 channel.decode(block);
             }
         }
-        if !bytes.is_empty() {
+        let mut bad = |count, text, lost| {
             result.troubles.push(Trouble {
                 channel: None,
                 kind: Kind::BadRecord,
-                count: 1,
+                count,
                 time: None,
-                text: format!(
-                    "{} bytes at the end of a chunk are no record and were left out",
-                    bytes.len()
-                ),
-                lost: 0,
+                text,
+                lost,
+            })
+        };
+        for (opcode, count) in misplaced {
+            let text = format!(
+                "records of the kind 0x{opcode:02x}, which no chunk should hold, were stepped over"
+            );
+            bad(count, text, 0);
+        }
+        if records.zeros {
+            let text = "zero bytes in a chunk, where a record should begin, were stepped over";
+            bad(1, text.to_owned(), 0);
+        }
+        if !records.rest.is_empty() {
+            let text = format!(
+                "{} bytes at the end of a chunk are no record and were left out",
+                records.rest.len()
+            );
+            bad(1, text, 0);
+        }
+        let short = std::mem::take(&mut self.short);
+        if short > 0 {
+            let text = "message records are too short for their header".to_owned();
+            bad(short, text, short);
+        }
+        for (id, (count, time)) in std::mem::take(&mut self.unknown) {
+            result.troubles.push(Trouble {
+                channel: None,
+                kind: Kind::UnknownChannel,
+                count,
+                time: i64::try_from(time).ok(),
+                text: format!("messages of channel {id}, which nothing defines"),
+                lost: count,
             });
         }
     }
@@ -230,27 +285,13 @@ impl<'a> Worker<'a> {
     #[inline]
     fn message(&mut self, body: &[u8], end: usize, result: &mut BlockResult) {
         let Some((header, data)) = body.split_first_chunk::<22>() else {
-            result.troubles.push(Trouble {
-                channel: None,
-                kind: Kind::BadRecord,
-                count: 1,
-                time: None,
-                text: "a message record is too short for its header".to_owned(),
-                lost: 1,
-            });
+            self.short += 1;
             return;
         };
         let id = u16::from_le_bytes([header[0], header[1]]);
         let time = u64::from_le_bytes(std::array::from_fn(|i| header[6 + i]));
         let Some(index) = self.recording.by_id[usize::from(id)] else {
-            result.troubles.push(Trouble {
-                channel: None,
-                kind: Kind::UnknownChannel,
-                count: 1,
-                time: i64::try_from(time).ok(),
-                text: format!("messages of channel {id}, which nothing defines"),
-                lost: 1,
-            });
+            self.unknown.entry(id).or_insert((0, time)).0 += 1;
             return;
         };
         let (recording, select) = (self.recording, self.select);
@@ -259,10 +300,12 @@ impl<'a> Worker<'a> {
         if !channel.begun() {
             self.touched.push(index);
         }
+        channel.seen += 1;
         let Ok(time) = i64::try_from(time) else {
             channel.out_of_range += 1;
             return;
         };
+        result.see(time);
         let bytes = end - data.len()..end;
         channel.waiting.push(Place { bytes, time });
     }
@@ -312,12 +355,13 @@ impl<'a> ChannelState<'a> {
             failed: None,
             closed: 0,
             out_of_range: 0,
+            seen: 0,
         }
     }
 
     /// Whether the current block has given this channel anything yet.
     fn begun(&self) -> bool {
-        !self.waiting.is_empty() || self.closed > 0 || self.out_of_range > 0
+        self.seen > 0
     }
 
     /// Decodes the messages that wait, which lie in `block`.
@@ -358,8 +402,9 @@ impl<'a> ChannelState<'a> {
     }
 
     fn harvest(&mut self, result: &mut BlockResult) {
+        let troubles = &mut result.troubles;
         let mut trouble = |kind, count, time, text, lost| {
-            result.troubles.push(Trouble {
+            troubles.push(Trouble {
                 channel: Some(self.index),
                 kind,
                 count,
@@ -368,12 +413,17 @@ impl<'a> ChannelState<'a> {
                 lost,
             });
         };
+        result
+            .per_channel
+            .push((self.index, std::mem::take(&mut self.seen)));
         if let Some((count, time, text)) = self.failed.take() {
             trouble(Kind::Undecodable, count, Some(time), text, count);
         }
         let closed = std::mem::take(&mut self.closed);
         if let (State::Closed(kind, text), 1..) = (&self.state, closed) {
-            trouble(*kind, closed, None, text.clone(), closed);
+            // A channel of a kind that is not read is left out, not lost.
+            let lost = if kind.is_loss() { closed } else { 0 };
+            trouble(*kind, closed, None, text.clone(), lost);
         }
         let out = std::mem::take(&mut self.out_of_range);
         if out > 0 {
@@ -441,13 +491,43 @@ fn not_finite(values: &[f64], rows: &[u32]) -> Option<(u64, u32)> {
     Some((count, rows.get(first).copied().unwrap_or(first as u32)))
 }
 
-/// The first record: opcode, body, rest. `None` at the end, or where no record fits.
-#[inline]
-pub(super) fn split_record(bytes: &[u8]) -> Option<(u8, &[u8], &[u8])> {
-    let (header, rest) = bytes.split_first_chunk::<9>()?;
-    let length = u64::from_le_bytes(std::array::from_fn(|i| header[1 + i]));
-    let (body, rest) = rest.split_at_checked(usize::try_from(length).ok()?)?;
-    Some((header[0], body, rest))
+/// Records one after the other, as opcode and body, up to where none fits. No record begins with a zero: such bytes are stepped over.
+pub(super) struct Records<'a> {
+    /// What is left.
+    pub rest: &'a [u8],
+    /// There were zeros where a record should begin.
+    pub zeros: bool,
+}
+
+impl<'a> Records<'a> {
+    pub fn new(rest: &'a [u8]) -> Self {
+        Records { rest, zeros: false }
+    }
+}
+
+impl<'a> Iterator for Records<'a> {
+    type Item = (u8, &'a [u8]);
+
+    #[inline]
+    fn next(&mut self) -> Option<Self::Item> {
+        if self.rest.first() == Some(&0) {
+            self.zeros = true;
+            self.rest = &self.rest[leading_zeros(self.rest)..];
+        }
+        let (header, rest) = self.rest.split_first_chunk::<9>()?;
+        let length = u64::from_le_bytes(std::array::from_fn(|i| header[1 + i]));
+        let (body, rest) = rest.split_at_checked(usize::try_from(length).ok()?)?;
+        self.rest = rest;
+        Some((header[0], body))
+    }
+}
+
+/// How many bytes at the beginning are zero.
+pub(super) fn leading_zeros(bytes: &[u8]) -> usize {
+    let (words, _) = bytes.as_chunks::<16>();
+    let whole = 16 * words.iter().take_while(|word| **word == [0; 16]).count();
+    let rest = bytes[whole..].iter().take_while(|byte| **byte == 0);
+    whole + rest.count()
 }
 
 fn lost_chunk(
@@ -478,9 +558,8 @@ fn lost_chunk(
 /// Looks through all blocks for definitions, counts and times, where there is no summary to say so.
 pub(super) fn scan(data: &[u8], blocks: &[Block], options: &ReadOptions) -> (Definitions, Tally) {
     let (mut definitions, mut tally) = (Definitions::default(), Tally::default());
-    let mut look = |mut bytes: &[u8]| {
-        while let Some((opcode, body, rest)) = split_record(bytes) {
-            bytes = rest;
+    let mut look = |bytes: &[u8]| {
+        for (opcode, body) in Records::new(bytes) {
             if opcode != op::MESSAGE {
                 definitions.define(opcode, body);
                 continue;
@@ -508,10 +587,7 @@ pub(super) fn scan(data: &[u8], blocks: &[Block], options: &ReadOptions) -> (Def
                 }
                 Ok(header) => {
                     // Damage is reported when the chunk is read for its messages.
-                    let _ = chunk::pieces(&header, options, &mut |records| {
-                        look(records);
-                        Ok(())
-                    });
+                    let _ = chunk::pieces(&header, options, &mut look);
                 }
                 Err(_) => {}
             },

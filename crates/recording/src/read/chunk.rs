@@ -5,6 +5,7 @@ use std::io::{self, Read};
 
 use super::{
     ReadOptions,
+    block::leading_zeros,
     container::{ChunkHeader, Fields, chunk_header},
 };
 use crate::finding::Kind;
@@ -172,51 +173,43 @@ pub(super) fn open<'a>(body: &'a [u8], options: &ReadOptions) -> Result<ChunkHea
 pub(super) fn pieces(
     header: &ChunkHeader<'_>,
     options: &ReadOptions,
-    each: &mut dyn FnMut(&[u8]) -> Result<(), super::ReadError>,
-) -> Result<Result<u64, Loss>, super::ReadError> {
+    each: &mut dyn FnMut(&[u8]),
+) -> Result<u64, Loss> {
     // First pass: nothing but the checksum, so that no number of a damaged chunk gets out.
     let name = String::from_utf8_lossy(header.compression);
-    let first = (|| {
-        let mut stream = stream(header.compression, header.records)?;
-        let mut crc = crc32fast::Hasher::new();
-        let mut buffer = vec![0; PIECE_BYTES];
-        let mut length = 0u64;
-        loop {
-            let count = stream
-                .read(&mut buffer)
-                .map_err(|error| bad(&name, &error))?;
-            if count == 0 {
-                break;
-            }
-            length += count as u64;
-            if length > header.uncompressed {
-                return Err((
-                    Kind::BadChunk,
-                    format!(
-                        "holds more than the {} bytes that its header says",
-                        header.uncompressed
-                    ),
-                ));
-            }
+    let mut packed = stream(header.compression, header.records)?;
+    let mut crc = crc32fast::Hasher::new();
+    let mut buffer = vec![0; PIECE_BYTES];
+    let mut length = 0u64;
+    loop {
+        let count = packed
+            .read(&mut buffer)
+            .map_err(|error| bad(&name, &error))?;
+        if count == 0 {
+            break;
+        }
+        length += count as u64;
+        if length > header.uncompressed {
+            return Err((
+                Kind::BadChunk,
+                format!(
+                    "holds more than the {} bytes that its header says",
+                    header.uncompressed
+                ),
+            ));
+        }
+        if header.crc != 0 {
             crc.update(&buffer[..count]);
         }
-        check(header, length, || crc.finalize())
-    })();
-    if let Err(loss) = first {
-        return Ok(Err(loss));
     }
+    check(header, length, || crc.finalize())?;
 
-    let mut stream = match stream(header.compression, header.records) {
-        Ok(stream) => stream,
-        Err(loss) => return Ok(Err(loss)),
-    };
-    let (mut buffer, mut filled, mut skip, mut too_long) =
-        (vec![0u8; PIECE_BYTES], 0usize, 0u64, 0u64);
+    let mut packed = stream(header.compression, header.records)?;
+    let (mut filled, mut skip, mut too_long) = (0usize, 0u64, 0u64);
     loop {
-        let count = match stream.read(&mut buffer[filled..]) {
-            Ok(count) => count,
-            Err(error) => return Ok(Err(bad(&name, &error))),
-        };
+        let count = packed
+            .read(&mut buffer[filled..])
+            .map_err(|error| bad(&name, &error))?;
         filled += count;
         if skip > 0 {
             // Inside a record that is stepped over.
@@ -227,7 +220,7 @@ pub(super) fn pieces(
         }
         let whole = whole_records(&buffer[..filled]);
         if whole > 0 && (filled == buffer.len() || count == 0) {
-            each(&buffer[..whole])?;
+            each(&buffer[..whole]);
             buffer.copy_within(whole..filled, 0);
             filled -= whole;
         }
@@ -248,20 +241,20 @@ pub(super) fn pieces(
     }
     if filled > 0 {
         // The caller's walk says what is wrong with the rest.
-        each(&buffer[..filled])?;
+        each(&buffer[..filled]);
     }
-    Ok(Ok(too_long))
+    Ok(too_long)
 }
 
 /// How many of the bytes are whole records.
 fn whole_records(bytes: &[u8]) -> usize {
-    let mut at = 0;
+    let mut at = leading_zeros(bytes);
     while let Some(length) = bytes.get(at + 1..).and_then(|rest| Fields::new(rest).u64()) {
         match usize::try_from(length)
             .ok()
             .and_then(|length| length.checked_add(at + 9))
         {
-            Some(end) if end <= bytes.len() => at = end,
+            Some(end) if end <= bytes.len() => at = end + leading_zeros(&bytes[end..]),
             _ => break,
         }
     }

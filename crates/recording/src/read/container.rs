@@ -3,7 +3,11 @@
 //! The walk touches a few bytes per record and leaves chunks packed. Where a record is not possible, it looks for the next
 //! place from which records follow each other, and says how many bytes it left out.
 
-use std::{borrow::Cow, collections::BTreeMap, ops::Range};
+use std::{
+    borrow::Cow,
+    collections::{BTreeMap, BTreeSet},
+    ops::Range,
+};
 
 use crate::finding::Kind;
 
@@ -107,9 +111,67 @@ pub(super) struct Channel {
 pub(super) struct Definitions {
     pub schemas: BTreeMap<u16, Schema>,
     pub channels: BTreeMap<u16, Channel>,
-    pub conflicts: u64,
+    /// Topic, or nothing for a schema, and what the second definition says.
+    pub conflicts: BTreeSet<(String, String)>,
     pub broken: u64,
 }
+
+/// A schema record as it stands in the file.
+struct SchemaRecord<'a> {
+    id: u16,
+    name: Cow<'a, str>,
+    encoding: Cow<'a, str>,
+    data: &'a [u8],
+}
+
+impl<'a> SchemaRecord<'a> {
+    fn read(body: &'a [u8]) -> Option<Self> {
+        let mut fields = Fields::new(body);
+        let id = fields.u16()?;
+        let (name, encoding) = (fields.text()?, fields.text()?);
+        let length = fields.u32()?;
+        Some(SchemaRecord {
+            id,
+            name,
+            encoding,
+            data: fields.take(u64::from(length))?,
+        })
+    }
+
+    fn is(&self, known: &Schema) -> bool {
+        known.name == self.name && known.encoding == self.encoding && known.data == self.data
+    }
+}
+
+/// A channel record as it stands in the file; its metadata follow.
+struct ChannelRecord<'a> {
+    id: u16,
+    schema: u16,
+    topic: Cow<'a, str>,
+    encoding: Cow<'a, str>,
+    rest: Fields<'a>,
+}
+
+impl<'a> ChannelRecord<'a> {
+    fn read(body: &'a [u8]) -> Option<Self> {
+        let mut fields = Fields::new(body);
+        let (id, schema) = (fields.u16()?, fields.u16()?);
+        Some(ChannelRecord {
+            id,
+            schema,
+            topic: fields.text()?,
+            encoding: fields.text()?,
+            rest: fields,
+        })
+    }
+
+    fn is(&self, known: &Channel) -> bool {
+        known.schema == self.schema && known.topic == self.topic && known.encoding == self.encoding
+    }
+}
+
+/// Conflicts are listed up to this many.
+const MAX_CONFLICTS: usize = 100;
 
 impl Definitions {
     /// Takes in a schema or channel record.
@@ -124,69 +186,107 @@ impl Definitions {
         }
     }
 
+    /// Whether a schema or channel record says what is known already.
+    pub fn knows(&self, opcode: u8, body: &[u8]) -> bool {
+        match opcode {
+            op::SCHEMA => SchemaRecord::read(body).is_none_or(|found| {
+                let known = self.schemas.get(&found.id);
+                known.is_some_and(|known| found.is(known))
+            }),
+            op::CHANNEL => ChannelRecord::read(body).is_none_or(|found| {
+                let known = self.channels.get(&found.id);
+                known.is_some_and(|known| found.is(known))
+            }),
+            _ => true,
+        }
+    }
+
     fn schema(&mut self, body: &[u8]) -> Option<()> {
-        let mut fields = Fields::new(body);
-        let id = fields.u16()?;
-        let (name, encoding) = (fields.text()?, fields.text()?);
-        let length = fields.u32()?;
-        let data = fields.take(u64::from(length))?;
-        match self.schemas.get(&id) {
-            Some(known) => {
-                if known.name != name || known.encoding != encoding || known.data != data {
-                    self.conflicts += 1;
-                }
-            }
+        let found = SchemaRecord::read(body)?;
+        let conflict = self.schemas.get(&found.id).map(|known| !found.is(known));
+        match conflict {
+            Some(true) => self.schema_conflict(found.id, &found.name),
+            Some(false) => {}
             None => {
                 let schema = Schema {
-                    name: name.into_owned(),
-                    encoding: encoding.into_owned(),
-                    data: data.to_vec(),
+                    name: found.name.into_owned(),
+                    encoding: found.encoding.into_owned(),
+                    data: found.data.to_vec(),
                 };
-                self.schemas.insert(id, schema);
+                self.schemas.insert(found.id, schema);
             }
         }
         Some(())
     }
 
     fn channel(&mut self, body: &[u8]) -> Option<()> {
-        let mut fields = Fields::new(body);
-        let (id, schema) = (fields.u16()?, fields.u16()?);
-        let (topic, encoding) = (fields.text()?, fields.text()?);
-        let metadata = fields.map()?;
-        match self.channels.get(&id) {
-            Some(known) => {
-                if known.schema != schema || known.topic != topic || known.encoding != encoding {
-                    self.conflicts += 1;
-                }
-            }
+        let mut found = ChannelRecord::read(body)?;
+        let metadata = found.rest.map()?;
+        let conflict = self.channels.get(&found.id).map(|known| !found.is(known));
+        match conflict {
+            Some(true) => self.channel_conflict(found.id, &found.topic, found.schema),
+            Some(false) => {}
             None => {
                 let channel = Channel {
-                    schema,
-                    topic: topic.into_owned(),
-                    encoding: encoding.into_owned(),
+                    schema: found.schema,
+                    topic: found.topic.into_owned(),
+                    encoding: found.encoding.into_owned(),
                     metadata,
                 };
-                self.channels.insert(id, channel);
+                self.channels.insert(found.id, channel);
             }
         }
         Some(())
+    }
+
+    fn conflict(&mut self, topic: String, text: String) {
+        if self.conflicts.len() < MAX_CONFLICTS {
+            self.conflicts.insert((topic, text));
+        }
+    }
+
+    fn schema_conflict(&mut self, id: u16, again: &str) {
+        let known = &self.schemas[&id].name;
+        let text = format!(
+            "schema {id}, {known}, is defined again and differently, as {again}: the first definition counts, and messages after the second may be wrong"
+        );
+        self.conflict(String::new(), text);
+    }
+
+    fn channel_conflict(&mut self, id: u16, again: &str, schema: u16) {
+        let known = &self.channels[&id];
+        let topic = known.topic.clone();
+        let text = format!(
+            "its channel {id} of schema {} is defined again and differently, as {again} of schema {schema}: the first definition counts, and messages after the second may be wrong",
+            known.schema
+        );
+        self.conflict(topic, text);
     }
 
     /// Adds what another set defines and this one does not.
     pub fn merge(&mut self, other: Definitions) {
         for (id, schema) in other.schemas {
             match self.schemas.get(&id) {
-                Some(known) => self.conflicts += u64::from(*known != schema),
+                Some(known) if *known != schema => self.schema_conflict(id, &schema.name),
+                Some(_) => {}
                 None => drop(self.schemas.insert(id, schema)),
             }
         }
         for (id, channel) in other.channels {
             match self.channels.get(&id) {
-                Some(known) => self.conflicts += u64::from(*known != channel),
+                Some(known)
+                    if (known.schema, &known.topic, &known.encoding)
+                        != (channel.schema, &channel.topic, &channel.encoding) =>
+                {
+                    self.channel_conflict(id, &channel.topic, channel.schema);
+                }
+                Some(_) => {}
                 None => drop(self.channels.insert(id, channel)),
             }
         }
-        self.conflicts += other.conflicts;
+        for (topic, text) in other.conflicts {
+            self.conflict(topic, text);
+        }
         self.broken += other.broken;
     }
 }
@@ -673,6 +773,25 @@ impl Walk<'_> {
         }
     }
 
+    /// The checksum of the data up to `end` as the mcap crate 0.26 makes it where it gives chunks none: without what is packed in them.
+    fn crc_without_chunks(&self, end: usize) -> Option<u32> {
+        let mut crc = crc32fast::Hasher::new();
+        let mut from = 0;
+        for block in &self.found.blocks {
+            if let Block::Chunk { body, .. } = block {
+                let header = chunk_header(&self.bytes[body.clone()])?;
+                if header.crc != 0 {
+                    return None;
+                }
+                let packed = body.end - header.spare - header.records.len();
+                crc.update(self.bytes.get(from..packed)?);
+                from = body.end - header.spare;
+            }
+        }
+        crc.update(self.bytes.get(from..end)?);
+        Some(crc.finalize())
+    }
+
     /// What can be said only at the end: unknown records, checksums, the summary.
     fn close(&mut self) {
         for (opcode, count) in std::mem::take(&mut self.unknown) {
@@ -687,6 +806,7 @@ impl Walk<'_> {
             && self.data_crc != 0
             && self.unchecked
             && crc32fast::hash(&self.bytes[..end]) != self.data_crc
+            && self.crc_without_chunks(end) != Some(self.data_crc)
         {
             self.damage(Kind::BadCrc, 1, "the data do not match their checksum: numbers in messages outside chunks may be wrong".to_owned());
         }

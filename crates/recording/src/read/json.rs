@@ -37,6 +37,25 @@ pub(super) fn open(schema: &SchemaRef<'_>, rows: &mut Rows) -> Result<Box<dyn De
 
 impl Decoder for Json {
     fn decode(&mut self, message: &[u8], rows: &mut Rows) -> Result<(), String> {
+        let stamp = self.read(message, rows).or_else(|problem| {
+            // Python's and other writers put bare words that JSON does not have.
+            match quote_words(message) {
+                Some(quoted) => self.read(&quoted, rows),
+                None => Err(problem),
+            }
+        });
+        let stamp = stamp
+            .map_err(|problem| format!("JSON message of {} bytes: {problem}", message.len()))?;
+        for &(column, value) in &self.pending {
+            rows.push(column, value);
+        }
+        rows.stamp_ns = stamp.ns();
+        Ok(())
+    }
+}
+
+impl Json {
+    fn read(&mut self, message: &[u8], rows: &mut Rows) -> Result<Stamp, serde_json::Error> {
         self.pending.clear();
         let mut stamp = Stamp::default();
         let mut deserializer = serde_json::Deserializer::from_slice(message);
@@ -46,16 +65,50 @@ impl Decoder for Json {
             pending: &mut self.pending,
             stamp: &mut stamp,
         };
-        place
-            .deserialize(&mut deserializer)
-            .and_then(|()| deserializer.end())
-            .map_err(|problem| format!("JSON message of {} bytes: {problem}", message.len()))?;
-        for &(column, value) in &self.pending {
-            rows.push(column, value);
-        }
-        rows.stamp_ns = stamp.ns();
-        Ok(())
+        place.deserialize(&mut deserializer)?;
+        deserializer.end()?;
+        Ok(stamp)
     }
+}
+
+/// Words for numbers that JSON does not have, and what they mean.
+const WORDS: [(&str, f64); 3] = [
+    ("NaN", f64::NAN),
+    ("-Infinity", f64::NEG_INFINITY),
+    ("Infinity", f64::INFINITY),
+];
+
+/// Marks a text that was such a word; no writer begins a text so.
+const MARK: char = '\u{1}';
+
+/// The document with its bare words as marked texts; `None` where it has none.
+fn quote_words(message: &[u8]) -> Option<Vec<u8>> {
+    let mut quoted = Vec::new();
+    let (mut rest, mut inside, mut found) = (message, false, false);
+    while let Some((&byte, after)) = rest.split_first() {
+        if !inside
+            && let Some((word, _)) = WORDS.iter().find(|(w, _)| rest.starts_with(w.as_bytes()))
+        {
+            quoted.extend(format!("\"\\u0001{word}\"").bytes());
+            rest = &rest[word.len()..];
+            found = true;
+            continue;
+        }
+        quoted.push(byte);
+        rest = after;
+        match byte {
+            b'"' => inside = !inside,
+            b'\\' if inside => {
+                // The character behind does not end the text.
+                if let Some((&escaped, after)) = rest.split_first() {
+                    quoted.push(escaped);
+                    rest = after;
+                }
+            }
+            _ => {}
+        }
+    }
+    found.then_some(quoted)
 }
 
 /// Seconds and nanoseconds of the header's stamp, or of a `timestamp`.
@@ -145,7 +198,11 @@ impl<'de> Visitor<'de> for Place<'_, '_> {
         Ok(())
     }
 
-    fn visit_str<E>(self, _: &str) -> Result<(), E> {
+    fn visit_str<E>(self, text: &str) -> Result<(), E> {
+        let word = text.strip_prefix(MARK);
+        if let Some((_, value)) = word.and_then(|w| WORDS.iter().find(|(known, _)| *known == w)) {
+            self.number(*value);
+        }
         Ok(())
     }
 

@@ -27,7 +27,10 @@ use std::{
     io::Read,
     ops::Range,
     path::Path,
-    sync::atomic::{AtomicU64, Ordering},
+    sync::{
+        Mutex, MutexGuard, PoisonError,
+        atomic::{AtomicU64, Ordering},
+    },
 };
 
 use container::{Container, Damage, Definitions};
@@ -196,9 +199,17 @@ pub struct Recording {
     info: Info,
     /// Index into the channels of [`Info`] by channel id.
     by_id: Vec<Option<usize>>,
-    /// Messages that the summary promises, if it was used.
+    /// Schemas and channels as they are used.
+    definitions: Definitions,
+    /// They come from a look through all blocks, not from the summary.
+    searched: bool,
+    /// Messages that the summary promises.
     promised: Option<u64>,
     skipped: AtomicU64,
+    /// How the last reading contradicted the summary.
+    contradictions: Mutex<Vec<Finding>>,
+    /// How the summary was contradicted that is no longer trusted.
+    distrusted: Vec<Finding>,
 }
 
 impl std::fmt::Debug for Recording {
@@ -250,7 +261,7 @@ impl Recording {
                 name: name.to_owned(),
             });
         }
-        let Some(mut container) = container::walk(&data, &|stretch| data.forget(stretch)) else {
+        let Some(container) = container::walk(&data, &|stretch| data.forget(stretch)) else {
             let found = data
                 .iter()
                 .take(8)
@@ -261,13 +272,24 @@ impl Recording {
                 found: format!("\"{found}\""),
             });
         };
-        let promised = container
-            .summary
+        let trusted = trusted(&container);
+        Ok(Self::known(data, container, trusted, options))
+    }
+
+    /// What the walk found, with the summary's counts where they are `trusted`, or else after a look through all blocks.
+    fn known(
+        data: Data,
+        mut container: Container,
+        trusted: Option<Tally>,
+        options: &ReadOptions,
+    ) -> Self {
+        let summary = container.summary.take();
+        let promised = summary
             .as_ref()
             .and_then(|(_, statistics)| Some(statistics.as_ref()?.messages));
-        let trusted = trusted(&container);
-        let (definitions, tally) = match (&trusted, container.summary.take()) {
-            (Some(tally), Some((definitions, _))) => (definitions, tally.clone()),
+        let searched = trusted.is_none();
+        let (definitions, tally) = match (trusted, summary) {
+            (Some(tally), Some((definitions, _))) => (definitions, tally),
             (_, summary) => {
                 let (mut definitions, tally) = block::scan(&data, &container.blocks, options);
                 if let Some((others, _)) = summary {
@@ -276,15 +298,6 @@ impl Recording {
                 (definitions, tally)
             }
         };
-        if definitions.conflicts > 0 {
-            let text = format!(
-                "{} schemas or channels are defined twice, differently; the first definition counts",
-                definitions.conflicts
-            );
-            container
-                .damage
-                .push((Kind::BadSchema, definitions.conflicts, text));
-        }
         if definitions.broken > 0 {
             let text = format!(
                 "{} schema or channel records cannot be read",
@@ -294,20 +307,55 @@ impl Recording {
                 .damage
                 .push((Kind::BadRecord, definitions.broken, text));
         }
-        let info = info(&container, &definitions, &tally, trusted.is_some());
+        let info = info(&container, &definitions, &tally, !searched);
         let mut by_id = vec![None; 1 << 16];
         for (index, channel) in info.channels.iter().enumerate() {
             by_id[usize::from(channel.id)] = Some(index);
         }
-        Ok(Recording {
+        Recording {
             data,
             options: options.clone(),
             container,
+            definitions,
+            searched,
             info,
             by_id,
             promised,
             skipped: AtomicU64::new(0),
-        })
+            contradictions: Mutex::default(),
+            distrusted: Vec::new(),
+        }
+    }
+
+    /// Whether the last [`stream`](Self::stream) or [`signals`](Self::signals) found other definitions, counts or times than the
+    /// summary gives: then numbers may have come under wrong names, or not at all, and [`searched`](Self::searched) has to be read.
+    pub fn contradicts_its_summary(&self) -> bool {
+        !self.lock_contradictions().is_empty()
+    }
+
+    fn lock_contradictions(&self) -> MutexGuard<'_, Vec<Finding>> {
+        self.contradictions
+            .lock()
+            .unwrap_or_else(PoisonError::into_inner)
+    }
+
+    /// The same recording, looked through from end to end instead of trusting its summary.
+    pub fn searched(self) -> Self {
+        if self.searched {
+            return self;
+        }
+        let distrusted = std::mem::take(&mut *self.lock_contradictions());
+        let Recording {
+            data,
+            options,
+            mut container,
+            definitions,
+            ..
+        } = self;
+        container.summary = Some((definitions, None));
+        let mut recording = Self::known(data, container, None, &options);
+        recording.distrusted = distrusted;
+        recording
     }
 
     /// What is in the recording.
@@ -446,10 +494,15 @@ fn info(container: &Container, definitions: &Definitions, tally: &Tally, trusted
         messages: tally.per_channel.values().sum(),
         salvaged: !(trusted || container.complete && container.damage.is_empty()),
         skipped_messages: 0,
-        warnings: container
-            .damage
-            .iter()
-            .map(|(_, _, text)| text.clone())
-            .collect(),
+        warnings: {
+            let damage = container.damage.iter().map(|(_, _, text)| text.clone());
+            let conflicts = definitions.conflicts.iter();
+            damage
+                .chain(conflicts.map(|(topic, text)| match topic.as_str() {
+                    "" => text.clone(),
+                    topic => format!("{topic}: {text}"),
+                }))
+                .collect()
+        },
     }
 }

@@ -7,7 +7,7 @@ use std::{
 
 use super::{
     ReadError, Recording,
-    block::{BlockResult, ChannelBatch, Worker, split_record},
+    block::{BlockResult, ChannelBatch, Records, Worker},
     chunk::{self, Unpacker, WHOLE_BYTES},
     clock::{Clocks, Order, seconds},
     container::{Block, op},
@@ -125,7 +125,7 @@ pub(super) fn run(
         for (position, block) in blocks.iter().enumerate() {
             let result = wait_for(position, &shared, &mut worker, blocks, window);
             if result.large {
-                worker.large(block, &mut |result| taker.take(result, sink))?;
+                worker.large(block, &mut |result| taker.take(result, sink));
             } else {
                 taker.take(result, sink);
             }
@@ -135,8 +135,7 @@ pub(super) fn run(
             drop(progress);
             shared.changed.notify_all();
         }
-        Ok(())
-    })?;
+    });
     Ok(taker.findings())
 }
 
@@ -224,13 +223,17 @@ struct Taker<'a> {
     messages: u64,
     lost: u64,
     start_ns: i64,
+    /// Messages by index of the channel.
+    per_channel: Vec<u64>,
+    times: Option<(i64, i64)>,
+    contradictions: u64,
 }
 
 impl<'a> Taker<'a> {
     fn new(recording: &'a Recording) -> Self {
         let mut watches = Vec::new();
         watches.resize_with(recording.info.channels.len(), Watch::default);
-        let mut findings = Vec::new();
+        let mut findings = recording.distrusted.clone();
         for (kind, count, text) in recording.damage() {
             findings.push(Finding {
                 topic: String::new(),
@@ -240,8 +243,20 @@ impl<'a> Taker<'a> {
                 text: text.clone(),
             });
         }
+        for (topic, text) in &recording.definitions.conflicts {
+            findings.push(Finding {
+                topic: topic.clone(),
+                kind: Kind::Redefined,
+                count: 1,
+                t_s: None,
+                text: text.clone(),
+            });
+        }
         Taker {
             recording,
+            per_channel: vec![0; watches.len()],
+            times: None,
+            contradictions: 0,
             watches,
             ids: HashMap::new(),
             findings,
@@ -254,6 +269,15 @@ impl<'a> Taker<'a> {
 
     fn take(&mut self, result: BlockResult, sink: &mut dyn FnMut(&Batch<'_>)) {
         self.messages += result.messages;
+        self.contradictions += result.contradictions;
+        for (channel, count) in result.per_channel {
+            self.per_channel[channel] += count;
+        }
+        if let Some((first, last)) = result.times {
+            let (start, end) = self.times.get_or_insert((first, last));
+            *start = first.min(*start);
+            *end = last.max(*end);
+        }
         for trouble in result.troubles {
             // Messages are named by their first; chunks each by their own place.
             let key = match trouble.kind {
@@ -316,12 +340,12 @@ impl<'a> Taker<'a> {
         watch.trailing += batch.trailing;
         let info = &self.recording.info.channels[batch.channel];
         if let Some(text) = batch.remark {
-            let key = (Some(batch.channel), Kind::BadSchema, text.clone());
+            let key = (Some(batch.channel), Kind::OddSchema, text.clone());
             if !self.known.contains_key(&key) {
                 self.known.insert(key, self.findings.len());
                 self.findings.push(Finding {
                     topic: info.topic.clone(),
-                    kind: Kind::BadSchema,
+                    kind: Kind::OddSchema,
                     count: 1,
                     t_s: None,
                     text,
@@ -371,10 +395,62 @@ impl<'a> Taker<'a> {
         });
     }
 
+    /// Holds the summary against what was found.
+    fn judge_summary(&mut self) {
+        let recording = self.recording;
+        if recording.searched {
+            return;
+        }
+        let mut contradictions = Vec::new();
+        let mut say = |topic: &str, kind, count, text| {
+            contradictions.push(Finding {
+                topic: topic.to_owned(),
+                kind,
+                count,
+                t_s: None,
+                text,
+            })
+        };
+        if self.contradictions > 0 {
+            let text = format!(
+                "the summary has other schemas or channels than the data, in {} places",
+                self.contradictions
+            );
+            say("", Kind::BadSummary, self.contradictions, text);
+        }
+        // What a damaged chunk held cannot be held against the summary.
+        if self.lost == 0 && recording.damage().is_empty() {
+            let info = &recording.info;
+            for (channel, &found) in info.channels.iter().zip(&self.per_channel) {
+                if channel.messages != found {
+                    let text = format!(
+                        "the summary counts {} messages of channel {}, {found} were found",
+                        channel.messages, channel.id
+                    );
+                    say(&channel.topic, Kind::BadSummary, 1, text);
+                }
+            }
+            let told = (info.start_ns, info.end_ns);
+            if let Some(found) = self.times.filter(|found| *found != told) {
+                let text = format!(
+                    "the summary says that log times go from {:.3} s to {:.3} s after the first, they go from 0 s to {:.3} s",
+                    seconds(told.0, found.0),
+                    seconds(told.1, found.0),
+                    seconds(found.1, found.0),
+                );
+                say("", Kind::SummaryTimes, 1, text);
+            }
+        }
+        self.findings.extend(contradictions.iter().cloned());
+        *recording.lock_contradictions() = contradictions;
+    }
+
     fn findings(mut self) -> Vec<Finding> {
         let start_ns = self.start_ns;
+        self.judge_summary();
         if let Some(promised) = self.recording.promised
             && promised != self.messages
+            && (self.recording.searched || self.lost > 0)
         {
             let lost = promised.saturating_sub(self.messages);
             // Chunks that were left out explain as many as their indexes name.
@@ -472,14 +548,20 @@ impl<'a> Taker<'a> {
                 } else {
                     format!("{} ", finding.count)
                 };
+                let at = match finding.t_s {
+                    Some(t_s) => format!(", at {t_s:.3} s"),
+                    None => String::new(),
+                };
                 finding.text = format!(
-                    "{count}{more} could not be decoded; the first: {}",
+                    "{count}{more} could not be decoded; the first{at}: {}",
                     finding.text
                 );
-            } else if matches!(finding.kind, Kind::NoDecoder | Kind::UnknownChannel)
-                || (finding.kind == Kind::BadSchema && finding.count > 1)
-            {
-                finding.text = format!("skipped {} messages: {}", finding.count, finding.text);
+            } else if matches!(
+                finding.kind,
+                Kind::NoDecoder | Kind::UnknownChannel | Kind::BadSchema
+            ) {
+                let s = if finding.count == 1 { "" } else { "s" };
+                finding.text = format!("skipped {} message{s}: {}", finding.count, finding.text);
             }
         }
         self.recording.skipped.store(self.lost, Ordering::Relaxed);
@@ -511,9 +593,8 @@ pub(super) fn raw(
         .iter()
         .map(|channel| select(&channel.topic))
         .collect();
-    let mut give = |mut bytes: &[u8]| {
-        while let Some((opcode, body, rest)) = split_record(bytes) {
-            bytes = rest;
+    let mut give = |bytes: &[u8]| {
+        for (opcode, body) in Records::new(bytes) {
             let (true, Some((header, data))) =
                 (opcode == op::MESSAGE, body.split_first_chunk::<22>())
             else {
@@ -553,10 +634,7 @@ pub(super) fn raw(
                     }
                     Ok(header) => {
                         // A damaged chunk is left out, as `stream` says it is.
-                        let _ = chunk::pieces(&header, &recording.options, &mut |records| {
-                            give(records);
-                            Ok(())
-                        })?;
+                        let _ = chunk::pieces(&header, &recording.options, &mut give);
                     }
                     Err(_) => {}
                 }

@@ -16,7 +16,7 @@ pub fn write_whole<E: From<Error>>(
         .filter(|p| !p.as_os_str().is_empty())
         .unwrap_or(Path::new("."));
     let mut builder = tempfile::Builder::new();
-    builder.prefix(".analyze-").suffix(".part");
+    builder.prefix(".whole-").suffix(".part");
     #[cfg(unix)]
     {
         use std::os::unix::fs::PermissionsExt;

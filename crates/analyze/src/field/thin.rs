@@ -1,0 +1,222 @@
+//! Long logs of fast sensors, thinned while they are read: the mean of so many samples stands for them, so that memory stays bounded.
+
+use std::collections::BTreeMap;
+
+use recording::Signal;
+use recording::read::{Batch, ReadError, Recording};
+
+use super::{ACCEL, GYRO, GYRO_MARK};
+use crate::roles::{Role, Roles};
+
+/// Bytes that the estimates hold per sample of the rath's sensor, and of a carrier's (measured; they hold many columns at once).
+const RATH_BYTES: u64 = 700;
+const CARRIER_BYTES: u64 = 250;
+/// What the estimates may hold (bytes).
+const MOST_BYTES: u64 = 220_000_000;
+/// Thinning stops at this rate (Hz): what moves on shoulders lies below a tenth of it.
+const LEAST_HZ: f64 = 100.0;
+
+/// How many samples of each topic become one; 1 where all are kept. `Err` gives the number of samples that are too many all the same.
+pub fn factors(recording: &Recording, roles: &Roles) -> Result<BTreeMap<String, usize>, u64> {
+    let info = recording.info();
+    let span_s = (info.end_ns.saturating_sub(info.start_ns)) as f64 / 1e9;
+    let rath = roles.topic(Role::Imu);
+    let topics = roles
+        .patterns(Role::Imu)
+        .iter()
+        .chain(roles.patterns(Role::Carriers));
+    let messages = |topic: &str| -> u64 {
+        let of_topic = info.channels.iter().filter(|c| c.topic == topic);
+        of_topic.map(|c| c.messages).sum()
+    };
+    let bytes = |factors: &BTreeMap<String, usize>| -> u64 {
+        let each = factors.iter().map(|(topic, factor)| {
+            let weight = match rath == Some(topic.as_str()) {
+                true => RATH_BYTES,
+                false => CARRIER_BYTES,
+            };
+            messages(topic) / *factor as u64 * weight
+        });
+        each.sum()
+    };
+    let mut factors: BTreeMap<String, usize> = topics.map(|t| (t.clone(), 1)).collect();
+    if bytes(&factors) <= MOST_BYTES {
+        return Ok(factors);
+    }
+    for (topic, factor) in &mut factors {
+        let hz = messages(topic) as f64 / span_s.max(1e-9);
+        *factor = ((hz / LEAST_HZ) as usize).max(1);
+    }
+    if bytes(&factors) <= MOST_BYTES {
+        return Ok(factors);
+    }
+    Err(factors.keys().map(|topic| messages(topic)).sum())
+}
+
+/// The inertial columns of the topics whose factor is above 1: means over so many samples in the order of the file. Samples that are not finite are
+/// left out.
+pub fn read(
+    recording: &Recording,
+    factors: &BTreeMap<String, usize>,
+) -> Result<Vec<Signal>, ReadError> {
+    let topics: Vec<&str> = factors
+        .iter()
+        .filter(|(_, factor)| **factor > 1)
+        .map(|(topic, _)| topic.as_str())
+        .collect();
+    if topics.is_empty() {
+        return Ok(Vec::new());
+    }
+    let wanted = |path: &str| {
+        let of = |topic: &&str| path.strip_prefix(*topic).and_then(|p| p.strip_prefix('.'));
+        topics
+            .iter()
+            .find_map(of)
+            .is_some_and(|f| COLUMNS.contains(&f) || f == GYRO_MARK)
+    };
+    let mut sensors: BTreeMap<&str, Sensor> = topics
+        .iter()
+        .map(|topic| (*topic, Sensor::new(factors[*topic])))
+        .collect();
+    recording.stream(&wanted, &mut |batch| {
+        if let Some(sensor) = sensors.get_mut(batch.topic) {
+            sensor.take(batch);
+        }
+    })?;
+    Ok(sensors
+        .into_iter()
+        .flat_map(|(topic, sensor)| sensor.signals(topic))
+        .collect())
+}
+
+/// What is averaged.
+const COLUMNS: [&str; 6] = [GYRO[0], GYRO[1], GYRO[2], ACCEL[0], ACCEL[1], ACCEL[2]];
+
+/// One sensor on the way.
+struct Sensor {
+    factor: usize,
+    /// Samples in the sums, their first time (ns), the sum of the times since then (ns), the sums of the columns.
+    count: usize,
+    first_ns: i64,
+    since_ns: i64,
+    sums: [f64; 6],
+    times_ns: Vec<i64>,
+    columns: [Vec<f64>; 6],
+    /// The columns that the sensor has.
+    has: [bool; 6],
+    mark: Option<f64>,
+}
+
+impl Sensor {
+    fn new(factor: usize) -> Self {
+        Sensor {
+            factor,
+            count: 0,
+            first_ns: 0,
+            since_ns: 0,
+            sums: [0.0; 6],
+            times_ns: Vec::new(),
+            columns: Default::default(),
+            has: [false; 6],
+            mark: None,
+        }
+    }
+
+    fn take(&mut self, batch: &Batch<'_>) {
+        let mut parts: [Option<&[f64]>; 6] = [None; 6];
+        for column in batch.columns {
+            let field = column.path.get(batch.topic.len() + 1..).unwrap_or_default();
+            // Fields of a message of fixed layout are in every row.
+            if let (Some(k), None) = (COLUMNS.iter().position(|c| *c == field), column.rows) {
+                parts[k] = Some(column.values);
+                self.has[k] = true;
+            } else if field == GYRO_MARK {
+                self.mark = self.mark.or(column.values.first().copied());
+            }
+        }
+        for (row, &t_ns) in batch.times_ns.iter().enumerate() {
+            let sample = parts.map(|part| part.map_or(0.0, |values| values[row]));
+            if !sample.iter().all(|x| x.is_finite()) {
+                continue;
+            }
+            if self.count == 0 {
+                (self.first_ns, self.since_ns, self.sums) = (t_ns, 0, [0.0; 6]);
+            }
+            self.count += 1;
+            self.since_ns = self.since_ns.wrapping_add(t_ns.wrapping_sub(self.first_ns));
+            for (sum, x) in self.sums.iter_mut().zip(sample) {
+                *sum += x;
+            }
+            if self.count == self.factor {
+                // OK because a factor is far below 2⁶³.
+                self.times_ns.push(
+                    self.first_ns
+                        .wrapping_add(self.since_ns / self.factor as i64),
+                );
+                for (column, sum) in self.columns.iter_mut().zip(self.sums) {
+                    column.push(sum / self.factor as f64);
+                }
+                self.count = 0;
+            }
+        }
+    }
+
+    fn signals(self, topic: &str) -> Vec<Signal> {
+        let signal = |field: &str, times_ns: &[i64], values: Vec<f64>| Signal {
+            path: format!("{topic}.{field}"),
+            unit: String::new(),
+            times_ns: times_ns.into(),
+            values,
+        };
+        let mark = self.mark.zip(self.times_ns.first().copied());
+        let mut signals: Vec<Signal> = mark
+            .map(|(mark, t_ns)| signal(GYRO_MARK, &[t_ns], vec![mark]))
+            .into_iter()
+            .collect();
+        for ((field, values), has) in COLUMNS.iter().zip(self.columns).zip(self.has) {
+            if has {
+                signals.push(signal(field, &self.times_ns, values));
+            }
+        }
+        signals
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn means_stand_for_samples_across_batches() {
+        let mut sensor = Sensor::new(4);
+        let mut x = Vec::new();
+        for batch in [3usize, 5, 1, 8] {
+            let from = x.len();
+            let values: Vec<f64> = (from..from + batch)
+                .map(|k| if k == 6 { f64::NAN } else { k as f64 })
+                .collect();
+            let times_ns: Vec<i64> = (from..from + batch).map(|k| 1_000 * k as i64).collect();
+            let column = recording::read::Column {
+                id: 0,
+                path: "/a.linear_acceleration.x",
+                rows: None,
+                values: &values,
+                finite: false,
+            };
+            sensor.take(&Batch {
+                channel: 0,
+                topic: "/a",
+                schema: "",
+                times_ns: &times_ns,
+                stamps_ns: None,
+                columns: &[column],
+            });
+            x.extend(values);
+        }
+        let signals = sensor.signals("/a");
+        assert_eq!(signals.len(), 1);
+        // 0 1 2 3, 4 5 7 8, 9 10 11 12, 13 14 15 16.
+        assert_eq!(signals[0].values, [1.5, 6.0, 10.5, 14.5]);
+        assert_eq!(*signals[0].times_ns, [1_500, 6_000, 10_500, 14_500]);
+    }
+}
