@@ -1,5 +1,6 @@
 //! `view`: opens a recording in the Rerun viewer, or writes what it would show.
 
+use std::fs::File;
 use std::io::{BufWriter, Chain, Cursor, Read, Stdin, Write};
 use std::net::{TcpStream, ToSocketAddrs};
 use std::path::{Path, PathBuf};
@@ -273,8 +274,12 @@ fn answering(uri: re_uri::ProxyUri, url: &str) -> anyhow::Result<re_uri::ProxyUr
 
 /// Starts the viewer, sends the recording into it and waits until it is closed.
 fn show(file: &Path, kind: Kind) -> anyhow::Result<Vec<Finding>> {
+    if !is_stdin(file) {
+        // What is wrong with the file is said before what is wrong with the viewer.
+        File::open(file).map_err(|error| anyhow!("{}: cannot be read: {error}", file.display()))?;
+    }
     let program = viewer::find()?;
-    // A file that is not there, or not good, should not open a window first.
+    // What cannot be read should not open a window first.
     let source = source(file)?;
     let (mut child, stdin) = viewer::start(&program, kind)?;
     let sent = Encoded::stream(BufWriter::with_capacity(1 << 16, stdin)).and_then(|mut encoded| {
