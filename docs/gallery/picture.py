@@ -1,7 +1,7 @@
 #!/usr/bin/env python3
 """A picture of what the Rerun viewer shows of a file at one moment, without a screen.
 
-  picture.py FILE.rrd OUT.png SECONDS [WIDTHxHEIGHT]
+  picture.py FILE.rrd|FILE.mcap OUT.png SECONDS [WIDTHxHEIGHT]
 
 Needs `pip install rerun-sdk==0.36.3 pillow` and a Vulkan driver; software will do (Debian: mesa-vulkan-drivers).
 """
@@ -89,14 +89,15 @@ def main():
                         raise
                     time.sleep(0.3)
             seen, since = {}, time.monotonic()
-            while time.monotonic() - since < 2.5 or "time" not in seen:
+            while time.monotonic() - since < 2.5 or not seen:
                 if time.monotonic() > deadline:
                     raise RuntimeError(f"{file}: was not loaded within two minutes")
                 now = ranges(control)
                 if now != seen:
                     seen, since = now, time.monotonic()
                 time.sleep(0.2)
-            control.tool("set_time", timeline="time", time=seen["time"][0] + round(seconds * 1e9))
+            timeline = "time" if "time" in seen else "message_log_time"  # an .mcap that the viewer opens by itself
+            control.tool("set_time", timeline=timeline, time=seen[timeline][0] + round(seconds * 1e9))
             for _ in range(3):
                 control.tool("wait_for", min_steps=3, timeout_secs=5)
             picture = os.path.join(home, "picture.png")

@@ -130,13 +130,109 @@ fn rerun() -> Option<PathBuf> {
     on_path(&["rerun"]).or_else(kept)
 }
 
-#[test]
-fn the_viewer_shows_what_is_meant() {
+/// What takes the pictures, where it is there.
+fn camera() -> Option<PathBuf> {
     let tool = Path::new(ROOT).join("../shared/tools/screenshot-rerun");
     if !tool.is_file() {
         eprintln!("skipped: {} is not there", tool.display());
-        return;
+        return None;
     }
+    Some(tool)
+}
+
+/// Titles of the views in a picture of `file` at the moment `at`; `None` where no picture can be taken here. A view of one colour
+/// is an error.
+fn views_drawn(tool: &Path, folder: &Path, file: &str, at: &str) -> Option<Vec<String>> {
+    let picture = Command::new(tool)
+        .current_dir(folder)
+        .args([file, "picture.png", "--at", at, "--timeout", "300"])
+        .output();
+    let said = match picture {
+        Ok(output) if output.status.success() => {
+            String::from_utf8_lossy(&output.stdout).into_owned()
+        }
+        // 3 and 4 are verdicts on the picture; 1 is about the machine.
+        Ok(output) if output.status.code() == Some(1) => {
+            let why = String::from_utf8_lossy(&output.stderr);
+            eprintln!("skipped: no picture could be taken: {why}");
+            return None;
+        }
+        other => panic!("{file}: {other:?}"),
+    };
+    let (_, drawn) = said.split_once("views drawn: ").expect("the views' names");
+    assert!(!drawn.contains("BLANK"), "{file}: {drawn}");
+    let titles = drawn.split("; time: ").next().unwrap_or(drawn);
+    Some(titles.split(" | ").map(str::to_owned).collect())
+}
+
+/// A recording that is opened without the bridge: the URDF on the frames of `/tf`, and plots of the motion.
+#[test]
+fn a_bare_recording_shows_bodies_and_plots() {
+    let Some(tool) = camera() else {
+        return;
+    };
+    let folder = tempfile::tempdir().expect("a folder");
+    good(run_in(
+        folder.path(),
+        "sim",
+        &["record", "music", "--out", "music.mcap"],
+    ));
+    let Some(titles) = views_drawn(&tool, folder.path(), "music.mcap", "30.3") else {
+        return;
+    };
+    for expected in [
+        "/",
+        "…/motion/position",
+        "…/motion/velocity",
+        "…/motion/effort",
+    ] {
+        assert!(
+            titles.iter().any(|t| t == expected),
+            "{expected}: {titles:?}"
+        );
+    }
+    let Some(rerun) = rerun() else {
+        eprintln!("skipped: there is no `rerun` on PATH");
+        return;
+    };
+    let says = |args: &[&str]| {
+        let mut command = Command::new(&rerun);
+        let output = command.current_dir(folder.path()).args(args).output();
+        let output = good(output.expect("the viewer starts"));
+        String::from_utf8_lossy(&output.stdout).into_owned()
+    };
+    says(&["mcap", "convert", "music.mcap", "-o", "bare.rrd"]);
+    says(&["rrd", "verify", "bare.rrd"]);
+    let printed = says(&["rrd", "print", "bare.rrd"]);
+    // An entity may come in several chunks.
+    let rows = |entity: &str, column: &str| -> usize {
+        let rows_of = |line: &str| -> Option<usize> {
+            let (head, rest) = line.split_once(&format!(" - {entity} - "))?;
+            rest.contains(column).then_some(())?;
+            let (_, count) = head.split_once(" with ")?;
+            count.split(' ').next()?.parse().ok()
+        };
+        printed.lines().filter_map(rows_of).sum()
+    };
+    // The body and two carriers; a minute at 30 Hz has 1801 samples.
+    assert_eq!(rows("/tf", "Transform3D:translation"), 3 * 1801);
+    for list in ["position", "velocity", "effort"] {
+        assert_eq!(
+            rows(&format!("/rath/motion/{list}"), "Scalars:scalars"),
+            1801
+        );
+    }
+    for body in ["rath", "carrier_1", "carrier_2"] {
+        let entity = format!("/visual_geometries/{body}/visual_0");
+        assert!(printed.contains(&entity), "{entity}");
+    }
+}
+
+#[test]
+fn the_viewer_shows_what_is_meant() {
+    let Some(tool) = camera() else {
+        return;
+    };
     let folder = tempfile::tempdir().expect("a folder");
     for case in CASES {
         let (mut mcap, rrd) = (
@@ -152,34 +248,9 @@ fn the_viewer_shows_what_is_meant() {
         }
         command("view", &[&mcap, "--save", &rrd]);
 
-        let picture = Command::new(&tool)
-            .current_dir(folder.path())
-            .args([&rrd, "picture.png"])
-            .args(["--at", "time=30.3", "--timeout", "300"])
-            .output();
-        let said = match picture {
-            Ok(output) if output.status.success() => {
-                String::from_utf8_lossy(&output.stdout).into_owned()
-            }
-            // 3 and 4 are verdicts on the picture; 1 is about the machine.
-            Ok(output) if output.status.code() == Some(1) => {
-                let why = String::from_utf8_lossy(&output.stderr);
-                eprintln!("skipped: no picture could be taken: {why}");
-                return;
-            }
-            other => panic!("{}: {other:?}", case.scene),
+        let Some(titles) = views_drawn(&tool, folder.path(), &rrd, "time=30.3") else {
+            return;
         };
-        let drawn = said
-            .split_once("views drawn: ")
-            .map(|(_, rest)| rest)
-            .expect("the views' names");
-        assert!(!drawn.contains("BLANK"), "{}: {drawn}", case.scene);
-        let titles: Vec<&str> = drawn
-            .split("; time: ")
-            .next()
-            .unwrap_or(drawn)
-            .split(" | ")
-            .collect();
         assert_eq!(titles.len(), case.views.len(), "{}: {titles:?}", case.scene);
         for (title, expected) in titles.iter().zip(case.views) {
             assert!(

@@ -178,8 +178,27 @@ fn the_report_fits_phones_screens_paper_and_the_dark() {
     nothing(&mut page, CLIPPED, "clipped in print");
     let hidden = "getComputedStyle(document.querySelector('button')).display";
     assert_eq!(page.evaluate(hidden), json!("none"));
-    let definition = "document.querySelector('.metrics details p').getBoundingClientRect().height";
-    assert!(page.evaluate(definition).as_f64().is_some_and(|h| h > 5.0));
+    // What a click opens elsewhere is open on paper, whose width the plots have, and closed again on the screen.
+    let definition = "document.querySelector('.metrics details p').checkVisibility()";
+    let drawing = "document.querySelector('figure svg').getAttribute('viewBox')";
+    let on_screen = page.evaluate(drawing);
+    assert_eq!(page.evaluate(definition), json!(false));
+    page.evaluate("window.dispatchEvent(new Event('beforeprint'))");
+    assert_eq!(page.evaluate(definition), json!(true));
+    assert_eq!(page.evaluate(drawing), json!("0 0 700 230"));
+    nothing(&mut page, CLIPPED, "clipped on paper");
+    nothing(&mut page, OVERLAPPING, "unreadable on paper");
+    page.evaluate("window.dispatchEvent(new Event('afterprint'))");
+    assert_eq!(page.evaluate(definition), json!(false));
+    assert_eq!(page.evaluate(drawing), on_screen);
+    // The spectrogram's colours have a key, which paper shows too.
+    let key = page.evaluate("document.querySelector('.map').parentElement.textContent");
+    assert!(
+        key.as_str().is_some_and(|k| k.ends_with("dB re 1 deg²/Hz")),
+        "{key}"
+    );
+    let swatch = "getComputedStyle(document.querySelector('.legend i')).printColorAdjust";
+    assert_eq!(page.evaluate(swatch), json!("exact"));
     drop(made.folder);
 }
 

@@ -520,9 +520,9 @@ impl<'a> Pass<'a> {
 
     /// Outlines of moving signals without a role, those of one vector together.
     fn traces(&self) -> Vec<Trace> {
-        // Topics that play a role are drawn as that; transforms and scenes repeat them.
+        // Topics that play a role are drawn as that; transforms, scenes and joints repeat them.
         let known = |channel: usize| {
-            let schema = &self.recording.info().channels[channel].schema;
+            let info = &self.recording.info().channels[channel];
             let repeats = [
                 "TFMessage",
                 "SceneUpdate",
@@ -530,8 +530,9 @@ impl<'a> Pass<'a> {
                 "FrameTransforms",
             ]
             .iter()
-            .any(|s| schema.ends_with(s));
+            .any(|s| info.schema.ends_with(s));
             repeats
+                || info.topic == recording::topics::MOTION
                 || self
                     .entries
                     .iter()

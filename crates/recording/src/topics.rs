@@ -21,6 +21,8 @@ pub enum MessageKind {
     RawAudio,
     /// `sensor_msgs/msg/Imu`.
     Imu,
+    /// `sensor_msgs/msg/JointState`.
+    JointState,
     /// `sensor_msgs/msg/MagneticField`.
     MagneticField,
     /// `tf2_msgs/msg/TFMessage`.
@@ -49,6 +51,7 @@ impl MessageKind {
             MessageKind::SceneUpdate => "foxglove.SceneUpdate",
             MessageKind::RawAudio => "foxglove.RawAudio",
             MessageKind::Imu => "sensor_msgs/msg/Imu",
+            MessageKind::JointState => "sensor_msgs/msg/JointState",
             MessageKind::MagneticField => "sensor_msgs/msg/MagneticField",
             MessageKind::Tf => "tf2_msgs/msg/TFMessage",
             MessageKind::RobotDescription => "std_msgs/msg/String",
@@ -100,6 +103,8 @@ pub struct Topic {
 
 /// Motion of the carried body.
 pub const STATE: &str = "/rath/state";
+/// Height, roll and tilt of the carried body once more, in the message that viewers plot by themselves.
+pub const MOTION: &str = "/rath/motion";
 /// Gait phases and beat phase.
 pub const PHASES: &str = "/carriers/phases";
 /// Handle forces.
@@ -131,6 +136,12 @@ pub const TOPICS: &[Topic] = &[
         kind: MessageKind::RathState,
         content: "position m, orientation, velocity m/s, angular velocity rad/s (body), roll/pitch/yaw rad",
         frame: "world",
+    },
+    Topic {
+        name: MOTION,
+        kind: MessageKind::JointState,
+        content: "height m, roll and tilt rad; their rates (body axes); vertical force N and moments N m of the handles (body axes)",
+        frame: "",
     },
     Topic {
         name: PHASES,

@@ -120,6 +120,7 @@ macro_rules! encode_cdr {
 }
 encode_cdr!(
     Imu,
+    JointState,
     MagneticField,
     TfMessage,
     StringMessage,

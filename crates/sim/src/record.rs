@@ -6,7 +6,8 @@ use crate::run::{Listener, Sample};
 use crate::scene::{Scene, to_toml};
 use crate::sensors::Reading;
 use recording::cdr::{
-    Header, Imu, Quaternion, StringMessage, TfMessage, Time, Transform, TransformStamped, Vector3,
+    Header, Imu, JointState, Quaternion, StringMessage, TfMessage, Time, Transform,
+    TransformStamped, Vector3,
 };
 use recording::load::Load;
 use recording::schema::{foxglove, rath};
@@ -23,6 +24,7 @@ pub struct Recorder<'m> {
     writer: RecordingWriter,
     epoch_ns: i64,
     state: ChannelId,
+    motion: ChannelId,
     phases: Option<ChannelId>,
     forces: ChannelId,
     energy: Option<ChannelId>,
@@ -67,6 +69,7 @@ impl<'m> Recorder<'m> {
             there.then(|| writer.channel(topic, kind)).transpose()
         };
         let state = writer.channel(topics::STATE, MessageKind::RathState)?;
+        let motion = writer.channel(topics::MOTION, MessageKind::JointState)?;
         let phases = has(
             model.layout().phases > 0,
             &mut writer,
@@ -112,6 +115,7 @@ impl<'m> Recorder<'m> {
             writer,
             epoch_ns,
             state,
+            motion,
             phases,
             forces,
             energy,
@@ -174,6 +178,7 @@ impl<'m> Recorder<'m> {
                 yaw_rad,
             },
         )?;
+        self.writer.message(self.motion, t_ns, &motion(s, t_ns))?;
         if let Some(channel) = self.phases {
             let message = rath::Phases {
                 time_s: s.t_s,
@@ -438,6 +443,36 @@ fn turn_from_x(d: [f64; 3]) -> foxglove::Quaternion {
     }
 }
 
+/// Height, roll and tilt as joints: of all messages Rerun plots this one by itself. Efforts are what the handles exert: ΣN_i, and the
+/// moments of N_i and T_i about the body's x and y through its centre of mass.
+fn motion(s: &Sample, t_ns: i64) -> JointState {
+    use nalgebra::{Quaternion, UnitQuaternion, Vector3};
+    let centre = Vector3::from(s.pose.position_m);
+    let mut force = Vector3::zeros();
+    let mut moment = Vector3::zeros();
+    for ((handle_m, normal_n), [tx, ty]) in s.handle_m.iter().zip(&s.normal_n).zip(&s.tangential_n)
+    {
+        let on_handle = Vector3::new(*tx, *ty, *normal_n);
+        force += on_handle;
+        moment += (Vector3::from(*handle_m) - centre).cross(&on_handle);
+    }
+    let [x, y, z, w] = s.pose.orientation;
+    let world_from_body = UnitQuaternion::new_normalize(Quaternion::new(w, x, y, z));
+    let moment = world_from_body.inverse_transform_vector(&moment);
+    let [roll_rad, tilt_rad, _] = s.roll_pitch_yaw_rad;
+    let [spin_x, spin_y, _] = s.pose.spin_rad_per_s;
+    JointState {
+        header: Header {
+            stamp: Time::from_ns(t_ns),
+            frame_id: String::new(),
+        },
+        name: ["height", "roll", "tilt"].map(str::to_owned).into(),
+        position: vec![s.pose.position_m[2], roll_rad, tilt_rad],
+        velocity: vec![s.pose.velocity_m_per_s[2], spin_x, spin_y],
+        effort: vec![force.z, moment.x, moment.y],
+    }
+}
+
 fn vector([x, y, z]: [f64; 3]) -> rath::Vector3 {
     rath::Vector3 { x, y, z }
 }
@@ -494,7 +529,9 @@ fn urdf(scene: &Scene) -> String {
         }
     }
     for [y, z, from, to] in poles {
-        let (middle, length) = (0.5 * (from + to), (to - from).max(0.2) + 0.4);
+        // Whole micrometres: people read this text too.
+        let whole = |x: f64| (x * 1e6).round() / 1e6;
+        let (middle, length) = (whole(0.5 * (from + to)), whole((to - from).max(0.2) + 0.4));
         let _ = writeln!(
             text,
             "    <visual><origin xyz=\"{middle} {y} {z}\" rpy=\"0 1.5707963267948966 0\"/><geometry><cylinder radius=\"0.04\" \

@@ -1,7 +1,7 @@
 //! `view`: opens a recording in the Rerun viewer, or writes what it would show.
 
 use std::fs::File;
-use std::io::{BufWriter, Read, Write};
+use std::io::{BufWriter, Chain, Cursor, Read, Stdin, Write};
 use std::net::{TcpStream, ToSocketAddrs};
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
@@ -10,7 +10,7 @@ use std::time::Duration;
 use anyhow::{Context, anyhow, bail};
 use clap::Parser;
 use recording::Finding;
-use recording::read::{ReadOptions, Recording};
+use recording::read::{ReadError, ReadOptions, Recording};
 use view::load::{Detail, load};
 use view::store::{Encoded, Sink};
 use view::take::Take;
@@ -18,7 +18,7 @@ use view::viewer::{self, Kind};
 
 /// Look at a recording in the Rerun viewer: the scene in space, phases on the circle, forces, angles, spectra and events.
 #[derive(Parser)]
-#[command(version, about)]
+#[command(version, about, after_help = help())]
 struct Arguments {
     /// The recording (MCAP), or - for one that comes through standard input and is shown while it grows
     #[arg(value_name = "FILE.mcap|-")]
@@ -36,6 +36,22 @@ struct Arguments {
 
 /// Exit code where the input was damaged and what could be saved was used.
 const DAMAGED: u8 = 3;
+
+/// What stands below the options.
+fn help() -> String {
+    format!(
+        "Examples:
+  view music.mcap                         open it in the Rerun viewer
+  view music.mcap --save music.rrd        write a file for the viewer; needs no viewer
+  view music.mcap --web                   in a browser: the viewer says the address
+  sim record music --out - | view -       watch a run while it is computed
+
+The viewer is a program of its own: {}
+
+Exit codes: 0 done; 1 it could not; 2 wrong usage; 3 done, but the input was damaged and part of it is lost.",
+        viewer::INSTALL
+    )
+}
 
 fn main() -> ExitCode {
     match run(&Arguments::parse()) {
@@ -103,23 +119,53 @@ fn name(file: &Path) -> String {
     )
 }
 
-/// Sends a recording that is complete, or one that comes through standard input as it comes.
-fn send(file: &Path, sink: &mut dyn Sink) -> anyhow::Result<Vec<Finding>> {
-    let (take, findings) = if is_stdin(file) {
-        view::live::follow(std::io::stdin(), sink)?
-    } else {
-        let recording = open(file)?;
-        let (take, findings) = load(&name(file), &recording, Detail::Thinned)?;
-        check(file, &take)?;
-        view::send(
-            sink,
-            &view::recording_id(&take.name, recording.info()),
-            &take,
-        )?;
-        (take, findings)
-    };
+/// What is to be shown, found good before anything is opened for it.
+enum Source {
+    /// Read from a file, with its id.
+    Whole(Box<Take>, String, Vec<Finding>),
+    /// Coming through standard input; its beginning has been read.
+    Growing(Chain<Cursor<Vec<u8>>, Stdin>),
+}
+
+/// Bytes by which an MCAP is known.
+const MAGIC_BYTES: u64 = 8;
+
+/// Reads a file, or the beginning of standard input.
+fn source(file: &Path) -> anyhow::Result<Source> {
+    if is_stdin(file) {
+        let mut begin = Vec::new();
+        std::io::stdin()
+            .lock()
+            .take(MAGIC_BYTES)
+            .read_to_end(&mut begin)
+            .context("standard input: cannot be read")?;
+        match Recording::from_bytes(begin.clone(), &ReadOptions::default()) {
+            Err(error @ ReadError::NotMcap { .. }) => return Err(error.into()),
+            Err(error) if begin.is_empty() => return Err(error.into()),
+            _ => {}
+        }
+        return Ok(Source::Growing(Cursor::new(begin).chain(std::io::stdin())));
+    }
+    let recording = open(file)?;
+    let (take, findings) = load(&name(file), &recording, Detail::Thinned)?;
     check(file, &take)?;
-    Ok(findings)
+    let id = view::recording_id(&take.name, recording.info());
+    Ok(Source::Whole(Box::new(take), id, findings))
+}
+
+/// Sends a recording that is complete, or one that comes through standard input as it comes.
+fn send(file: &Path, source: Source, sink: &mut dyn Sink) -> anyhow::Result<Vec<Finding>> {
+    match source {
+        Source::Whole(take, id, findings) => {
+            view::send(sink, &id, &take)?;
+            Ok(findings)
+        }
+        Source::Growing(input) => {
+            let (take, findings) = view::live::follow(input, sink)?;
+            check(file, &take)?;
+            Ok(findings)
+        }
+    }
 }
 
 /// A recording without any number has nothing to look at.
@@ -199,7 +245,7 @@ fn connect(file: &Path, url: &str) -> anyhow::Result<Vec<Finding>> {
         answering(parsed, url)?,
         re_grpc_client::write::Options::default(),
     );
-    let findings = send(file, &mut client)?;
+    let findings = send(file, source(file)?, &mut client)?;
     client
         .flush_blocking(Duration::from_secs(20))
         .map_err(|error| {
@@ -229,18 +275,24 @@ fn answering(uri: re_uri::ProxyUri, url: &str) -> anyhow::Result<re_uri::ProxyUr
 /// Starts the viewer, sends the recording into it and waits until it is closed.
 fn show(file: &Path, kind: Kind) -> anyhow::Result<Vec<Finding>> {
     if !is_stdin(file) {
-        // A file that is not there should not open a window first.
+        // What is wrong with the file is said before what is wrong with the viewer.
         File::open(file).map_err(|error| anyhow!("{}: cannot be read: {error}", file.display()))?;
     }
-    let (mut child, stdin) = viewer::start(kind)?;
+    let program = viewer::find()?;
+    // What cannot be read should not open a window first.
+    let source = source(file)?;
+    let (mut child, stdin) = viewer::start(&program, kind)?;
     let sent = Encoded::stream(BufWriter::with_capacity(1 << 16, stdin)).and_then(|mut encoded| {
-        let findings = send(file, &mut encoded)?;
+        let findings = send(file, source, &mut encoded)?;
         encoded.finish()?.flush()?;
         Ok(findings)
     });
     if sent.is_err() && child.try_wait()?.is_none() {
-        // It would wait for ever with nothing to show.
-        child.kill()?;
+        eprintln!(
+            "view: not all could be read; the viewer shows what came before, until it is closed"
+        );
+        child.wait()?;
+        return sent;
     }
     let status = child.wait()?;
     match sent {

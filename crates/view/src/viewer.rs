@@ -1,6 +1,6 @@
 //! The Rerun viewer as a program of its own: found on PATH, its version checked, fed through its standard input.
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::process::{Child, ChildStdin, Command, Stdio};
 
 use anyhow::{Context, bail};
@@ -67,10 +67,9 @@ fn compatible(version: &str) -> bool {
 /// Starts the viewer; it shows what comes through the pipe.
 ///
 /// # Errors
-/// Where the viewer is missing, of another version, or cannot be started.
-pub fn start(kind: Kind) -> anyhow::Result<(Child, ChildStdin)> {
-    let program = find()?;
-    let mut command = Command::new(&program);
+/// Where the viewer cannot be started.
+pub fn start(program: &Path, kind: Kind) -> anyhow::Result<(Child, ChildStdin)> {
+    let mut command = Command::new(program);
     // What is shown is nobody else's: only this machine may ask for it.
     command
         .args(["-", "--bind", "127.0.0.1"])

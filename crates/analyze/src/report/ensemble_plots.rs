@@ -113,7 +113,7 @@ fn distribution(
     (!p.series.is_empty()).then_some(p)
 }
 
-/// Mean of the runs' densities, and the mean plus and minus their standard deviation where that is above zero.
+/// Mean of the runs' densities and their standard deviation, both in decibels: densities differ by factors.
 fn mean_psd(
     groups: &[(String, Vec<&Analysis>)],
     role: &str,
@@ -139,7 +139,7 @@ fn mean_psd(
             let unit = super::plots::unit(&first.unit);
             let mut panel = Panel::new(id, title, "frequency, Hz", &format!("density, {unit}"));
             panel.log_y = true;
-            panel.note = "Mean over the runs of each condition; shaded: one standard deviation above and below.".into();
+            panel.note = "Mean in decibels over the runs of each condition; shaded: one standard deviation above and below.".into();
             let nyquist = first.spectrum.hz.last().copied().unwrap_or(1.0);
             panel.x_range = Some((0.0, first.f_hz.map_or(nyquist, |f| (4.0 * f).min(nyquist))));
             panel
@@ -148,12 +148,9 @@ fn mean_psd(
         let bins = (1..first.spectrum.hz.len()).filter(|b| first.spectrum.hz[*b] <= reach);
         let rows: Vec<(f64, f64, f64)> = bins
             .map(|b| {
-                let mean = same.iter().map(|s| s.spectrum.power[b]).sum::<f64>() / n;
-                let variance = same
-                    .iter()
-                    .map(|s| (s.spectrum.power[b] - mean).powi(2))
-                    .sum::<f64>()
-                    / (n - 1.0).max(1.0);
+                let db = same.iter().map(|s| 10.0 * s.spectrum.power[b].log10());
+                let mean = db.clone().sum::<f64>() / n;
+                let variance = db.map(|x| (x - mean).powi(2)).sum::<f64>() / (n - 1.0).max(1.0);
                 (first.spectrum.hz[b], mean, variance.sqrt())
             })
             .collect();
@@ -162,11 +159,12 @@ fn mean_psd(
             colour: k % COLOURS.len(),
             ..Series::default()
         };
-        for (hz, mean, sd) in rows.into_iter().filter(|(_, mean, _)| *mean > 0.0) {
+        let density = |db: f64| 10f64.powf(0.1 * db);
+        for (hz, mean, sd) in rows.into_iter().filter(|(_, mean, _)| mean.is_finite()) {
             line.x.push(hz);
-            line.y.push(mean);
+            line.y.push(density(mean));
             if same.len() > 1 {
-                line.spread.push((mean - sd, mean + sd));
+                line.spread.push((density(mean - sd), density(mean + sd)));
             }
         }
         panel.series.push(line);

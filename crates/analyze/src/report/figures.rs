@@ -99,11 +99,9 @@ fn still(p: &Panel) -> Panel {
         let db = |x: f64| 10.0 * x.max(f64::MIN_POSITIVE).log10();
         for s in &mut p.series {
             s.y.iter_mut().for_each(|y| *y = db(*y));
-            // A spread may reach zero: it is then drawn to the lowest mean.
-            let lowest = s.y.iter().copied().fold(f64::INFINITY, f64::min);
             s.spread
                 .iter_mut()
-                .for_each(|(low, high)| (*low, *high) = (db(*low).max(lowest), db(*high)));
+                .for_each(|(low, high)| (*low, *high) = (db(*low), db(*high)));
         }
         p.y_label = p.y_label.replacen(", ", ", dB re 1 ", 1);
         p.log_y = false;
@@ -138,10 +136,15 @@ fn panel(p: &Panel) -> Scene {
     if x1 <= x0 {
         (x0, x1) = (x0 - 1.0, x0 + 1.0);
     }
-    let room = 0.06 * (y1 - y0);
-    let (low, high) = (y0 - room, y1 + room);
-    let range = (low, high);
     let several = p.series.len() > 1;
+    let names = names(&p.marks, (x0, x1), several);
+    // The names of marks stand above all curves.
+    let rows = names.iter().map(|(.., row)| row + 1).max().unwrap_or(0);
+    let room = 0.06 * (y1 - y0);
+    let range = (
+        y0 - room,
+        y1 + room.max(ROW * rows as f64 / (1.0 - ROW * rows as f64) * (y1 - y0 + room)),
+    );
     let marks: Vec<Mark> = p
         .series
         .iter()
@@ -203,8 +206,8 @@ fn panel(p: &Panel) -> Scene {
         );
         layout = layout.with_annotation(note(
             name,
-            x0 + 0.09 * (x1 - x0),
-            a + 0.04 * (range.1 - range.0),
+            x1 - 0.07 * (x1 - x0),
+            a + 0.02 * (range.1 - range.0),
         ));
     }
     for (y, name) in &p.levels {
@@ -214,27 +217,51 @@ fn panel(p: &Panel) -> Scene {
                 .with_label(name.clone()),
         );
     }
-    for (k, (x, name)) in p
-        .marks
-        .iter()
-        .filter(|(x, _)| (x0..=x1).contains(x))
-        .enumerate()
-    {
+    for (name, x, at, row) in names {
         layout = layout.with_reference_line(
-            ReferenceLine::vertical(*x)
+            ReferenceLine::vertical(x)
                 .with_color(GREY)
                 .with_dasharray("2 3"),
         );
-        // Names of neighbours at different heights.
-        let up = 1.0 - 0.05 * (1 + k % 4) as f64;
-        let y = low + up * (high - low);
-        layout = layout.with_annotation(note(
-            name,
-            (x + 0.035 * (x1 - x0)).min(x1 - 0.035 * (x1 - x0)),
-            y,
-        ));
+        let y = range.1 - (row as f64 + 0.8) * ROW * (range.1 - range.0);
+        layout = layout.with_annotation(note(name, at, y));
     }
     render_multiple(marks, layout)
+}
+
+/// Height of a line of names, as a share of the drawing's.
+const ROW: f64 = 0.055;
+/// Width of a character of a name, in the units of the SVG.
+const CHARACTER: f64 = 6.2;
+/// Width of the drawing, without and with a legend beside it.
+const DRAWING: [f64; 2] = [830.0, 710.0];
+
+/// Marks inside the range: name, place, middle of the name and its line from the top, so that no name touches the one before.
+fn names(
+    marks: &[(f64, String)],
+    (x0, x1): (f64, f64),
+    legend: bool,
+) -> Vec<(&str, f64, f64, usize)> {
+    let unit = (x1 - x0) / DRAWING[usize::from(legend)];
+    let mut ends: Vec<f64> = Vec::new();
+    let mut out = Vec::new();
+    for (x, name) in marks.iter().filter(|(x, _)| (x0..=x1).contains(x)) {
+        let width = CHARACTER * name.chars().count() as f64 * unit;
+        // To the right of its line; to the left where that would leave the drawing.
+        let right = x + 5.0 * unit + width <= x1;
+        let from = if right {
+            x + 5.0 * unit
+        } else {
+            x - 5.0 * unit - width
+        };
+        let row = (ends.iter().position(|end| *end < from)).unwrap_or(ends.len());
+        if row == ends.len() {
+            ends.push(0.0);
+        }
+        ends[row] = from + width;
+        out.push((name.as_str(), *x, from + 0.5 * width, row));
+    }
+    out
 }
 
 /// The range of no values.
@@ -273,12 +300,12 @@ fn image(i: &Image) -> Scene {
         .with_color_map(ColorMap::Cividis)
         .with_x_range(i.x_range.0, i.x_range.1)
         .with_y_range(i.y_range.0, i.y_range.1)
-        .with_cell_size(1.0)
-        .with_legend(i.value_label.clone());
+        .with_cell_size(1.0);
     let marks: Vec<Mark> = vec![map.into()];
     let layout = look(
         Layout::auto_from_plots(&marks)
-            .with_title(i.title.clone())
+            // The library's scale of colours has no name of its own.
+            .with_title(format!("{}, {}", i.title, i.value_label))
             .with_x_label("time, s")
             .with_y_label(i.y_label.clone()),
     )

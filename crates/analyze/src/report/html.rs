@@ -150,7 +150,7 @@ fn figures_section(out: &mut String, plots: &[Plot]) {
         return;
     }
     out.push_str(
-        "<h2 id=\"plots\">Plots</h2>\n<p class=\"faint\">Drag to zoom (time axes move together), double-click to see all, \
+        "<h2 id=\"plots\">Plots</h2>\n<p class=\"faint hint\">Drag to zoom (time axes move together), double-click to see all, \
          shift + wheel or + and − to zoom, point to read values. <button id=\"reset\" type=\"button\">Show all</button></p>\n<div class=\"plots\">\n",
     );
     for (k, plot) in plots.iter().enumerate() {
@@ -182,7 +182,7 @@ fn metrics_section(out: &mut String, a: &Analysis) {
         };
         let mut more = format!(
             "<p>{}</p><p class=\"faint\">Definition from: {}. Name: <code>{name}</code>.</p>",
-            escaped(metric.definition),
+            with_code(metric.definition),
             escaped(metric.origin)
         );
         if let Some(reason) = &value.reason {
@@ -300,7 +300,7 @@ fn recording_section(out: &mut String, a: &Analysis) {
             ""
         }
     );
-    out.push_str("<div class=\"scroll\"><table><thead><tr><th>topic</th><th>schema</th><th>encoding</th><th class=\"n\">messages</th><th class=\"n\">Hz</th></tr></thead><tbody>\n");
+    out.push_str("<div class=\"scroll\"><table class=\"topics\"><thead><tr><th>topic</th><th>schema</th><th>encoding</th><th class=\"n\">messages</th><th class=\"n\">Hz</th></tr></thead><tbody>\n");
     for t in a.topics.iter().take(500) {
         let _ = writeln!(
             out,
@@ -429,9 +429,27 @@ fn escaped(text: &str) -> String {
         .replace('"', "&quot;")
 }
 
+/// The same, with what stands between backticks as code.
+fn with_code(text: &str) -> String {
+    let mut out = String::new();
+    for (k, part) in text.split('`').enumerate() {
+        let part = escaped(part);
+        match k % 2 {
+            0 => out += &part,
+            _ => out += &format!("<code>{part}</code>"),
+        }
+    }
+    out
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn backticks_become_code() {
+        assert_eq!(with_code("`per` <i>"), "<code>per</code> &lt;i&gt;");
+    }
 
     #[test]
     fn names_cannot_become_markup() {

@@ -3,9 +3,11 @@
 (() => {
   const data = JSON.parse(document.getElementById("data").textContent);
   const SVG = "http://www.w3.org/2000/svg";
-  const pad = { left: 62, right: 12, top: 18, bottom: 38 };
+  const pad = { left: 70, right: 12, top: 18, bottom: 38 };
+  const paper = { w: 700, h: 230 }; // of a plot in print: three fit on a page
   const plots = [];
   let shared = null; // the time range that all time axes show, or null for all of it
+  let printing = false;
 
   const el = (parent, name, attrs, text) => {
     const e = document.createElementNS(SVG, name);
@@ -20,6 +22,7 @@
     if (a >= 1e5 || a < 1e-3) return x.toExponential(2).replace(/\.?0+e/, "e").replace("e+", "e");
     return String(Number(x.toPrecision(4)));
   };
+  const power = k => Math.abs(k) < 3 ? short(Math.pow(10, k)) : "10" + String(k).replace(/[-\d]/g, c => "⁻⁰¹²³⁴⁵⁶⁷⁸⁹"["-0123456789".indexOf(c)]);
   // Ticks at 1, 2 or 5 times a power of ten.
   const ticks = (lo, hi, n) => {
     const raw = (hi - lo) / n, p = Math.pow(10, Math.floor(Math.log10(raw)));
@@ -75,7 +78,7 @@
     }
 
     draw() {
-      const spec = this.spec, svg = this.svg, w = Math.max(240, this.figure.clientWidth), h = Math.round(Math.min(300, Math.max(200, w * 0.45)));
+      const spec = this.spec, svg = this.svg, w = printing ? paper.w : Math.max(240, this.figure.clientWidth), h = printing ? paper.h : Math.round(Math.min(300, Math.max(200, w * 0.45)));
       svg.replaceChildren();
       svg.setAttribute("viewBox", `0 0 ${w} ${h}`);
       svg.setAttribute("height", h);
@@ -96,16 +99,16 @@
       for (const t of log ? decades(y0, y1) : ticks(y0, y1, 5)) {
         const y = log ? sy(Math.pow(10, t)) : sy(t);
         el(svg, "line", { class: "grid", x1: left, x2: right, y1: y, y2: y });
-        el(svg, "text", { x: left - 6, y: y + 4, "text-anchor": "end" }, log ? short(Math.pow(10, t)) : short(t));
+        el(svg, "text", { x: left - 6, y: y + 4, "text-anchor": "end" }, log ? power(t) : short(t));
       }
       if (spec.image) this.paint(); else svg.appendChild(inside);
       el(svg, "text", { x: (left + right) / 2, y: h - 5, "text-anchor": "middle" }, spec.x_label);
-      el(svg, "text", { x: 0, y: 0, "text-anchor": "middle", transform: `translate(13 ${(top + bottom) / 2}) rotate(-90)` }, spec.y_label);
-      for (const [v, name] of spec.levels) {
+      el(svg, "text", { x: 0, y: 0, "text-anchor": "middle", transform: `translate(12 ${(top + bottom) / 2}) rotate(-90)` }, spec.y_label);
+      for (const [v] of spec.levels) {
         el(inside, "line", { class: "level", x1: left, x2: right, y1: sy(v), y2: sy(v) });
-        el(inside, "text", { class: "note", x: right - 4, y: sy(v) - 4, "text-anchor": "end" }, name);
       }
       spec.series.forEach((s, k) => { if (!this.hidden.has(k)) this.curve(inside, s, k, x0, x1); });
+      for (const [v, name] of spec.levels) el(inside, "text", { class: "note", x: right - 4, y: sy(v) - 4, "text-anchor": "end" }, name);
       let free = -1e9, row = 0; // where the last name ends
       for (const [v, name] of spec.marks) {
         if (v < x0 || v > x1) continue;
@@ -163,6 +166,13 @@
     names(at) { // the legend, with values where the pointer is
       if (!this.legend) return;
       this.legend.replaceChildren();
+      if (this.spec.image) {
+        const key = document.createElement("span"), bar = document.createElement("i"), [lo, hi] = this.spec.value_range;
+        bar.className = "map";
+        bar.style.background = `linear-gradient(90deg, ${data.map.map(c => `rgb(${c})`)})`;
+        key.append(`${Math.round(lo)}`, bar, `${Math.round(hi)} ${this.spec.value_label}`);
+        this.legend.append(key);
+      }
       this.spec.series.forEach((s, k) => {
         const item = document.createElement("span"), swatch = document.createElement("i");
         swatch.style.background = data.colours[s.colour % data.colours.length];
@@ -250,7 +260,11 @@
   redraw();
   let width = document.body.clientWidth;
   new ResizeObserver(() => { if (document.body.clientWidth !== width) { width = document.body.clientWidth; redraw(); } }).observe(document.body);
-  window.addEventListener("beforeprint", redraw);
+  // Paper has a width of its own, and nobody opens on it what is closed.
+  const closed = () => document.querySelectorAll(".metrics details:not([open])");
+  let opened = [];
+  window.addEventListener("beforeprint", () => { printing = true; redraw(); opened = [...closed()]; opened.forEach(d => { d.open = true; }); });
+  window.addEventListener("afterprint", () => { printing = false; redraw(); opened.forEach(d => { d.open = false; }); });
   const reset = document.getElementById("reset");
   if (reset) reset.onclick = () => { shared = null; plots.forEach(p => { p.range = null; p.hidden.clear(); }); redraw(); };
   document.body.dataset.ready = "yes";

@@ -156,14 +156,26 @@ pub fn plots(a: &Analysis) -> Vec<Plot> {
     };
     let degrees = |x: &[f64]| x.iter().map(|x| x.to_degrees()).collect::<Vec<_>>();
 
-    let mut roll = Panel::over_time("roll", "Roll and tilt", "angle, deg", a);
+    let imu = |source: &str| {
+        if source == "imu" {
+            ", estimated from the IMU"
+        } else {
+            ""
+        }
+    };
+    let title = format!("Roll and tilt{}", imu(&i.sources.attitude));
+    let mut roll = Panel::over_time("roll", &title, "angle, deg", a);
     roll.note = "Roll turns about the pole, tilt lifts its nose. The shaded stretch is the analysis window.".into();
     roll.line("roll", &i.t_s, &degrees(&i.roll_rad));
     roll.line("tilt", &i.t_s, &degrees(&i.pitch_rad));
     roll.marks = marks(a);
     panel(roll);
 
-    let mut height = Panel::over_time("height", "Height of the centre of mass", "height, m", a);
+    let title = match imu(&i.sources.height) {
+        "" => "Height of the centre of mass".to_owned(),
+        from => format!("Height about its mean{from}"),
+    };
+    let mut height = Panel::over_time("height", &title, "height, m", a);
     height.line("height", &i.t_s, &i.height_m);
     height.marks = marks(a);
     panel(height);
@@ -175,7 +187,8 @@ pub fn plots(a: &Analysis) -> Vec<Plot> {
     }
     panel(forces);
 
-    let mut support = Panel::over_time("support", "Support over weight", "N_tot / (M g)", a);
+    let title = format!("Support over weight{}", imu(&i.sources.forces));
+    let mut support = Panel::over_time("support", &title, "N_tot / (M g)", a);
     support.note = "Below the dashed line at 0.05 nobody holds it: that is T_float.".into();
     match i.mass_kg {
         Some(mass_kg) if !i.normal_n.is_empty() => {
@@ -185,6 +198,7 @@ pub fn plots(a: &Analysis) -> Vec<Plot> {
         }
         _ => support.line("specific force", &i.t_s, &i.support_ratio),
     }
+    support.last_s = Some(LAST_S);
     support.levels = vec![
         (crate::metrics::FLOAT_SHARE, "0.05".into()),
         (1.0, "at rest".into()),
@@ -257,12 +271,13 @@ fn marks(a: &Analysis) -> Vec<(f64, String)> {
         .collect()
 }
 
-/// A plot of energies: id, title, note, and the fields of the ledger with their names.
+/// A plot of energies: id, title, note, the fields of the ledger with their names, and what [`Panel::last_s`] says.
 type Energies = (
     &'static str,
     &'static str,
     &'static str,
     [(&'static str, &'static str); 3],
+    Option<f64>,
 );
 
 /// What is stored and what went in and out are of different size: a plot each.
@@ -276,6 +291,7 @@ const ENERGIES: [Energies; 2] = [
             ("potential_j", "potential"),
             ("elastic_j", "elastic"),
         ],
+        Some(LAST_S),
     ),
     (
         "ledger",
@@ -286,23 +302,25 @@ const ENERGIES: [Energies; 2] = [
             ("dissipated_j", "dissipated"),
             ("unexplained_j", "unexplained"),
         ],
+        None,
     ),
 ];
 
-fn energies(a: &Analysis, (id, title, note, fields): &Energies) -> Option<Panel> {
+fn energies(a: &Analysis, &(id, title, note, fields, last_s): &Energies) -> Option<Panel> {
     let trace = a.traces.iter().find(|t| t.topic == topics::ENERGY)?;
     let mut p = Panel::over_time(id, title, "energy, J", a);
-    p.note = (*note).into();
+    p.note = note.into();
+    p.last_s = last_s;
     for (field, name) in fields {
-        let Some((_, t_s, j)) = trace.series.iter().find(|(known, ..)| known == field) else {
+        let Some((_, t_s, j)) = trace.series.iter().find(|(known, ..)| *known == field) else {
             continue;
         };
-        let mean_j = match *field {
+        let mean_j = match field {
             "potential_j" => j.iter().sum::<f64>() / j.len().max(1) as f64,
             _ => 0.0,
         };
         let about: Vec<f64> = j.iter().map(|j| j - mean_j).collect();
-        p.line(*name, t_s, &about);
+        p.line(name, t_s, &about);
     }
     Some(p)
 }

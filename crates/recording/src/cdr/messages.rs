@@ -215,6 +215,38 @@ impl Cdr for MagneticField {
     }
 }
 
+/// `sensor_msgs/msg/JointState`: one value of each list for every joint; m and N where it slides, rad and N·m where it turns.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct JointState {
+    /// Stamp.
+    pub header: Header,
+    /// Names of the joints.
+    pub name: Vec<String>,
+    /// Positions, m or rad.
+    pub position: Vec<f64>,
+    /// Velocities, m/s or rad/s.
+    pub velocity: Vec<f64>,
+    /// Forces or moments, N or N·m.
+    pub effort: Vec<f64>,
+}
+
+impl Cdr for JointState {
+    fn cdr(&self, out: &mut Encoder<'_>) {
+        self.header.cdr(out);
+        // OK because sequences of 4 billion are refused by the writer's limit on messages.
+        out.u32(self.name.len() as u32);
+        for name in &self.name {
+            out.string(name);
+        }
+        for list in [&self.position, &self.velocity, &self.effort] {
+            out.u32(list.len() as u32);
+            for &value in list {
+                out.f64(value);
+            }
+        }
+    }
+}
+
 /// `geometry_msgs/msg/PoseStamped`.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct PoseStamped {

@@ -4,8 +4,8 @@ pub mod definition;
 mod messages;
 
 pub use messages::{
-    Float64, Header, Imu, Log, MagneticField, PoseStamped, Quaternion, StringMessage, TfMessage,
-    Time, Transform, TransformStamped, Vector3,
+    Float64, Header, Imu, JointState, Log, MagneticField, PoseStamped, Quaternion, StringMessage,
+    TfMessage, Time, Transform, TransformStamped, Vector3,
 };
 
 /// Appends values in CDR: primitives aligned to their own size, counted from after the four header bytes.

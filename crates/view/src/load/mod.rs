@@ -1,0 +1,210 @@
+//! From a recording to a [`Take`]: which signal is drawn as what.
+//!
+//! What metrics are made of comes from `analyze`, whole; the pose, the carriers and the ledger are collected; everything else streams
+//! through once and is thinned on the way, so that an hour of ten sensors fits into memory.
+
+mod scene;
+mod sensor;
+mod stream;
+
+use std::collections::BTreeMap;
+
+use analyze::examine::{Request, examine};
+use recording::read::{Info, ReadError, Recording};
+use recording::signal::Signal;
+use recording::{Finding, topics};
+
+use crate::take::Take;
+
+/// More messages than this are streamed only: metrics need whole columns in memory.
+const MAX_EXAMINED: u64 = 3_000_000;
+
+/// Whether curves may be made coarser.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Detail {
+    /// Curves with very many samples keep the extremes of short intervals.
+    Thinned,
+    /// Everything, for recordings that are still growing.
+    Whole,
+}
+
+/// Reads what there is to draw. Returns what the reader found odd beside it.
+pub fn load(
+    name: &str,
+    recording: &Recording,
+    detail: Detail,
+) -> Result<(Take, Vec<Finding>), ReadError> {
+    let info = recording.info();
+    let mut take = Take {
+        name: name.to_owned(),
+        start_ns: info.start_ns,
+        end_ns: info.end_ns,
+        growing: detail == Detail::Whole,
+        ..Take::default()
+    };
+    name_of_scene(&mut take, info);
+    let whole = info.messages <= MAX_EXAMINED;
+    let plan = Plan::new(info, whole);
+    let mut findings = Vec::new();
+    if whole {
+        examined(&mut take, recording)?;
+    } else {
+        take.notes.push(format!(
+            "{} messages: curves and spectra only, no metrics.",
+            info.messages
+        ));
+    }
+    if !plan.ours.is_empty() {
+        let (signals, found) = recording.signals(&|path| plan.is_whole(path))?;
+        findings = found;
+        let signals: BTreeMap<&str, &Signal> =
+            signals.iter().map(|s| (s.path.as_str(), s)).collect();
+        take.pose = scene::pose(&signals);
+        take.carriers = scene::carriers(&signals);
+        take.energy = scene::energy(&signals);
+        take.shape = scene::shape(recording, &take);
+    }
+    stream::others(&mut take, recording, &plan, detail, &mut findings)?;
+    Ok((take, findings))
+}
+
+/// Metrics, events, remarks and the columns behind them, as `analyze` finds them.
+fn examined(take: &mut Take, recording: &Recording) -> Result<(), ReadError> {
+    // No list of signals is asked for: no topic has the empty name. (To name no signal would switch the estimates off.)
+    let request = Request {
+        topics: vec![String::new()],
+        ..Request::default()
+    };
+    let analysis = examine(&take.name, recording, &request)?;
+    // OK because the seconds came from nanoseconds of this recording.
+    let at = |t_s: &[f64]| {
+        t_s.iter()
+            .map(|t| take.start_ns.saturating_add((t * 1e9).round() as i64))
+            .collect::<Vec<i64>>()
+    };
+    take.state_ns = at(&analysis.inputs.t_s);
+    take.force_ns = at(analysis.inputs.force_times());
+    take.phase_ns = at(analysis.inputs.phase_times());
+    take.window = analysis.window;
+    take.metrics = analysis.metrics;
+    let imu = analysis.roles.into_iter().find(|(role, _)| *role == "imu");
+    take.main_imu = imu.and_then(|(_, topics)| topics.into_iter().next());
+    take.events = analysis.events;
+    take.remarks = analysis
+        .quality
+        .iter()
+        .filter(|q| q.kind != "gap")
+        .map(|q| (q.t_s, remark(&q.topic, &q.text)))
+        .collect();
+    take.notes.extend(analysis.warnings);
+    take.inputs = analysis.inputs;
+    Ok(())
+}
+
+fn remark(topic: &str, text: &str) -> String {
+    if topic.is_empty() {
+        text.to_owned()
+    } else {
+        format!("{topic}: {text}")
+    }
+}
+
+/// Which topics are read how.
+struct Plan<'a> {
+    /// Topics of our own schemas, which have drawings of their own.
+    ours: Vec<&'a str>,
+    imus: Vec<&'a str>,
+}
+
+impl<'a> Plan<'a> {
+    fn new(info: &'a Info, whole: bool) -> Self {
+        let of = |schemas: &[&str]| -> Vec<&'a str> {
+            let fits = |schema: &str| schemas.contains(&schema.replacen("/msg/", "/", 1).as_str());
+            let mut topics: Vec<&str> = info
+                .channels
+                .iter()
+                .filter(|c| c.messages > 0 && fits(&c.schema))
+                .map(|c| c.topic.as_str())
+                .collect();
+            topics.sort_unstable();
+            topics.dedup();
+            topics
+        };
+        let schemas = [
+            "rath.State",
+            "rath.Phases",
+            "rath.HandleForces",
+            "rath.Energy",
+            "rath.Beat",
+            "foxglove.SceneUpdate",
+            "tf2_msgs/TFMessage",
+            "foxglove.FrameTransform",
+            "foxglove.FrameTransforms",
+        ];
+        let mut ours = of(&schemas);
+        // The state says the same.
+        ours.extend(
+            info.channels
+                .iter()
+                .map(|c| c.topic.as_str())
+                .filter(|t| *t == topics::MOTION),
+        );
+        Plan {
+            ours: if whole { ours } else { Vec::new() },
+            imus: of(&["sensor_msgs/Imu"]),
+        }
+    }
+
+    fn is_ours(&self, topic: &str) -> bool {
+        self.ours.contains(&topic)
+    }
+
+    /// Collected whole: the pose, the carriers' frames and the ledger.
+    fn is_whole(&self, path: &str) -> bool {
+        let pose = ["position_m", "orientation"]
+            .iter()
+            .any(|f| within(path, topics::STATE, f));
+        pose || within(path, topics::ENERGY, "")
+            || (within(path, topics::TF, "") && path.contains(".transform.translation."))
+    }
+
+    /// Streamed and thinned: sensors and everything that is not ours.
+    fn is_streamed(&self, path: &str) -> bool {
+        !self.ours.iter().any(|topic| within(path, topic, "")) && is_measurement(path)
+    }
+}
+
+/// Whether a path is `TOPIC.FIELD…`. A topic may have dots of its own, so it is never cut out of a path.
+fn within(path: &str, topic: &str, field: &str) -> bool {
+    path.strip_prefix(topic)
+        .and_then(|rest| rest.strip_prefix('.'))
+        .is_some_and(|rest| rest.starts_with(field))
+}
+
+/// Stamps, covariances and status fields are no curves that anybody wants to see.
+fn is_measurement(path: &str) -> bool {
+    ![
+        "covariance",
+        ".stamp.",
+        ".header.",
+        ".seq",
+        ".sec",
+        ".nanosec",
+    ]
+    .iter()
+    .any(|word| path.contains(word))
+}
+
+/// The scene's name and seed, where the recording says them.
+fn name_of_scene(take: &mut Take, info: &Info) {
+    let Some(meta) = info.metadata.get("rath") else {
+        return;
+    };
+    if let Some(scene) = meta.get("scene") {
+        let seed = meta
+            .get("seed")
+            .map(|seed| format!(", seed {seed}"))
+            .unwrap_or_default();
+        take.name = format!("{scene}{seed}");
+    }
+}

@@ -1,0 +1,162 @@
+//! The things of the scene, out of signals that were collected whole: body, carriers, handles, ledger.
+
+use std::collections::BTreeMap;
+
+use recording::read::Recording;
+use recording::signal::Signal;
+use recording::topics;
+
+use crate::take::{Carriers, Ledger, Pose, Shape, Take};
+
+/// Height of the handles above the centre of mass where the recording does not say, m (the archive's rath).
+const HANDLE_HEIGHT_M: f64 = 0.1;
+/// The box that stands for the body, m, as in the recording's own URDF.
+const BOX_M: [f64; 3] = [0.7, 0.5, 0.6];
+
+/// Signals in a row, `NAME[0]`, `NAME[1]`, … as far as they have the times of the first.
+fn numbered<'s>(signals: &BTreeMap<&str, &'s Signal>, pattern: &str) -> Vec<&'s Signal> {
+    let mut out: Vec<&Signal> = Vec::new();
+    while let Some(signal) = signals.get(
+        pattern
+            .replacen("[*]", &format!("[{}]", out.len()), 1)
+            .as_str(),
+    ) {
+        if out
+            .first()
+            .is_some_and(|first| first.times_ns != signal.times_ns)
+        {
+            break;
+        }
+        out.push(signal);
+    }
+    out
+}
+
+/// Where the body is, on the times of the state.
+pub fn pose(signals: &BTreeMap<&str, &Signal>) -> Option<Pose> {
+    let parts = |field: &str, names: &[&str]| -> Option<Vec<&Signal>> {
+        let path = |name: &&str| format!("{}.{field}.{name}", topics::STATE);
+        names
+            .iter()
+            .map(|n| signals.get(path(n).as_str()).copied())
+            .collect()
+    };
+    let p = parts("position_m", &["x", "y", "z"])?;
+    let q = parts("orientation", &["x", "y", "z", "w"])?;
+    let times = &p[0].times_ns;
+    if p.iter().chain(&q).any(|s| s.times_ns != *times) {
+        return None;
+    }
+    Some(Pose {
+        times_ns: times.to_vec(),
+        position_m: (0..times.len())
+            .map(|k| [0, 1, 2].map(|i| p[i].values[k]))
+            .collect(),
+        orientation: (0..times.len())
+            .map(|k| [0, 1, 2, 3].map(|i| q[i].values[k]))
+            .collect(),
+    })
+}
+
+/// The carriers' frames in `/tf`: the first transform is the body's, the others are theirs.
+pub fn carriers(signals: &BTreeMap<&str, &Signal>) -> Option<Carriers> {
+    let axis = |name: &str| {
+        numbered(
+            signals,
+            &format!("{}.transforms[*].transform.translation.{name}", topics::TF),
+        )
+    };
+    let axes = ["x", "y", "z"].map(axis);
+    let count = axes.iter().map(Vec::len).min()?;
+    if count < 2 {
+        return None;
+    }
+    let times_ns = axes[0][0].times_ns.to_vec();
+    let points_m = (1..count)
+        .map(|i| {
+            (0..times_ns.len())
+                .map(|k| [0, 1, 2].map(|a| axes[a][i].values[k]))
+                .collect()
+        })
+        .collect();
+    Some(Carriers { times_ns, points_m })
+}
+
+/// Handles as the attached scene gives them; otherwise where the carriers are beside the body, at the middle of what they do.
+pub fn shape(recording: &Recording, take: &Take) -> Shape {
+    let from_scene = || -> Option<Vec<[f64; 3]>> {
+        let text = String::from_utf8(recording.attachment("scene.toml")?).ok()?;
+        let scene: toml::Table = text.parse().ok()?;
+        let handles = scene.get("carriers")?.get("handles_m")?.as_array()?;
+        let number = |v: &toml::Value| v.as_float().or_else(|| v.as_integer().map(|i| i as f64));
+        handles
+            .iter()
+            .map(|h| {
+                let h = h.as_array()?;
+                (h.len() == 3).then_some(())?;
+                Some([number(&h[0])?, number(&h[1])?, number(&h[2])?])
+            })
+            .collect()
+    };
+    let beside = || -> Option<Vec<[f64; 3]>> {
+        let (carriers, pose) = (take.carriers.as_ref()?, take.pose.as_ref()?);
+        if carriers.times_ns != pose.times_ns {
+            return None;
+        }
+        let middle = |mut x: Vec<f64>| -> f64 {
+            x.retain(|x| x.is_finite());
+            x.sort_by(f64::total_cmp);
+            x.get(x.len() / 2).copied().unwrap_or(0.0)
+        };
+        let offset = |points: &Vec<[f64; 3]>, axis: usize| {
+            middle(
+                points
+                    .iter()
+                    .zip(&pose.position_m)
+                    .map(|(c, p)| c[axis] - p[axis])
+                    .collect(),
+            )
+        };
+        let round = |x: f64| (x * 100.0).round() / 100.0;
+        Some(
+            carriers
+                .points_m
+                .iter()
+                .map(|c| [round(offset(c, 0)), round(offset(c, 1)), HANDLE_HEIGHT_M])
+                .collect(),
+        )
+    };
+    Shape {
+        handles_m: from_scene().or_else(beside).unwrap_or_default(),
+        box_m: BOX_M,
+    }
+}
+
+/// The ledger; the potential, whose zero is arbitrary, is counted from its mean.
+pub fn energy(signals: &BTreeMap<&str, &Signal>) -> Option<Ledger> {
+    const COLUMNS: [(&str, &str); 6] = [
+        ("kinetic", "kinetic_j"),
+        ("potential about its mean", "potential_j"),
+        ("elastic", "elastic_j"),
+        ("work in", "work_in_j"),
+        ("dissipated", "dissipated_j"),
+        ("unexplained", "unexplained_j"),
+    ];
+    let mut ledger = Ledger::default();
+    for (name, field) in COLUMNS {
+        let Some(signal) = signals.get(format!("{}.{field}", topics::ENERGY).as_str()) else {
+            continue;
+        };
+        if ledger.times_ns.is_empty() {
+            ledger.times_ns = signal.times_ns.to_vec();
+        }
+        if signal.times_ns[..] == ledger.times_ns[..] {
+            let mean = || signal.values.iter().sum::<f64>() / signal.values.len().max(1) as f64;
+            let from = if field == "potential_j" { mean() } else { 0.0 };
+            ledger
+                .columns
+                .push((name, signal.values.iter().map(|j| j - from).collect()));
+        }
+    }
+    (!ledger.columns.is_empty()).then_some(ledger)
+}

@@ -1,0 +1,161 @@
+//! Everything that is drawn as curves of its own, sensors and topics that are not ours: read once and thinned on the way.
+
+use std::collections::BTreeMap;
+
+use recording::Finding;
+use recording::read::{Batch, ReadError, Recording};
+use recording::signal::unit_of;
+
+use super::{Detail, Plan, sensor};
+use crate::take::{Curve, Sensor, Take, Topic};
+use crate::thin::Thin;
+
+/// Points that all thinned curves together may have: what a viewer draws with ease.
+const POINTS: u64 = 1_200_000;
+/// Points that a curve has at least, however many there are.
+const MIN_POINTS: u64 = 4_000;
+/// Curves of one topic that are drawn; more would be no picture.
+const MAX_CURVES: usize = 24;
+/// Topics that are neither ours nor sensors and get a view of their own.
+const MAX_TOPICS: usize = 12;
+
+/// Sensors and all topics that are not ours, in one pass.
+pub fn others(
+    take: &mut Take,
+    recording: &Recording,
+    plan: &Plan<'_>,
+    detail: Detail,
+    findings: &mut Vec<Finding>,
+) -> Result<(), ReadError> {
+    let info = recording.info();
+    let messages: BTreeMap<&str, u64> = info
+        .channels
+        .iter()
+        .map(|c| (c.topic.as_str(), c.messages))
+        .collect();
+    let curves = 8 * plan.imus.len() as u64
+        + info
+            .channels
+            .iter()
+            .filter(|c| !plan.is_ours(&c.topic) && !plan.imus.contains(&c.topic.as_str()))
+            .count() as u64
+            * 6;
+    if curves == 0 {
+        return Ok(());
+    }
+    let points = match detail {
+        Detail::Thinned => (POINTS / curves).max(MIN_POINTS),
+        Detail::Whole => u64::MAX,
+    };
+    let (start_ns, end_ns) = (info.start_ns, info.end_ns);
+    let span_s = take.duration_s();
+    let mut coarsest_ns = 0;
+    let mut thin = |name: &str, topic: &str| {
+        let thin = Thin::new(
+            name,
+            start_ns,
+            end_ns,
+            messages.get(topic).copied().unwrap_or(0),
+            points,
+        );
+        coarsest_ns = coarsest_ns.max(thin.interval_ns());
+        thin
+    };
+    let mut sensors: BTreeMap<&str, sensor::Stream> = BTreeMap::new();
+    for topic in &plan.imus {
+        let count = messages.get(topic).copied().unwrap_or(0);
+        if count < 2 || span_s <= 0.0 {
+            continue;
+        }
+        let rate_hz = (count - 1) as f64 / span_s;
+        sensors.insert(
+            topic,
+            sensor::Stream::new(rate_hz, |name| thin(name, topic)),
+        );
+    }
+    let mut plain: BTreeMap<String, Vec<(String, String, Thin)>> = BTreeMap::new();
+    // The second pass looks at other fields of the same file: what is odd about it was said in the first.
+    let more = recording.stream(&|path| plan.is_streamed(path), &mut |batch: &Batch<'_>| {
+        if let Some(sensor) = sensors.get_mut(batch.topic) {
+            sensor.push(batch);
+            return;
+        }
+        let known = plain.len();
+        let Some(topic) = (match plain.contains_key(batch.topic) {
+            true => plain.get_mut(batch.topic),
+            false if known < MAX_TOPICS => Some(plain.entry(batch.topic.to_owned()).or_default()),
+            false => None,
+        }) else {
+            return;
+        };
+        for column in batch.columns {
+            let field = column
+                .path
+                .strip_prefix(batch.topic)
+                .unwrap_or(column.path)
+                .trim_start_matches('.');
+            let at = match topic.iter().position(|(name, ..)| name == field) {
+                Some(at) => at,
+                None if topic.len() < MAX_CURVES => {
+                    let unit = unit_of(batch.schema, field).to_owned();
+                    topic.push((field.to_owned(), unit, thin(field, batch.topic)));
+                    topic.len() - 1
+                }
+                None => continue,
+            };
+            push(&mut topic[at].2, batch.times_ns, column.rows, column.values);
+        }
+    })?;
+    for finding in more {
+        if !findings.contains(&finding) {
+            findings.push(finding);
+        }
+    }
+    take.imus = sensors
+        .into_iter()
+        .map(|(topic, sensor)| sensor.finish(topic))
+        .filter(Sensor::has_any)
+        .collect();
+    // The load's own sensor comes first.
+    take.imus
+        .sort_by_key(|sensor| Some(&sensor.topic) != take.main_imu.as_ref());
+    take.topics = plain
+        .into_iter()
+        .map(|(name, curves)| topic(name, curves))
+        .filter(|t| !t.plots.is_empty())
+        .collect();
+    if coarsest_ns > 0 {
+        take.notes.push(format!(
+            "Curves with many samples show the smallest and the largest value of every {:.3} s at their own times.",
+            coarsest_ns as f64 / 1e9
+        ));
+    }
+    Ok(())
+}
+
+/// The next values of a column; `rows` are their places among the times, where not every message has one.
+pub fn push(thin: &mut Thin, times_ns: &[i64], rows: Option<&[u32]>, values: &[f64]) {
+    match rows {
+        None => thin.push(times_ns, values),
+        Some(rows) => {
+            let times: Vec<i64> = rows.iter().map(|row| times_ns[*row as usize]).collect();
+            thin.push(&times, values);
+        }
+    }
+}
+
+/// A plain topic: curves of one unit share a plot.
+fn topic(name: String, curves: Vec<(String, String, Thin)>) -> Topic {
+    let mut plots: Vec<(String, Vec<Curve>)> = Vec::new();
+    for (_, unit, thin) in curves {
+        let curve = thin.finish();
+        if !curve.values.iter().any(|x| x.is_finite()) {
+            continue;
+        }
+        match plots.iter_mut().find(|(u, _)| *u == unit) {
+            Some((_, curves)) => curves.push(curve),
+            None => plots.push((unit, vec![curve])),
+        }
+    }
+    Topic { name, plots }
+}
