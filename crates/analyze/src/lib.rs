@@ -31,4 +31,3 @@ pub mod table;
 
 pub use inputs::{Inputs, Window};
 pub use metrics::{Metrics, metrics, metrics_of};
-pub use recording::whole;

@@ -91,10 +91,11 @@ pub fn write(
         source,
     };
     // Both kinds of failure in one type, sorted out afterwards.
-    let written: Result<(), Trouble> = crate::whole::write_whole(out, |file| match kind.as_str() {
-        "csv" => Ok(csv(&table, file)?),
-        _ => parquet(&table, file, &name).map_err(Trouble::Table),
-    });
+    let written: Result<(), Trouble> =
+        recording::whole::write_whole(out, |file| match kind.as_str() {
+            "csv" => Ok(csv(&table, file)?),
+            _ => parquet(&table, file, &name).map_err(Trouble::Table),
+        });
     written.map_err(|trouble| match trouble {
         Trouble::Io(source) => io(source),
         Trouble::Table(error) => error,

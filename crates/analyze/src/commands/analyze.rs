@@ -137,7 +137,7 @@ fn one(path: &Path, args: &AnalyzeArgs, request: &Request) -> anyhow::Result<Ana
     }
     if let Some(out) = &args.report {
         let page = report::html(&analysis, &command_line());
-        analyze::whole::write_whole(out, |file| file.write_all(page.as_bytes())).with_context(
+        recording::whole::write_whole(out, |file| file.write_all(page.as_bytes())).with_context(
             || {
                 format!(
                     "{}: cannot be written; no file of that name was made or changed",

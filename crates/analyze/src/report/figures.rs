@@ -70,7 +70,7 @@ pub fn figures(plots: &[Plot], folder: &Path) -> Result<Vec<PathBuf>, FigureErro
         let svg = SvgBackend::default().render_scene(&scene);
         for (extension, bytes) in [("svg", svg.as_bytes()), ("png", &png[..])] {
             let path = folder.join(format!("{stem}.{extension}"));
-            crate::whole::write_whole(&path, |file| std::io::Write::write_all(file, bytes))
+            recording::whole::write_whole(&path, |file| std::io::Write::write_all(file, bytes))
                 .map_err(io(&path))?;
             written.push(path);
         }

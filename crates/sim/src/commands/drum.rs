@@ -1,8 +1,10 @@
 //! `sim drum`: the drum of a scene as a WAV file.
 
 use anyhow::{Context, Result, anyhow};
+use recording::whole::write_whole;
 use sim::model::Model;
 use sim::scene::load;
+use std::io::Write;
 use std::path::PathBuf;
 
 /// Arguments of `sim drum`.
@@ -36,14 +38,8 @@ pub fn run(args: &Args) -> Result<()> {
     let model = Model::new(&scene);
     let track = model.track().context("a scene with a drum has a track")?;
     let wav = track.wav().map_err(|e| anyhow!(e))?;
-    let unfinished = args.out.with_extension("wav.part");
-    let written =
-        std::fs::write(&unfinished, wav).and_then(|()| std::fs::rename(&unfinished, &args.out));
-    if written.is_err() {
-        // What is left of a failed write helps nobody; that it may not be there is fine.
-        let _ = std::fs::remove_file(&unfinished);
-    }
-    written.with_context(|| format!("cannot write {}", args.out.display()))?;
+    write_whole(&args.out, |file| file.write_all(&wav))
+        .with_context(|| format!("cannot write {}", args.out.display()))?;
     eprintln!(
         "{}: {} strokes in {} s at {} Hz",
         args.out.display(),

@@ -264,7 +264,7 @@ impl<'p> Store<'p> {
     }
 }
 
-/// [`analyze::whole::write_whole`] with its errors as sentences.
+/// [`recording::whole::write_whole`] with its errors as sentences.
 ///
 /// # Errors
 /// What the system or the table's library says.
@@ -281,7 +281,7 @@ pub fn write_whole(
             Self::Io(e)
         }
     }
-    analyze::whole::write_whole(path, |file| fill(file).map_err(Trouble::Table)).map_err(|t| {
+    recording::whole::write_whole(path, |file| fill(file).map_err(Trouble::Table)).map_err(|t| {
         let why = match t {
             Trouble::Io(e) => e.to_string(),
             Trouble::Table(e) => e.to_string(),

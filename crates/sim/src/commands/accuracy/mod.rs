@@ -6,12 +6,13 @@ mod hard;
 use super::{Format, number};
 use anyhow::{Context, Result, anyhow};
 use indicatif::{ProgressBar, ProgressStyle};
+use recording::whole::write_whole;
 use serde_json::{Value, json};
 use sim::accuracy::{Judge, Quoted, REFERENCE, Rung, SECOND, Study, study};
 use sim::scene::load;
 use std::fmt::Write as _;
 use std::io::Write as _;
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 use std::time::{Duration, Instant};
 
 /// Arguments of `sim accuracy`.
@@ -70,7 +71,9 @@ pub fn run(args: &Args) -> Result<()> {
             ("runs.csv", &csv(&study)),
             ("work-precision.svg", &figure::draw(&study)),
         ] {
-            whole(&folder.join(name), text)?;
+            let path = folder.join(name);
+            write_whole(&path, |file| file.write_all(text.as_bytes()))
+                .with_context(|| format!("cannot write {}", path.display()))?;
         }
     }
     let text = if args.format == Format::Json {
@@ -113,14 +116,6 @@ impl Watch {
             bar.finish_and_clear();
         }
     }
-}
-
-/// Writes a file whole or not at all.
-fn whole(path: &Path, text: &str) -> Result<()> {
-    let beside = path.with_extension("partial");
-    std::fs::write(&beside, text)
-        .and_then(|()| std::fs::rename(&beside, path))
-        .with_context(|| format!("cannot write {}", path.display()))
 }
 
 /// A column of the table: its head, its width, and what it says of a rung.
