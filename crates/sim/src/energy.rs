@@ -8,6 +8,7 @@
 //! zero but for integration error. Nothing is renormalised or clipped to make it small.
 
 use crate::model::{Model, Workspace};
+use crate::solve::{Method, Settings};
 
 /// The balance at one moment, J.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -53,7 +54,7 @@ impl Energy {
     }
 }
 
-/// Whether a run with fixed steps can be believed, as it goes on.
+/// Whether a run can be believed, as it goes on.
 ///
 /// A step that is too large makes energy out of nothing and often loses it in the dampers again, so neither the motion nor the
 /// throughput tells. What can be in a motion is what it began with, what gravity gave, and what the shoulders did:
@@ -61,9 +62,11 @@ impl Energy {
 /// ```text
 /// supplied = K₀ + S₀ + max(0, P₀ − P) + |∫ work|        [J]
 /// ```
-/// A run whose unexplained rest exceeds that is an artefact of its method, and stops. The floor is rounding.
-#[derive(Debug, Default)]
+/// A run whose unexplained rest exceeds that is an artefact of its method, and stops; one whose method promises a tolerance stops at a
+/// hundred times that part of it, and a thousandth at least. The floor is rounding.
+#[derive(Debug)]
 pub(crate) struct Belief {
+    part: f64,
     start: Option<Energy>,
     most_work_j: f64,
 }
@@ -72,6 +75,19 @@ pub(crate) struct Belief {
 const FLOOR: f64 = 1e-6;
 
 impl Belief {
+    pub(crate) fn new(method: &Method, settings: &Settings) -> Self {
+        let part = if method.locates {
+            (100.0 * settings.tolerance).clamp(1e-3, 1.0)
+        } else {
+            1.0
+        };
+        Self {
+            part,
+            start: None,
+            most_work_j: 0.0,
+        }
+    }
+
     /// What came from nowhere and what was supplied, J, where the first is more.
     pub(crate) fn betrayed(&mut self, e: &Energy) -> Option<(f64, f64)> {
         let start = *self.start.get_or_insert(*e);
@@ -80,6 +96,6 @@ impl Belief {
         let supplied = start.kinetic_j + start.elastic_j.abs() + fallen + self.most_work_j;
         let all = supplied + e.kinetic_j + e.potential_j.abs() + start.potential_j.abs();
         let nowhere = e.unexplained_j.abs();
-        (nowhere > supplied + FLOOR * all).then_some((nowhere, supplied))
+        (nowhere > self.part * supplied + FLOOR * all).then_some((nowhere, supplied))
     }
 }

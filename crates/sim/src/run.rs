@@ -119,7 +119,7 @@ pub fn run_model(
         listener,
         sample: blank(model),
         at_start_j: None,
-        belief: (!method.adaptive).then(Belief::default),
+        belief: Belief::new(method, settings),
         betrayed: None,
         sensors: Sensors::new(model),
     };
@@ -143,8 +143,7 @@ struct Bridge<'a> {
     listener: &'a mut dyn Listener,
     sample: Sample,
     at_start_j: Option<f64>,
-    /// Of a method that has no other control.
-    belief: Option<Belief>,
+    belief: Belief,
     /// Energy from nowhere and energy supplied, J, once the first was more.
     betrayed: Option<(f64, f64)>,
     sensors: Sensors<'a>,
@@ -196,8 +195,8 @@ impl Observer for Bridge<'_> {
             }
         }
         s.energy = Energy::of(model, y, w, &mut self.at_start_j);
-        if let (Some(energy), Some(belief)) = (&s.energy, &mut self.belief) {
-            self.betrayed = belief.betrayed(energy);
+        if let Some(energy) = &s.energy {
+            self.betrayed = self.belief.betrayed(energy);
         }
         if self.betrayed.is_some() {
             return false;

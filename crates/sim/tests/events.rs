@@ -34,9 +34,7 @@ fn heard(text: &str, method: &Method) -> Heard {
 
 /// The methods that locate.
 fn locating() -> impl Iterator<Item = &'static Method> {
-    METHODS
-        .iter()
-        .filter(|m| m.adaptive && !m.name.ends_with("-blind"))
+    METHODS.iter().filter(|m| m.locates)
 }
 
 /// Dropped from `height_m` above springs without damping, which it meets as it passes shoulder height.

@@ -22,7 +22,7 @@ fn precise(m: &Method) -> bool {
 /// Those that locate contact events: only they keep the books of a contact that opens and closes to 1e-8. Their blind twins are
 /// there to show what that buys.
 fn located(m: &Method) -> bool {
-    m.adaptive && !m.name.ends_with("-blind")
+    m.locates
 }
 /// Dense Jacobians of a thousand states are no use to anybody.
 fn explicit(m: &Method) -> bool {

@@ -105,9 +105,9 @@ pub enum Stopped {
         /// How many there may be.
         most: usize,
     },
-    /// The energy ledger shows more energy from nowhere than anything supplied.
+    /// The energy ledger shows more energy from nowhere than can be believed.
     #[error(
-        "{method} gave up at t = {t_s} s: {nowhere_j:.1e} J came from nowhere where {supplied_j:.1e} J were supplied; take a smaller --set solver.step_s or an adaptive --method"
+        "{method} gave up at t = {t_s} s: {nowhere_j:.1e} J came from nowhere where {supplied_j:.1e} J were supplied; take a smaller --set solver.step_s, a smaller --tolerance or another --method"
     )]
     FromNowhere {
         /// Method name.
@@ -139,6 +139,8 @@ pub struct Method {
     pub order: u32,
     /// Whether it chooses its steps by the tolerance.
     pub adaptive: bool,
+    /// Whether it locates contact events.
+    pub locates: bool,
     /// Integrates a model from its initial state.
     pub run: Run,
 }
@@ -164,6 +166,7 @@ pub const METHODS: &[Method] = &[
         about: "the cheapest for the tolerance: dop853 below 3e-5, else dopri5; radau5 where that is limited by stability",
         order: 8,
         adaptive: true,
+        locates: true,
         run: auto::run,
     },
     Method {
@@ -171,6 +174,7 @@ pub const METHODS: &[Method] = &[
         about: "Dormand-Prince 8(5,3), adaptive, contact events located",
         order: 8,
         adaptive: true,
+        locates: true,
         run: pair::run::<dop853::Dop853, true>,
     },
     Method {
@@ -178,6 +182,7 @@ pub const METHODS: &[Method] = &[
         about: "the same without locating contact events",
         order: 8,
         adaptive: true,
+        locates: false,
         run: pair::run::<dop853::Dop853, false>,
     },
     Method {
@@ -185,6 +190,7 @@ pub const METHODS: &[Method] = &[
         about: "Dormand-Prince 5(4), adaptive, contact events located",
         order: 5,
         adaptive: true,
+        locates: true,
         run: pair::run::<dopri5::Dopri5, true>,
     },
     Method {
@@ -192,6 +198,7 @@ pub const METHODS: &[Method] = &[
         about: "the same without locating contact events",
         order: 5,
         adaptive: true,
+        locates: false,
         run: pair::run::<dopri5::Dopri5, false>,
     },
     Method {
@@ -199,6 +206,7 @@ pub const METHODS: &[Method] = &[
         about: "Radau IIA 5, implicit, adaptive, contact events located: for very stiff contacts",
         order: 5,
         adaptive: true,
+        locates: true,
         run: radau5::run::<true>,
     },
     Method {
@@ -206,6 +214,7 @@ pub const METHODS: &[Method] = &[
         about: "the same without locating contact events",
         order: 5,
         adaptive: true,
+        locates: false,
         run: radau5::run::<false>,
     },
     Method {
@@ -213,6 +222,7 @@ pub const METHODS: &[Method] = &[
         about: "Runge-Kutta-Munthe-Kaas of order 4 on the rotation group, fixed step",
         order: 4,
         adaptive: false,
+        locates: false,
         run: fixed::run::<rkmk4::Rkmk4>,
     },
     Method {
@@ -220,6 +230,7 @@ pub const METHODS: &[Method] = &[
         about: "the classical fourth-order method, fixed step",
         order: 4,
         adaptive: false,
+        locates: false,
         run: fixed::run::<rk4::Rk4>,
     },
     Method {
@@ -227,6 +238,7 @@ pub const METHODS: &[Method] = &[
         about: "velocities first, then positions, fixed step: the paper archive's method",
         order: 1,
         adaptive: false,
+        locates: false,
         run: fixed::run::<semi_implicit_euler::SemiImplicitEuler>,
     },
 ];

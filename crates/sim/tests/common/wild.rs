@@ -254,7 +254,7 @@ fn run(scene: &Scene, method: &'static Method) -> Outcome {
     if stats.evaluations > 3 * (ALLOWANCE + logged) {
         return Outcome::Hung(method.name.into());
     }
-    let controls = method.adaptive && !method.name.ends_with("-blind");
+    let controls = method.locates;
     match outcome {
         Err(_) => Outcome::Stopped,
         Ok(()) if !controls || scene.solver.tolerance > 0.01 * WRONG => Outcome::Uncontrolled,

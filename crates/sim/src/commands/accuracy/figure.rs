@@ -18,8 +18,8 @@ const COLOURS: [&str; 7] = [
 /// A method whose name ends so is its family's without located events.
 const BLIND: &str = "-blind";
 
-/// Draws the study as SVG.
-pub fn draw(study: &Study) -> String {
+/// Draws the study as SVG; `set` is what was changed of the scene.
+pub fn draw(study: &Study, set: &[String]) -> String {
     // The axis is that of digits, −log10(error): more of them lie to the right.
     let digits = |r: &Rung| -study.error(r).max(1e-16).log10();
     let good = |r: &&Rung| r.failed.is_none();
@@ -99,8 +99,10 @@ pub fn draw(study: &Study) -> String {
         plots.push(mark.with_legend("the archive's method").into());
     }
     let (what, unit) = study.judge.name();
+    let changed = |s: &String| format!(", {}", s.strip_prefix("effects.").unwrap_or(s));
+    let changed: String = set.iter().map(changed).collect();
     let mut layout = Layout::new((least, most), (low, high))
-        .with_title(format!("{}: what accuracy costs", study.scene))
+        .with_title(format!("{}{changed}: what accuracy costs", study.scene))
         .with_x_label(format!("largest error of {what}, {unit}"))
         .with_y_label("time of a run on the processor, ms")
         .with_x_tick_format(TickFormat::Custom(Arc::new(|d| {

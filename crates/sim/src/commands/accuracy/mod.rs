@@ -69,7 +69,7 @@ pub fn run(args: &Args) -> Result<()> {
             ("table.txt", &table),
             ("accuracy.json", &json),
             ("runs.csv", &csv(&study)),
-            ("work-precision.svg", &figure::draw(&study)),
+            ("work-precision.svg", &figure::draw(&study, &args.set)),
         ] {
             let path = folder.join(name);
             write_whole(&path, |file| file.write_all(text.as_bytes()))
