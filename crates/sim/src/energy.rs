@@ -8,6 +8,7 @@
 //! zero but for integration error. Nothing is renormalised or clipped to make it small.
 
 use crate::model::{Model, Workspace};
+use crate::scene::Scene;
 use crate::solve::{Method, Settings};
 
 /// The balance at one moment, J.
@@ -54,6 +55,12 @@ impl Energy {
     }
 }
 
+/// The unit of an energy of the ledger in an error norm, J: the body at 1.4 m/s, and lifted by 1 m.
+pub(crate) fn unit_j(scene: &Scene) -> f64 {
+    let gravity = scene.body.gravity_m_per_s2.iter().map(|g| g * g);
+    scene.body.mass_kg * (1.0 + gravity.sum::<f64>().sqrt())
+}
+
 /// Whether a run can be believed, as it goes on.
 ///
 /// A step that is too large makes energy out of nothing and often loses it in the dampers again, so neither the motion nor the
@@ -63,10 +70,11 @@ impl Energy {
 /// supplied = K₀ + S₀ + max(0, P₀ − P) + |∫ work|        [J]
 /// ```
 /// A run whose unexplained rest exceeds that is an artefact of its method, and stops; one whose method promises a tolerance stops at a
-/// hundred times that part of it, and a thousandth at least. The floor is rounding.
+/// hundred times that part of it, and a thousandth at least. The floor is rounding, and what the tolerance allows in units of [`unit_j`].
 #[derive(Debug)]
 pub(crate) struct Belief {
     part: f64,
+    floor_j: f64,
     start: Option<Energy>,
     most_work_j: f64,
 }
@@ -75,14 +83,16 @@ pub(crate) struct Belief {
 const FLOOR: f64 = 1e-6;
 
 impl Belief {
-    pub(crate) fn new(method: &Method, settings: &Settings) -> Self {
-        let part = if method.locates {
-            (100.0 * settings.tolerance).clamp(1e-3, 1.0)
+    pub(crate) fn new(scene: &Scene, method: &Method, settings: &Settings) -> Self {
+        let (part, allowed) = if method.locates {
+            let part = 100.0 * settings.tolerance;
+            (part.clamp(1e-3, 1.0), 10.0 * settings.tolerance)
         } else {
-            1.0
+            (1.0, 0.0)
         };
         Self {
             part,
+            floor_j: allowed * unit_j(scene),
             start: None,
             most_work_j: 0.0,
         }
@@ -96,6 +106,6 @@ impl Belief {
         let supplied = start.kinetic_j + start.elastic_j.abs() + fallen + self.most_work_j;
         let all = supplied + e.kinetic_j + e.potential_j.abs() + start.potential_j.abs();
         let nowhere = e.unexplained_j.abs();
-        (nowhere > self.part * supplied + FLOOR * all).then_some((nowhere, supplied))
+        (nowhere > self.part * supplied + FLOOR * all + self.floor_j).then_some((nowhere, supplied))
     }
 }

@@ -119,7 +119,7 @@ pub fn run_model(
         listener,
         sample: blank(model),
         at_start_j: None,
-        belief: Belief::new(method, settings),
+        belief: Belief::new(&model.scene, method, settings),
         betrayed: None,
         sensors: Sensors::new(model),
     };

@@ -15,6 +15,7 @@
 use super::course::{Course, SAME_MOMENT_S};
 use super::events::{self, Looks};
 use super::{Observer, Settings, Stats, Stopped};
+use crate::energy::unit_j;
 use crate::model::Model;
 
 /// Coefficients `(stage, a)` of one stage, zeros left out.
@@ -263,15 +264,8 @@ impl<'m, P: Pair, const EVENTS: bool> Run<'m, P, EVENTS> {
         let (body, watched) = (model.layout().body, model.layout().ledger_range().start);
         // Phases grow without bound and mean nothing modulo a turn: they are held absolutely, the body (see `weigh`) relatively too.
         weight.as_flattened_mut()[body..watched].fill(1.0);
-        // The ledger feeds nothing back, yet a rest that is quadrature's own would accuse the motion. Its unit: lifted by 1 m.
-        let gravity: f64 = model
-            .scene
-            .body
-            .gravity_m_per_s2
-            .iter()
-            .map(|g| g * g)
-            .sum();
-        let unit_j = model.scene.body.mass_kg * (1.0 + gravity.sqrt());
+        // The ledger feeds nothing back, yet a rest that is quadrature's own would accuse the motion.
+        let unit_j = unit_j(&model.scene);
         for d in watched..course.y.len() {
             weight.as_flattened_mut()[d] = LEDGER / unit_j;
             relative.as_flattened_mut()[d] = LEDGER / unit_j;
