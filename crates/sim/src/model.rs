@@ -417,7 +417,7 @@ impl Model {
     ///
     /// An error of a velocity that decays at rate λ moves its coordinate by 1/λ of it. Its unit is that of the coordinate times λ where that
     /// is more than its scale. But forces show it undiminished, and a force that errs opens contacts that are closed: it is no more than
-    /// [`LOOSEST`]/λ, so nothing is loosened for stiff contacts.
+    /// so much that it is worth 2400 m/s² or rad/s², so nothing is loosened for stiff contacts.
     pub fn units(&self, y: &[f64], w: &Workspace, units: &mut [f64]) {
         units.fill(0.0);
         if !self.contact_damping.is_empty() {
