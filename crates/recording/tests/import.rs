@@ -6,10 +6,12 @@ use std::{
     path::{Path, PathBuf},
 };
 
+use prost::Message as _;
 use recording::{
     Signal,
-    import::{self, ImportError, Ingested},
+    import::{self, ImportError, ImportOptions, Ingested},
     read::{ReadOptions, Recording},
+    schema::foxglove::RawAudio,
     write::{RecordingWriter, WriterOptions},
 };
 
@@ -43,7 +45,14 @@ impl Imported {
 fn ingest(folder: &Path, paths: &[PathBuf], layout: Option<&str>) -> Result<Imported, ImportError> {
     let out = folder.join("out.mcap");
     let mut writer = RecordingWriter::create(&out, &WriterOptions::default())?;
-    let ingested = import::ingest(paths, layout, &mut writer)?;
+    let ingested = import::ingest(
+        paths,
+        &ImportOptions {
+            layout,
+            ..ImportOptions::default()
+        },
+        &mut writer,
+    )?;
     writer.finish()?;
     let recording = Recording::open(&out, &ReadOptions::default()).expect("opens");
     let (signals, _) = recording.signals(&|_| true).expect("reads");
@@ -347,4 +356,141 @@ fn what_is_missing_or_odd_is_named() {
         error("g.npz", "PK\u{3}\u{4}nonsense", None)
             .starts_with("g.npz: is not a NumPy archive (.npz): ")
     );
+}
+
+/// A WAV file of `format` (1 whole numbers, 3 floating point).
+fn wav(format: u16, channels: u16, rate: u32, bits: u16, data: &[u8]) -> Vec<u8> {
+    let frame = channels * bits.div_ceil(8);
+    [
+        &b"RIFF"[..],
+        &(36 + data.len() as u32).to_le_bytes(),
+        b"WAVEfmt ",
+        &16u32.to_le_bytes(),
+        &format.to_le_bytes(),
+        &channels.to_le_bytes(),
+        &rate.to_le_bytes(),
+        &(rate * u32::from(frame)).to_le_bytes(),
+        &frame.to_le_bytes(),
+        &bits.to_le_bytes(),
+        b"data",
+        &(data.len() as u32).to_le_bytes(),
+        data,
+    ]
+    .concat()
+}
+
+/// Log time, rate, channels and samples of each message of sound.
+fn sound(recording: &Recording) -> Vec<(i64, u32, u32, Vec<i16>)> {
+    let mut out = Vec::new();
+    recording
+        .messages(&|topic| topic.starts_with("/audio/"), &mut |message| {
+            let audio = RawAudio::decode(message.data).expect("decodes");
+            assert_eq!(audio.format, "pcm-s16");
+            let samples = audio.data.chunks_exact(2);
+            out.push((
+                message.log_time_ns,
+                audio.sample_rate,
+                audio.number_of_channels,
+                samples.map(|b| i16::from_le_bytes([b[0], b[1]])).collect(),
+            ));
+        })
+        .expect("reads");
+    out
+}
+
+#[test]
+fn sound_of_every_width_becomes_the_same_samples() {
+    let samples: Vec<i16> = (0..1000).map(|k| (k * 37 % 2000 - 1000) * 32).collect();
+    let bytes =
+        |of: &dyn Fn(i16) -> Vec<u8>| samples.iter().flat_map(|s| of(*s)).collect::<Vec<u8>>();
+    let made = [
+        wav(1, 2, 4000, 16, &bytes(&|s| s.to_le_bytes().to_vec())),
+        wav(
+            1,
+            2,
+            4000,
+            24,
+            &bytes(&|s| [vec![0], s.to_le_bytes().to_vec()].concat()),
+        ),
+        wav(
+            1,
+            2,
+            4000,
+            32,
+            &bytes(&|s| (i32::from(s) << 16).to_le_bytes().to_vec()),
+        ),
+        wav(
+            3,
+            2,
+            4000,
+            32,
+            &bytes(&|s| (f32::from(s) / 32767.0).to_le_bytes().to_vec()),
+        ),
+    ];
+    for bytes in made {
+        let folder = folder();
+        let path = folder.path().join("drum 1.wav");
+        fs::write(&path, &bytes).expect("writes");
+        let got = ingest(folder.path(), &[path], None).expect("ingests");
+        let found = sound(&got.recording);
+        assert_eq!(got.ingested.topics, [("/audio/drum_1".to_owned(), 2)]);
+        // 400 frames of two channels in a tenth of a second.
+        assert_eq!(found[0].3.len(), 800);
+        assert_eq!((found[1].0, found[1].1, found[1].2), (100_000_000, 4000, 2));
+        assert_eq!([&found[0].3[..], &found[1].3].concat(), samples);
+    }
+}
+
+#[test]
+fn sound_stands_where_it_is_said_to_begin_and_its_loss_is_said() {
+    let folder = folder();
+    let text = "device = \"belt\"\n[time]\ncolumn = \"t\"\nunit = \"s\"\nstart_s = 100\n\
+        [acceleration]\ncolumns = [\"x\", \"y\", \"z\"]\nunit = \"m/s^2\"\n";
+    let layout = file(folder.path(), "layout.toml", text);
+    let log = file(folder.path(), "log.csv", "t,x,y,z\n0,0,0,9.8\n1,0,0,9.8\n");
+    // A recorder that lost its power: the head says four seconds, one is there.
+    let mut bytes = wav(1, 1, 8000, 16, &[1; 64_000]);
+    bytes.truncate(44 + 16_000);
+    let path = folder.path().join("drum.wav");
+    fs::write(&path, &bytes).expect("writes");
+    let out = folder.path().join("walk.mcap");
+    let mut writer = RecordingWriter::create(&out, &WriterOptions::default()).expect("begins");
+    let options = ImportOptions {
+        layout: layout.to_str(),
+        sound_start_s: 0.25,
+    };
+    let ingested = import::ingest(&[log, path], &options, &mut writer).expect("ingests");
+    writer.finish().expect("finishes");
+    let recording = Recording::open(&out, &ReadOptions::default()).expect("opens");
+    let found = sound(&recording);
+    assert_eq!(found.len(), 10);
+    assert_eq!(found[0].0, 100_250_000_000);
+    assert!(
+        ingested.notes.iter().any(|n| n.contains("0.25 s after")),
+        "{:?}",
+        ingested.notes
+    );
+    assert!(
+        ingested
+            .notes
+            .iter()
+            .any(|n| n.contains("before its head says")),
+        "{:?}",
+        ingested.notes
+    );
+
+    let error = |name: &str, bytes: &[u8]| {
+        let path = folder.path().join(name);
+        fs::write(&path, bytes).expect("writes");
+        let error = ingest(folder.path(), &[path], None).err().expect("refused");
+        error
+            .to_string()
+            .replace(&format!("{}/", folder.path().display()), "")
+    };
+    assert_eq!(
+        error("a.m4a", b"...."),
+        "a.m4a: is m4a; sound is read from WAV: make one with `ffmpeg -i a.m4a -ac 1 a.wav`"
+    );
+    assert!(error("a.wav", b"RIFF....").starts_with("a.wav: is no WAV file: "));
+    assert!(error("b.wav", &wav(1, 0, 8000, 16, &[])).starts_with("b.wav: "));
 }

@@ -6,6 +6,11 @@ use std::{
     sync::{Arc, Mutex},
 };
 
+use prost::Message as _;
+use prost_types::{
+    DescriptorProto, FieldDescriptorProto, FileDescriptorProto, FileDescriptorSet, MessageOptions,
+    field_descriptor_proto::{Label, Type},
+};
 use recording::{
     cdr::{Header, Imu, PoseStamped, Time},
     read::{ReadOptions, Recording},
@@ -256,4 +261,90 @@ fn json_with_bare_words() {
             "nan /j: 1 values of y[1] are NaN or infinite, first at 0.000 s",
         ]
     );
+}
+
+/// A set of one file with `message`, in a channel of its own.
+fn one_message(syntax: &str, message: DescriptorProto, bytes: &[u8]) -> Recording {
+    let name = format!("a.{}", message.name());
+    let set = FileDescriptorSet {
+        file: vec![FileDescriptorProto {
+            name: Some("a.proto".into()),
+            package: Some("a".into()),
+            syntax: Some(syntax.into()),
+            message_type: vec![message],
+            ..FileDescriptorProto::default()
+        }],
+    };
+    recording(&WriterOptions::default(), |writer| {
+        let channel = writer
+            .raw_channel(&RawChannel {
+                topic: "/p",
+                message_encoding: "protobuf",
+                schema_name: &name,
+                schema_encoding: "protobuf",
+                schema_data: &set.encode_to_vec(),
+                metadata: &BTreeMap::new(),
+            })
+            .expect("opens");
+        writer.message(channel, START_NS, bytes).expect("writes");
+    })
+}
+
+fn field(name: &str, number: i32, kind: Type, of: Option<&str>) -> FieldDescriptorProto {
+    let label = if of.is_some() {
+        Label::Repeated
+    } else {
+        Label::Optional
+    };
+    FieldDescriptorProto {
+        name: Some(name.into()),
+        number: Some(number),
+        label: Some(label as i32),
+        r#type: Some(kind as i32),
+        type_name: of.map(Into::into),
+        ..FieldDescriptorProto::default()
+    }
+}
+
+/// Found by fuzzing: the library panics over the first while it words its error, and over the second when asked for the value.
+#[test]
+fn protobuf_schemas_of_no_known_kind() {
+    let plain = DescriptorProto {
+        name: Some("M".into()),
+        field: vec![field("x", 1, Type::Double, None)],
+        nested_type: vec![DescriptorProto {
+            name: Some("N".into()),
+            ..DescriptorProto::default()
+        }],
+        ..DescriptorProto::default()
+    };
+    assert_eq!(
+        lines(&one_message("editions", plain, &[])),
+        [
+            "bad_schema /p: skipped 1 message: the schema \"a.M\" cannot be used: the FileDescriptorSet's file \"a.proto\" is written in \"editions\"; expected proto2 or proto3"
+        ]
+    );
+    let keyless = DescriptorProto {
+        name: Some("M".into()),
+        field: vec![
+            field("x", 1, Type::Double, None),
+            field("m", 2, Type::Message, Some(".a.M.MEntry")),
+        ],
+        nested_type: vec![DescriptorProto {
+            name: Some("MEntry".into()),
+            field: vec![field("key", 1, Type::String, None)],
+            options: Some(MessageOptions {
+                map_entry: Some(true),
+                ..MessageOptions::default()
+            }),
+            ..DescriptorProto::default()
+        }],
+        ..DescriptorProto::default()
+    };
+    // x = 1 and an entry of three bytes.
+    let bytes = [&[9][..], &1f64.to_le_bytes(), &[18, 3, 10, 1, b'k']].concat();
+    let found = one_message("proto3", keyless, &bytes);
+    let (signals, _) = found.signals(&|_| true).expect("reads");
+    assert_eq!(signals[0].path, "/p.x");
+    assert_eq!(signals[0].values, [1.0]);
 }

@@ -14,12 +14,13 @@ Examples:
   analyze ingest logs.npz --out run.mcap                     a log of the paper's archive
   analyze ingest phone.zip --out walk.mcap                   phyphox or Sensor Logger
   analyze ingest rath.zip left.csv right.csv --out walk.mcap several devices, one recording
+  analyze ingest rath.zip left.zip right.zip drum.wav --out walk.mcap  with sound
   analyze ingest sensor.csv --layout columns.toml --out walk.mcap";
 
 #[derive(Args)]
 #[command(after_help = EXAMPLES)]
 pub(super) struct IngestArgs {
-    /// Logs: .npz of the archive; .zip, .csv or folders of phone apps and inertial sensors
+    /// Logs: .npz of the archive; .zip, .csv or folders of phone apps and inertial sensors; .wav of a sound recorder
     #[arg(required = true, value_name = "FILE")]
     files: Vec<PathBuf>,
     /// The recording to write
@@ -28,6 +29,14 @@ pub(super) struct IngestArgs {
     /// How the columns are laid out, where the files do not tell: a built-in name or a TOML file
     #[arg(long, value_name = "NAME|FILE.toml")]
     layout: Option<String>,
+    /// When the sound begins after the first inertial sample; taps that both noticed put it right later
+    #[arg(
+        long,
+        value_name = "SECONDS",
+        default_value_t = 0.0,
+        allow_negative_numbers = true
+    )]
+    sound_start: f64,
 }
 
 pub(super) fn run(args: &IngestArgs) -> anyhow::Result<Done> {
@@ -37,8 +46,18 @@ pub(super) fn run(args: &IngestArgs) -> anyhow::Result<Done> {
             args.out.display()
         );
     }
+    if args.sound_start.abs() > 1e6 || args.sound_start.is_nan() {
+        bail!(
+            "--sound-start: found {}, expected seconds up to 1000000",
+            args.sound_start
+        );
+    }
+    let options = import::ImportOptions {
+        layout: args.layout.as_deref(),
+        sound_start_s: args.sound_start,
+    };
     let mut writer = RecordingWriter::create(&args.out, &WriterOptions::default())?;
-    let done = import::ingest(&args.files, args.layout.as_deref(), &mut writer)?;
+    let done = import::ingest(&args.files, &options, &mut writer)?;
     writer.finish()?;
     for note in &done.notes {
         eprintln!("analyze: {note}");

@@ -1,12 +1,7 @@
 //! Inertial logs on their way to `sensor_msgs/msg/Imu` in the convention of REP-145: specific force in m/s² (+g on the axis that
 //! points up at rest), angular velocity in rad/s, covariance −1 for what is not given.
 
-use super::ImportError;
-use crate::{
-    cdr::{self, Quaternion},
-    topics::MessageKind,
-    write::RecordingWriter,
-};
+use crate::cdr::{self, Quaternion};
 
 /// Standard gravity, m/s² (3rd General Conference on Weights and Measures, 1901).
 pub(super) const STANDARD_GRAVITY: f64 = 9.80665;
@@ -129,56 +124,26 @@ pub(super) fn nanoseconds(t_s: f64) -> Option<i64> {
     (0.0..9.2e18).contains(&t_ns).then_some(t_ns as i64)
 }
 
-/// Writes logs as one recording, in the order of time. Returns topics and how many messages each got.
-pub(super) fn write(
-    logs: &[Log],
-    writer: &mut RecordingWriter,
-) -> Result<Vec<(String, u64)>, ImportError> {
-    let mut topics = Vec::new();
-    let mut channels = Vec::new();
-    for log in logs {
-        // Two devices of one name stay two.
-        let mut topic = format!("/imu/{}", log.name);
-        let mut number = 2;
-        while topics.iter().any(|(known, _)| *known == topic) {
-            topic = format!("/imu/{}_{number}", log.name);
-            number += 1;
-        }
-        channels.push(writer.channel(&topic, MessageKind::Imu)?);
-        topics.push((topic, log.samples.len() as u64));
-    }
-    let mut order: Vec<(i64, usize, usize)> = logs
-        .iter()
-        .enumerate()
-        .flat_map(|(device, log)| {
-            log.samples
-                .iter()
-                .enumerate()
-                .map(move |(row, sample)| (sample.t_ns, device, row))
-        })
-        .collect();
-    order.sort_unstable();
-    for (t_ns, device, row) in order {
-        let sample = &logs[device].samples[row];
-        let frame = topics[device].0.strip_prefix("/imu/").unwrap_or_default();
+impl Sample {
+    /// As a message of the device `frame`.
+    pub fn message(&self, frame: &str) -> cdr::Imu {
         let mut message = cdr::Imu::raw(
-            t_ns,
+            self.t_ns,
             frame,
-            sample.rate.unwrap_or_default(),
-            sample.force.unwrap_or_default(),
+            self.rate.unwrap_or_default(),
+            self.force.unwrap_or_default(),
         );
-        if sample.rate.is_none() {
+        if self.rate.is_none() {
             message = message.without_angular_velocity();
         }
-        if sample.force.is_none() {
+        if self.force.is_none() {
             message = message.without_linear_acceleration();
         }
-        if let Some(orientation) = sample.orientation {
-            message = message.with_orientation(Quaternion::from(orientation));
+        match self.orientation {
+            Some(orientation) => message.with_orientation(Quaternion::from(orientation)),
+            None => message,
         }
-        writer.message(channels[device], t_ns, &message)?;
     }
-    Ok(topics)
 }
 
 /// A device's name out of a file's: letters, digits, `_` and `-`.

@@ -1,7 +1,7 @@
-//! Other people's logs turned into recordings: NumPy archives, phone apps, inertial sensors, any CSV.
+//! Other people's logs turned into recordings: NumPy archives, phone apps, inertial sensors, any CSV, sound.
 //!
-//! [`ingest`] finds out what each file is. Inertial logs become `sensor_msgs/msg/Imu` in the convention of REP-145, several devices in
-//! one recording, in the order of time.
+//! [`ingest`] finds out what each file is. Inertial logs become `sensor_msgs/msg/Imu` in the convention of REP-145, WAV files
+//! `foxglove.RawAudio`, several devices in one recording, in the order of time.
 
 mod imu;
 pub mod layout;
@@ -9,6 +9,7 @@ pub mod npz;
 mod phyphox;
 mod sensor_logger;
 mod table;
+mod wav;
 mod xsens;
 
 use std::{
@@ -18,7 +19,10 @@ use std::{
     path::{Path, PathBuf},
 };
 
-use crate::write::{RecordingWriter, WriteError};
+use crate::{
+    topics::MessageKind,
+    write::{RecordingWriter, WriteError},
+};
 
 /// Why a log could not be turned into a recording. Nothing is left half-written.
 #[derive(Debug, thiserror::Error)]
@@ -54,6 +58,15 @@ pub struct Ingested {
     pub notes: Vec<String>,
 }
 
+/// What files do not tell of themselves.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct ImportOptions<'a> {
+    /// A built-in [`layout`] or a TOML file, for every CSV; without it the format is found out.
+    pub layout: Option<&'a str>,
+    /// When sound begins after the first inertial sample, s.
+    pub sound_start_s: f64,
+}
+
 /// Texts larger than this, unpacked, are refused.
 const MAX_TEXT_BYTES: u64 = 2 << 30;
 
@@ -83,14 +96,13 @@ impl Files {
 
 /// Turns logs into one recording; `writer` has had no message yet, and the caller finishes it.
 ///
-/// A `.npz` is a log of the published archive and stands alone. `layout` names a built-in [`layout`] or a TOML file, and is then used for
-/// every CSV; without it the format is found out.
+/// A `.npz` is a log of the published archive and stands alone.
 ///
 /// # Errors
 /// Says in one sentence which file, what was found and what was expected.
 pub fn ingest(
     paths: &[PathBuf],
-    layout: Option<&str>,
+    options: &ImportOptions<'_>,
     writer: &mut RecordingWriter,
 ) -> Result<Ingested, ImportError> {
     if let [path] = paths
@@ -110,19 +122,29 @@ pub fn ingest(
             notes: vec!["the archive's axes were turned: (x, y, z) became (x, -z, y); its pitch is yaw here".to_owned()],
         });
     }
-    let layout = layout.map(layout::find).transpose()?;
-    let mut logs = Vec::new();
-    for path in paths {
-        let files = open(path)?;
-        logs.push(read(&files, layout.as_ref())?);
-    }
+    let layout = options.layout.map(layout::find).transpose()?;
+    let (mut logs, mut sounds) = (Vec::new(), Vec::new());
+    let mut notes = Vec::new();
     let mut metadata: BTreeMap<String, String> = [
         ("version".to_owned(), env!("CARGO_PKG_VERSION").to_owned()),
         ("source".to_owned(), "field".to_owned()),
     ]
     .into();
-    let mut notes = Vec::new();
-    for (log, path) in logs.iter().zip(paths) {
+    let mut note = |path: &Path, name: &str, said: &[String]| {
+        notes.extend(said.iter().map(|n| format!("{}: {n}", path.display())));
+        if !said.is_empty() {
+            metadata.insert(format!("notes.{name}"), said.join("; "));
+        }
+    };
+    for path in paths {
+        if wav::is_wav(path)? {
+            let sound = wav::Sound::open(path)?;
+            note(path, &sound.name, &sound.notes);
+            sounds.push(sound);
+            continue;
+        }
+        wav::refuse(path)?;
+        let log = read(&open(path)?, layout.as_ref())?;
         if log.samples.is_empty() {
             let problem = "has a header but no rows; expected at least one sample".to_owned();
             return Err(ImportError::Content {
@@ -130,19 +152,89 @@ pub fn ingest(
                 problem,
             });
         }
-        notes.extend(
-            log.notes
-                .iter()
-                .map(|note| format!("{}: {note}", path.display())),
-        );
-        if !log.notes.is_empty() {
-            metadata.insert(format!("notes.{}", log.name), log.notes.join("; "));
-        }
+        note(path, &log.name, &log.notes);
+        logs.push(log);
     }
     notes.extend(undated(&logs));
+    let first_ns = logs
+        .iter()
+        .flat_map(|log| log.samples.iter().map(|s| s.t_ns))
+        .min();
+    let start_ns = first_ns
+        .unwrap_or(0)
+        .saturating_add((options.sound_start_s * 1e9).round() as i64);
+    for sound in &mut sounds {
+        sound.start_ns = start_ns;
+        if first_ns.is_some() {
+            notes.push(format!(
+                "{}: a WAV file does not know when it began: it is put {} s after the first inertial sample",
+                sound.name, options.sound_start_s
+            ));
+        }
+    }
     writer.metadata("rath", &metadata)?;
-    let topics = imu::write(&logs, writer)?;
+    let topics = write(&logs, &mut sounds, writer)?;
+    notes.extend(
+        sounds
+            .iter()
+            .filter_map(|s| Some(format!("{}: {}", s.name, s.loss()?))),
+    );
     Ok(Ingested { topics, notes })
+}
+
+/// Writes logs and sounds as one recording, in the order of time. Returns topics and how many messages each got.
+fn write(
+    logs: &[imu::Log],
+    sounds: &mut [wav::Sound],
+    writer: &mut RecordingWriter,
+) -> Result<Vec<(String, u64)>, ImportError> {
+    let mut topics: Vec<(String, u64)> = Vec::new();
+    let mut channels = Vec::new();
+    let names = logs
+        .iter()
+        .map(|log| (format!("/imu/{}", log.name), MessageKind::Imu));
+    let names = names.chain(
+        sounds
+            .iter()
+            .map(|sound| (format!("/audio/{}", sound.name), MessageKind::RawAudio)),
+    );
+    for (name, kind) in names {
+        // Two devices of one name stay two.
+        let mut topic = name.clone();
+        let mut number = 2;
+        while topics.iter().any(|(known, _)| *known == topic) {
+            topic = format!("{name}_{number}");
+            number += 1;
+        }
+        channels.push(writer.channel(&topic, kind)?);
+        topics.push((topic, 0));
+    }
+    // Time, device, sample; sounds are devices behind the logs.
+    let mut order: Vec<(i64, usize, usize)> = Vec::new();
+    for (device, log) in logs.iter().enumerate() {
+        let samples = log.samples.iter().enumerate();
+        order.extend(samples.map(|(row, sample)| (sample.t_ns, device, row)));
+    }
+    for (number, sound) in sounds.iter().enumerate() {
+        let blocks = sound.block_times().enumerate();
+        order.extend(blocks.map(|(block, t_ns)| (t_ns, logs.len() + number, block)));
+    }
+    order.sort_unstable();
+    for (t_ns, device, row) in order {
+        let (topic, count) = &mut topics[device];
+        match logs.get(device) {
+            Some(log) => {
+                let frame = topic.strip_prefix("/imu/").unwrap_or_default();
+                writer.message(channels[device], t_ns, &log.samples[row].message(frame))?;
+            }
+            None => match sounds[device - logs.len()].block(t_ns) {
+                Some(block) => writer.message(channels[device], t_ns, &block)?,
+                None => continue,
+            },
+        }
+        *count += 1;
+    }
+    Ok(topics)
 }
 
 fn read(files: &Files, layout: Option<&layout::Layout>) -> Result<imu::Log, ImportError> {

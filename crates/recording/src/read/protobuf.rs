@@ -51,6 +51,14 @@ fn descriptor(schema: &SchemaRef<'_>) -> Result<MessageDescriptor, String> {
             None => missing.push(name),
         }
     }
+    let known = |syntax: &str| ["proto2", "proto3", ""].contains(&syntax);
+    if let Some(file) = set.file.iter().find(|file| !known(file.syntax())) {
+        return Err(format!(
+            "the FileDescriptorSet's file {:?} is written in {:?}; expected proto2 or proto3",
+            file.name(),
+            file.syntax()
+        ));
+    }
     // The library indexes past its files while it words some of its errors: a schema that makes it panic is one that does not parse.
     let parsed = std::panic::catch_unwind(|| DescriptorPool::from_file_descriptor_set(set))
         .map_err(|_| "the FileDescriptorSet is not consistent".to_owned())?;
@@ -256,6 +264,13 @@ impl Plan {
         if descriptor.is_map()
             && let FieldKind::Message(entry) = kind
         {
+            // A schema may call a message an entry that lacks a key or a value.
+            if [1, 2]
+                .iter()
+                .any(|number| entry.get_field(*number).is_none())
+            {
+                return Plan::Opaque;
+            }
             return Plan::Map {
                 entry,
                 field,

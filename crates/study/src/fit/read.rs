@@ -4,7 +4,7 @@ use super::Field;
 use analyze::Window;
 use analyze::examine::{Request, examine};
 use anyhow::{Result, anyhow};
-use recording::import::ingest;
+use recording::import::{ImportOptions, ingest};
 use recording::read::{ReadOptions, Recording};
 use recording::write::{RecordingWriter, WriterOptions};
 use std::path::Path;
@@ -24,7 +24,7 @@ impl Field {
             let folder = tempfile::tempdir()?;
             let path = folder.path().join("log.mcap");
             let mut writer = RecordingWriter::create(&path, &WriterOptions::default())?;
-            ingest(&[file.to_owned()], None, &mut writer)?;
+            ingest(&[file.to_owned()], &ImportOptions::default(), &mut writer)?;
             writer.finish()?;
             Recording::from_bytes(std::fs::read(&path)?, &ReadOptions::default())?
         } else {
