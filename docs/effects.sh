@@ -45,29 +45,43 @@ costs() {
     echo "friction, bristle | $((($(count "$COST" music $fixed effects.sling=false effects.friction.law=bristle) - bare) / calls))"
 }
 
+workspace() { # [EFFECT]...: a workspace in which these are not: their files, their lines in mod.rs, and what other effects ask about
+    # them. Commands, replay and the hard cases, which name effects as a user does, are in none.
+    rm -rf "$COPY"
+    mkdir -p "$COPY"
+    cp -rp Cargo.toml Cargo.lock crates schemas tests "$COPY"
+    sim=$COPY/crates/sim
+    rm -r "$sim/src/main.rs" "$sim/src/commands" "$sim/src/replay" "$sim/src/cases"
+    sed -i '/^pub mod replay;/d; /^pub mod cases;/d' "$sim/src/lib.rs"
+    sed -i -z 's/\[\[bin\]\]\nname = "sim"\npath = "src\/main.rs"\n//' "$sim/Cargo.toml"
+    effects=$sim/src/effects
+    for e in "$@"; do
+        rm "$effects/$e.rs"
+        sed -i "/^pub mod $e;/d; /^    pub $e: Option</d" "$effects/mod.rs"
+        sed -i -z "s/    entry!(\s*$e,\s*\"[^\"]*\"\s*),\n//" "$effects/mod.rs"
+        sed -i "s/scene\.effects\.$e\.is_some()/false/; s/scene\.effects\.$e\.is_none()/true/" "$effects"/*.rs
+    done
+    (cd "$COPY" && cargo build --quiet --release -p sim --example cost --target-dir ../target 2>"$TMP/build.log") ||
+        { cat "$TMP/build.log" >&2; return 1; }
+}
+
 absent() { # [GROUP]...: the effects to leave out together, a build for each group; without groups one for every effect
     [ $# -gt 0 ] || set -- $ON_IN_MUSIC $OFF_IN_MUSIC
+    COPY=$TARGET/without/workspace
+    there=$TARGET/without/target/release/examples/cost
+    workspace
+    mkdir "$TMP/whole"
     for group in "$@"; do
-        # A workspace in which they are not: their files, their lines in mod.rs, and what other effects ask about them.
-        copy=$TARGET/without/workspace
-        rm -rf "$copy"
-        mkdir -p "$copy"
-        cp -rp Cargo.toml Cargo.lock crates schemas tests "$copy"
-        effects=$copy/crates/sim/src/effects
         settings=duration_s=20.0
-        for e in $group; do
-            rm "$effects/$e.rs"
-            sed -i "/^pub mod $e;/d; /^    pub $e: Option</d" "$effects/mod.rs"
-            sed -i -z "s/    entry!(\s*$e,\s*\"[^\"]*\"\s*),\n//" "$effects/mod.rs"
-            sed -i "s/scene\.effects\.$e\.is_some()/false/; s/scene\.effects\.$e\.is_none()/true/" "$effects"/*.rs
-            settings="$settings $(without "$e")"
-        done
-        (cd "$copy" && cargo build --quiet --release -p sim --example cost --target-dir ../target 2>"$TMP/build.log") ||
-            { cat "$TMP/build.log"; exit 1; }
-        "$TARGET/release/sim" scenes music $(printf -- '--set %s ' $settings) >"$TMP/scene.toml"
-        here=$(count "$COST" "$TMP/scene.toml")
-        there=$(count "$TARGET/without/target/release/examples/cost" "$TMP/scene.toml")
-        echo "$group | $((here / 20)) | $((there / 20)) | $(percent $((here - there)) "$there") %"
+        for e in $group; do settings="$settings $(without "$e")"; done
+        "$TARGET/release/sim" scenes music $(printf -- '--set %s ' $settings) >"$TMP/$group.toml"
+        count "$there" "$TMP/$group.toml" >"$TMP/whole/$group"
+    done
+    for group in "$@"; do
+        workspace $group || continue
+        whole=$(cat "$TMP/whole/$group")
+        less=$(count "$there" "$TMP/$group.toml")
+        echo "$group | $((whole / 20)) | $((less / 20)) | $(percent $((whole - less)) "$less") %"
     done
 }
 

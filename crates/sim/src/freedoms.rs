@@ -59,8 +59,10 @@ pub trait Freedoms: Send + Sync {
     fn positions(&self) -> usize;
     /// Puts the body where a scene starts.
     fn place(&self, start: &Start, height_m: f64, y: &mut [f64]);
-    /// Fills `arm`, `gap`, `gap_rate`, `rotation` and `spin` of the workspace.
+    /// Fills `arm`, `gap`, `gap_rate` and `spin` of the workspace, and `rotation` where that is on the way.
     fn gaps(&self, y: &[f64], w: &mut Workspace);
+    /// Fills `rotation` of the workspace where [`Self::gaps`] did not.
+    fn orient(&self, _y: &[f64], _w: &mut Workspace) {}
     /// Writes the derivatives of the body's states from the forces in the workspace.
     fn accelerate(&self, y: &[f64], w: &mut Workspace, dy: &mut [f64]);
     /// The pose at a state.

@@ -114,7 +114,7 @@ pub struct Workspace {
     pub segment_s: f64,
     /// The carriers, two by two: carrier i is lane i mod 2 of pair i / 2.
     pub pair: Vec<Pair>,
-    /// Rows of the rotation body → world.
+    /// Rows of the rotation body → world; where the freedoms do not need it, set only if something bends.
     pub rotation: [[f64; 3]; 3],
     /// Angular velocity in the body, rad/s.
     pub spin: [f64; 3],
@@ -353,6 +353,11 @@ impl Model {
         self.contact_exponent = exponent;
         self.contact_stiffness = stiffness.collect();
         self.watches_contact = !bilateral;
+    }
+
+    /// Whether a contact can pull: for effects that come after it in the table.
+    pub(crate) fn contact_pulls(&self) -> bool {
+        !self.contact_stiffness.is_empty() && !self.watches_contact
     }
 
     /// N·s/m of every carrier's contact, where it is the same whatever the load.
@@ -653,8 +658,12 @@ impl Model {
             self.party(t_s, w);
         }
         self.freedoms.gaps(y, w);
-        for term in &self.terms[Stage::Bends as usize] {
-            term.apply(t_s, w);
+        let bends = &self.terms[Stage::Bends as usize];
+        if !bends.is_empty() {
+            self.freedoms.orient(y, w);
+            for term in bends {
+                term.apply(t_s, w);
+            }
         }
         for term in &self.terms[Stage::Handles as usize] {
             term.apply(t_s, w);

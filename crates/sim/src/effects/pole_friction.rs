@@ -43,8 +43,8 @@ impl PoleFriction {
         )
     }
 
-    pub(super) fn build(&self, scene: &Scene, model: &mut Model) {
-        let bilateral = scene.effects.contact.as_ref().is_some_and(|c| c.bilateral);
+    pub(super) fn build(&self, _scene: &Scene, model: &mut Model) {
+        let bilateral = model.contact_pulls();
         let law = Rub {
             arm_m: self.arm_m,
             bilateral,

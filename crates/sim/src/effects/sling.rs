@@ -47,7 +47,12 @@ impl Sling {
         let law = Strap {
             per_length: 1.0 / self.length_m,
             damping_s: self.damping_s,
-            least_n: least_load_n(scene),
+            // A contact that cannot pull has no least load of its own: there the workspace alone decides.
+            least_n: if model.contact_pulls() {
+                0.0
+            } else {
+                f64::NEG_INFINITY
+            },
         };
         if scene.effects.hold.is_some() {
             // The hold has set its force already, and its account books all that there is sideways.
@@ -64,14 +69,6 @@ struct Strap {
     per_length: f64,
     damping_s: f64,
     least_n: f64,
-}
-
-/// The least load that a strap may be under, N. A unilateral contact never pulls: there the workspace alone decides.
-fn least_load_n(scene: &Scene) -> f64 {
-    match &scene.effects.contact {
-        Some(contact) if contact.bilateral => 0.0,
-        _ => f64::NEG_INFINITY,
-    }
 }
 
 impl Strap {

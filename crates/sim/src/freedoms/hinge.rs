@@ -74,13 +74,6 @@ impl Turning for Hinge {
             None => ((0.0, 1.0), 0.0),
         };
         w.spin = self.in_body.map(|j| j * rate);
-        let [a, b, c] = &self.rotation;
-        for row in 0..3 {
-            for column in 0..3 {
-                w.rotation[row][column] =
-                    a[row][column] + b[row][column] * cos + c[row][column] * sin;
-            }
-        }
         let [sin, cos, rate] = [sin, cos, rate].map(f64x2::splat);
         place_handles(&mut w.pair, &self.handles, motion, |[a, b, c]| {
             [
@@ -88,6 +81,17 @@ impl Turning for Hinge {
                 [0, 1, 2].map(|k| (c[k] * cos - b[k] * sin) * rate),
             ]
         });
+    }
+
+    fn orient(&self, y: &[f64], w: &mut Workspace) {
+        let (sin, cos) = self.place.map_or((0.0, 1.0), |p| sin_cos(y[p]));
+        let [a, b, c] = &self.rotation;
+        for row in 0..3 {
+            for column in 0..3 {
+                w.rotation[row][column] =
+                    a[row][column] + b[row][column] * cos + c[row][column] * sin;
+            }
+        }
     }
 
     #[inline(always)]

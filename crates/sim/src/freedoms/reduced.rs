@@ -109,7 +109,8 @@ impl Freedoms for Pinned {
 
 /// Which coordinates are free and where the others are held, and the body that they place.
 pub(super) struct Rails {
-    pub mass: f64,
+    mass: f64,
+    inverse_mass: f64,
     pub gravity: [f64; 3],
     pub inertia: Matrix3<f64>,
     /// Where the held coordinates are: x, y, z, roll, tilt, yaw.
@@ -118,6 +119,8 @@ pub(super) struct Rails {
     pub place: [Option<usize>; 6],
     /// How many are free.
     pub free: usize,
+    /// The free ones of x, y, z, each with its place.
+    translations: Vec<(usize, usize)>,
     names: Vec<&'static str>,
     scales: Vec<f64>,
 }
@@ -146,6 +149,8 @@ impl Rails {
         let [x, y] = start.position_m;
         Self {
             mass: body.mass_kg,
+            inverse_mass: 1.0 / body.mass_kg,
+            translations: (0..3).filter_map(|c| place[c].map(|p| (c, p))).collect(),
             gravity: body.gravity_m_per_s2.into(),
             inertia: body.inertia_kg_m2,
             held: [x, y, height_m, roll, tilt, yaw],
@@ -174,8 +179,10 @@ impl Rails {
 pub(super) trait Turning: Send + Sync {
     /// For handles in body coordinates, packed two by two (m).
     fn new(rails: &Rails, handles: Vec<[f64x2; 3]>) -> Self;
-    /// Fills `rotation` and `spin` of the workspace and places the handles; `motion` of the centre of mass as in [`super::place_handles`].
+    /// Fills `spin` of the workspace and places the handles; `motion` of the centre of mass as in [`super::place_handles`].
     fn gaps(&self, rails: &Rails, y: &[f64], motion: [[f64; 3]; 2], w: &mut Workspace);
+    /// Fills `rotation` of the workspace, if `gaps` did not.
+    fn orient(&self, _y: &[f64], _w: &mut Workspace) {}
     /// Writes the second derivatives of the free angles; `torque` of the handle forces in the world (N·m).
     fn accelerate(&self, rails: &Rails, torque: [f64; 3], y: &[f64], w: &Workspace, dy: &mut [f64]);
     /// What vertical dampers take from the rate of a free angle, as [`Freedoms::damping_per_s`].
@@ -239,7 +246,8 @@ impl<T: Turning> Freedoms for Reduced<T> {
         let rails = &self.rails;
         if let Some(height) = rails.place[2] {
             let acting = pairs.iter().zip(damping).map(|(p, d)| *d * p.contact_gain);
-            rates[rails.free + height] = sum(acting.fold(f64x2::ZERO, |a, b| a + b)) / rails.mass;
+            rates[rails.free + height] =
+                sum(acting.fold(f64x2::ZERO, |a, b| a + b)) * rails.inverse_mass;
         }
         self.turning.damping_per_s(rails, y, pairs, damping, rates);
     }
@@ -272,21 +280,25 @@ impl<T: Turning> Freedoms for Reduced<T> {
 
     fn gaps(&self, y: &[f64], w: &mut Workspace) {
         let rails = &self.rails;
-        let position = [0, 1, 2].map(|c| rails.coordinate(c, y));
-        let velocity = [0, 1, 2].map(|c| rails.rate(c, y));
+        let (mut position, mut velocity) = ([0, 1, 2].map(|c| rails.held[c]), [0.0; 3]);
+        for &(c, p) in &rails.translations {
+            (position[c], velocity[c]) = (y[p], y[rails.free + p]);
+        }
         self.turning.gaps(rails, y, [position, velocity], w);
+    }
+
+    fn orient(&self, y: &[f64], w: &mut Workspace) {
+        self.turning.orient(y, w);
     }
 
     fn accelerate(&self, y: &[f64], w: &mut Workspace, dy: &mut [f64]) {
         let (rails, n) = (&self.rails, self.rails.free);
         let [force, torque] = pull(&w.pair);
-        for c in 0..6 {
-            if let Some(p) = rails.place[c] {
-                dy[p] = y[n + p];
-                if c < 3 {
-                    dy[n + p] = force[c] / rails.mass + rails.gravity[c];
-                }
-            }
+        for p in 0..n {
+            dy[p] = y[n + p];
+        }
+        for &(c, p) in &rails.translations {
+            dy[n + p] = force[c] * rails.inverse_mass + rails.gravity[c];
         }
         self.turning.accelerate(rails, torque, y, w, dy);
     }
