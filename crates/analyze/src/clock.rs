@@ -36,6 +36,39 @@ impl Clock {
         device_s + self.offset_s + 1e-6 * self.drift_ppm * (device_s - self.at_s)
     }
 
+    /// The device's time of a moment on the reference's clock, s.
+    pub fn device_s(&self, reference_s: f64) -> f64 {
+        let d = 1e-6 * self.drift_ppm;
+        (reference_s - self.offset_s + d * self.at_s) / (1.0 + d)
+    }
+
+    /// Standard error of what is added to the device's time at `device_s`, s.
+    pub fn sd_s(&self, device_s: f64) -> f64 {
+        let drift = 1e-6 * self.drift_sd_ppm.unwrap_or(PRIOR_PPM);
+        self.offset_sd_s.hypot(drift * (device_s - self.at_s))
+    }
+
+    /// The drift as one believes it who knows what quartz does: the mean of what was found and of none, each by its certainty.
+    ///
+    /// ```text
+    /// d' = d σ_p² / (σ_p² + σ_d²),    1/σ'² = 1/σ_p² + 1/σ_d²
+    /// ```
+    /// σ_p = 30 ppm, the tolerance of the crystals in phones and sensors at room temperature; σ_d the standard error of what was found.
+    /// Taps at one end leave the drift at none, taps at both ends minutes apart set it. Source: normal prior, normal likelihood.
+    pub fn believed(&self) -> Self {
+        let found = self.drift_sd_ppm.unwrap_or(f64::INFINITY);
+        let share = if found.is_finite() {
+            PRIOR_PPM.powi(2) / (PRIOR_PPM.powi(2) + found.powi(2))
+        } else {
+            0.0
+        };
+        Self {
+            drift_ppm: share * self.drift_ppm,
+            drift_sd_ppm: Some(PRIOR_PPM * (1.0 - share).sqrt()),
+            ..*self
+        }
+    }
+
     /// Whether the offset or the drift differ from zero by more than two standard errors and more than a millisecond over
     /// the recording of `length_s`.
     pub fn is_off(&self, length_s: f64) -> bool {
@@ -47,6 +80,9 @@ impl Clock {
             || (drifted_s > 1e-3 && sure)
     }
 }
+
+/// How far quartz clocks usually part, ppm.
+const PRIOR_PPM: f64 = 30.0;
 
 /// Why two clocks could not be compared.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
@@ -64,6 +100,18 @@ pub enum ClockError {
     NoMatch {
         /// Best correlation.
         best: f64,
+    },
+    /// Events that fit in two ways.
+    #[error(
+        "{paired} events fit at {first_s:+.3} s and at {second_s:+.3} s alike; events at uneven intervals are needed"
+    )]
+    Ambiguous {
+        /// Pairs.
+        paired: usize,
+        /// One offset, s.
+        first_s: f64,
+        /// Another, s.
+        second_s: f64,
     },
     /// Events that cannot be paired.
     #[error(
@@ -140,7 +188,7 @@ pub fn from_signals(
         points.push((0.5 * (a.0 + a.1), lag / RATE_HZ));
     }
     // Windows overlap by half: two of them count as one and a half measurements at best.
-    Ok(line(&points, 1.5))
+    Ok(line(&points, 1.5, 0.0))
 }
 
 /// Resampled about its mean; zero where the device was not on.
@@ -244,82 +292,113 @@ fn window_lag(x: &[f64], y: &[f64]) -> Option<(f64, f64)> {
     Some((best as f64 + shift.clamp(-0.5, 0.5), c))
 }
 
+/// As far as quartz clocks ever part.
+const MOST_DRIFT: f64 = 2e-4;
+/// Events at either end of the device's list from which a search begins: all but one of them may be the device's own.
+const ENDS: usize = 12;
+/// Nobody times an event better than this, s: half a sample of two sensors at 200 Hz.
+const EVENT_SD_S: f64 = 0.001;
+
 /// Offset and drift from events both noticed (taps, claps, steps on a plate, beats), ascending times, s.
 ///
-/// The offset is looked for within ± `search_s`: the one that pairs most events to within `tolerance_s`. A perfectly regular
-/// series fits at every multiple of its period: keep `search_s` below half of it, or tap irregularly. Drift is
-/// assumed below 200 ppm.
+/// The offset is looked for within ± `search_s`, the drift within ± 200 ppm: those that pair most events to within `tolerance_s`. Each may have
+/// noticed things that the other did not. A perfectly regular series fits at every multiple of its period, so tap unevenly.
 ///
 /// # Errors
-/// When fewer than two events can be paired.
+/// When fewer than two events can be paired, or as many at another offset.
 pub fn from_events(
     device_s: &[f64],
     reference_s: &[f64],
     search_s: f64,
     tolerance_s: f64,
 ) -> Result<Clock, ClockError> {
-    let pairs_at = |offset: f64, drift: f64, tolerance: f64| -> Vec<(f64, f64)> {
-        let middle = 0.5 * (device_s.first().unwrap_or(&0.0) + device_s.last().unwrap_or(&0.0));
-        device_s
-            .iter()
-            .filter_map(|&d| {
-                let there = d + offset + drift * (d - middle);
-                let k = reference_s.partition_point(|r| *r < there);
-                let near = [k.checked_sub(1), Some(k)]
-                    .into_iter()
-                    .flatten()
-                    .filter_map(|k| reference_s.get(k))
-                    .min_by(|a, b| (*a - there).abs().total_cmp(&(*b - there).abs()))?;
-                ((near - there).abs() <= tolerance).then_some((d, near - d))
-            })
-            .collect()
+    let middle = 0.5 * (device_s.first().unwrap_or(&0.0) + device_s.last().unwrap_or(&0.0));
+    // (device, what to add) of every event that has one of the reference within the tolerance; the offset holds in the middle.
+    let pairs_at = |offset: f64, drift: f64| {
+        device_s.iter().filter_map(move |&d| {
+            let there = d + offset + drift * (d - middle);
+            let k = reference_s.partition_point(|r| *r < there);
+            let near = [k.checked_sub(1), Some(k)]
+                .into_iter()
+                .flatten()
+                .filter_map(|k| reference_s.get(k))
+                .min_by(|a, b| (*a - there).abs().total_cmp(&(*b - there).abs()))?;
+            ((near - there).abs() <= tolerance_s).then_some((d, near - d))
+        })
     };
-    // Candidates: every difference between an early event of one and any of the other.
-    let mut best: (usize, f64, f64) = (0, f64::MAX, 0.0);
-    for d in device_s
-        .iter()
-        .take(20)
-        .chain(device_s.iter().rev().take(20))
-    {
-        for r in reference_s {
-            let offset = r - d;
-            if offset.abs() <= search_s {
-                let pairs = pairs_at(offset, 0.0, tolerance_s.max(0.02));
-                let spread =
-                    pairs.iter().map(|p| (p.1 - offset).abs()).sum::<f64>() / pairs.len() as f64;
-                if pairs.len() > best.0 || (pairs.len() == best.0 && spread < best.1) {
-                    best = (pairs.len(), spread, offset);
+    let mut best: (usize, f64, f64, f64) = (0, f64::MAX, 0.0, 0.0);
+    let mut alike: Vec<f64> = Vec::new();
+    let late = &device_s[device_s.len().saturating_sub(ENDS)..];
+    for &d in device_s.iter().take(ENDS) {
+        let from = reference_s.partition_point(|r| *r < d - search_s);
+        for &r in reference_s[from..]
+            .iter()
+            .take_while(|r| **r <= d + search_s)
+        {
+            for &l in late.iter().filter(|l| **l > d) {
+                let there = l + r - d;
+                let reach = MOST_DRIFT * (l - d) + tolerance_s;
+                let from = reference_s.partition_point(|r| *r < there - reach);
+                for &r2 in reference_s[from..]
+                    .iter()
+                    .take_while(|r| **r <= there + reach)
+                {
+                    let drift = ((r2 - there) / (l - d)).clamp(-MOST_DRIFT, MOST_DRIFT);
+                    let offset = r - d + drift * (middle - d);
+                    let (mut count, mut spread) = (0, 0.0);
+                    for (at, found) in pairs_at(offset, drift) {
+                        count += 1;
+                        spread += (found - offset - drift * (at - middle)).abs();
+                    }
+                    if count > best.0 || (count == best.0 && spread < best.1) {
+                        if count > best.0 {
+                            alike.clear();
+                        }
+                        best = (count, spread, offset, drift);
+                    }
+                    if count == best.0 && alike.last() != Some(&offset) {
+                        alike.push(offset);
+                    }
                 }
             }
         }
     }
-    let mut pairs = pairs_at(best.2, 0.0, tolerance_s.max(0.02));
-    for _ in 0..3 {
-        if pairs.len() < 2 {
-            break;
-        }
-        let clock = line(&pairs, 1.0);
-        let middle = 0.5 * (device_s[0] + device_s[device_s.len() - 1]);
-        let offset = clock.reference_s(middle) - middle;
-        let drift = (1e-6 * clock.drift_ppm).clamp(-2e-4, 2e-4);
-        let next = pairs_at(offset, drift, tolerance_s);
-        if next.len() < pairs.len().min(2) {
-            break;
-        }
-        pairs = next;
-    }
-    if best.0 < 2 || pairs.len() < 2 {
+    if best.0 < 2 {
         return Err(ClockError::TooFewEvents {
             device: device_s.len(),
             reference: reference_s.len(),
-            paired: pairs.len(),
+            paired: best.0,
         });
     }
-    Ok(line(&pairs, 1.0))
+    let other = alike
+        .iter()
+        .find(|o| (*o - best.2).abs() > 4.0 * tolerance_s);
+    if let Some(other) = other {
+        return Err(ClockError::Ambiguous {
+            paired: best.0,
+            first_s: best.2,
+            second_s: *other,
+        });
+    }
+    let mut clock = line(
+        &pairs_at(best.2, best.3).collect::<Vec<_>>(),
+        1.0,
+        EVENT_SD_S,
+    );
+    for _ in 0..3 {
+        let drift = (1e-6 * clock.drift_ppm).clamp(-MOST_DRIFT, MOST_DRIFT);
+        let offset = clock.offset_s + drift * (middle - clock.at_s);
+        let pairs: Vec<(f64, f64)> = pairs_at(offset, drift).collect();
+        if pairs.len() < best.0 {
+            break;
+        }
+        clock = line(&pairs, 1.0, EVENT_SD_S);
+    }
+    Ok(clock)
 }
 
-/// Least squares through (time, offset); `shared` independent measurements count once.
-fn line(points: &[(f64, f64)], shared: f64) -> Clock {
+/// Least squares through (time, offset); `shared` points are one independent measurement, which errs by `least_sd_s` or more (s).
+fn line(points: &[(f64, f64)], shared: f64, least_sd_s: f64) -> Clock {
     let n = points.len() as f64;
     let at_s = points.iter().map(|p| p.0).sum::<f64>() / n;
     let offset_s = points.iter().map(|p| p.1).sum::<f64>() / n;
@@ -334,7 +413,7 @@ fn line(points: &[(f64, f64)], shared: f64) -> Clock {
         .map(|(t, o)| (o - offset_s - drift * (t - at_s)).powi(2))
         .sum();
     let free = (n / shared - 2.0).max(1.0);
-    let variance = squares / n * (n / shared) / free;
+    let variance = (squares / n * (n / shared) / free).max(least_sd_s.powi(2));
     Clock {
         offset_s,
         offset_sd_s: (variance / (n / shared)).sqrt(),
@@ -345,36 +424,72 @@ fn line(points: &[(f64, f64)], shared: f64) -> Clock {
     }
 }
 
-/// Taps: moments at which the norm of the specific force jumps far beyond what surrounds it, s.
+/// Length of a stretch that is judged as a whole, s.
+const STRETCH_S: f64 = 0.5;
+/// Median deviation of the specific force from its median in a stretch at rest, at most, m/s²: a hand that holds still stays below, a step does
+/// not.
+const REST_M_PER_S2: f64 = 0.3;
+/// What a tap stands out by, m/s², and in median deviations.
+const TAP_M_PER_S2: f64 = 1.5;
+const TAP_DEVIATIONS: f64 = 12.0;
+/// Within this time after a tap begins it still rings, s.
+const RING_S: f64 = 0.15;
+
+/// Taps at rest: moments at which the norm of the specific force jumps out of stillness, s.
 ///
-/// A tap is a maximum above `threshold_m_per_s2` over the running median norm, at least 0.15 s from a stronger one.
-pub fn taps(t_s: &[f64], accel_norm_m_per_s2: &[f64], threshold_m_per_s2: f64) -> Vec<f64> {
-    let n = t_s.len().min(accel_norm_m_per_s2.len());
-    let mut sorted: Vec<f64> = accel_norm_m_per_s2[..n]
+/// Only where the half second of a sample and both its neighbours are at rest: while somebody walks, a tap cannot be told from a step. Each tap
+/// is timed by its largest deviation, so to about half a sample. Samples that are not finite are passed over; times ascend.
+pub fn taps(t_s: &[f64], accel_norm_m_per_s2: &[f64]) -> Vec<f64> {
+    let samples: Vec<(f64, f64)> = t_s
         .iter()
-        .copied()
-        .filter(|a| a.is_finite())
+        .zip(accel_norm_m_per_s2)
+        .filter(|(t, a)| t.is_finite() && a.is_finite())
+        .map(|(t, a)| (*t, *a))
         .collect();
-    if sorted.is_empty() {
-        return Vec::new();
-    }
-    let middle = sorted.len() / 2;
-    let usual = *sorted.select_nth_unstable_by(middle, f64::total_cmp).1;
-    let mut out: Vec<(f64, f64)> = Vec::new();
-    for (&t, &a) in t_s[..n].iter().zip(accel_norm_m_per_s2) {
-        if !(a > usual + threshold_m_per_s2) {
+    // Number of the stretch, median, median deviation.
+    let number = |t: f64| ((t - samples[0].0) / STRETCH_S) as u64;
+    let stretches: Vec<(u64, f64, f64)> = samples
+        .chunk_by(|a, b| number(a.0) == number(b.0))
+        .filter_map(|stretch| {
+            let mut level: Vec<f64> = stretch.iter().map(|s| s.1).collect();
+            let usual = median(&mut level)?;
+            level.iter_mut().for_each(|a| *a = (*a - usual).abs());
+            Some((number(stretch[0].0), usual, median(&mut level)?))
+        })
+        .collect();
+    let at_rest = |number: u64| {
+        stretches
+            .binary_search_by_key(&number, |s| s.0)
+            .is_ok_and(|k| stretches[k].2 < REST_M_PER_S2)
+    };
+    let mut out: Vec<(f64, f64, f64)> = Vec::new();
+    for &(t, a) in &samples {
+        let n = number(t);
+        let Ok(k) = stretches.binary_search_by_key(&n, |s| s.0) else {
+            continue;
+        };
+        let (_, usual, deviation) = stretches[k];
+        let height = (a - usual).abs();
+        let still = n > 0 && at_rest(n - 1) && at_rest(n) && at_rest(n + 1);
+        if !still || !(height > TAP_M_PER_S2.max(TAP_DEVIATIONS * deviation)) {
             continue;
         }
         match out.last_mut() {
-            Some(last) if t - last.0 < 0.15 => {
-                if a > last.1 {
-                    *last = (t, a);
+            Some((began, at, most)) if t - *began < RING_S => {
+                if height > *most {
+                    (*at, *most) = (t, height);
                 }
             }
-            _ => out.push((t, a)),
+            _ => out.push((t, t, height)),
         }
     }
-    out.into_iter().map(|p| p.0).collect()
+    out.into_iter().map(|tap| tap.1).collect()
+}
+
+/// The upper median; `None` of nothing.
+fn median(x: &mut [f64]) -> Option<f64> {
+    let middle = x.len() / 2;
+    (!x.is_empty()).then(|| *x.select_nth_unstable_by(middle, f64::total_cmp).1)
 }
 
 #[cfg(test)]
@@ -434,15 +549,78 @@ mod tests {
         assert!((clock.drift_ppm - 50.0).abs() < 0.1, "{clock:?}");
         assert!((clock.reference_s(device[3]) - 3.4).abs() < 1e-6);
         assert_eq!(clock.points, 8);
+        // Ten minutes apart, with events of their own, and one missed.
+        let (mut device, mut reference) = (vec![0.1, 0.33, 310.0], vec![0.9, 4.4, 150.0]);
+        for (k, t) in [10.0, 10.7, 11.1, 12.4, 610.0, 610.9, 611.3, 612.0]
+            .into_iter()
+            .enumerate()
+        {
+            reference.push(t);
+            if k != 2 {
+                device.push(t + 1.3 + 80e-6 * (t - 300.0));
+            }
+        }
+        device.sort_by(f64::total_cmp);
+        reference.sort_by(f64::total_cmp);
+        let clock = from_events(&device, &reference, 20.0, 0.02).unwrap();
+        assert_eq!(clock.points, 7);
+        assert!((clock.reference_s(1.3 + 610.9 + 80e-6 * 310.9) - 610.9).abs() < 1e-5);
+        // Even taps, the first of which one of them missed.
+        let even = [1.0, 2.0, 3.0, 4.0];
+        assert!(matches!(
+            from_events(&even[1..], &even, 5.0, 0.02),
+            Err(ClockError::Ambiguous { paired: 3, .. })
+        ));
         assert!(from_events(&[1.0], &[1.0], 1.0, 0.01).is_err());
         assert!(from_events(&[], &[], 1.0, 0.01).is_err());
     }
 
     #[test]
-    fn taps_are_the_jumps() {
-        let t: Vec<f64> = (0..1000).map(|k| f64::from(k) * 0.01).collect();
-        let mut a = vec![9.8; 1000];
-        (a[100], a[102], a[500]) = (40.0, 50.0, 45.0);
-        assert_eq!(taps(&t, &a, 20.0), [t[102], t[500]]);
+    fn taps_are_the_jumps_out_of_stillness() {
+        let t: Vec<f64> = (0..4000).map(|k| f64::from(k) * 0.01).collect();
+        // Ten seconds of rest in a hand that shakes a little, steps, rest again; a tap in each, and one that rings.
+        let mut a: Vec<f64> = t
+            .iter()
+            .map(|t| {
+                let steps = if (10.0..30.0).contains(t) { 3.0 } else { 0.05 };
+                9.8 + steps * (12.6 * t).sin()
+            })
+            .collect();
+        for (k, height) in [
+            (300, 8.0),
+            (302, 12.0),
+            (450, -6.0),
+            (2000, 40.0),
+            (3500, 9.0),
+        ] {
+            a[k] += height;
+        }
+        a[100] = f64::NAN;
+        assert_eq!(taps(&t, &a), [t[302], t[450], t[3500]]);
+        assert!(taps(&[], &[]).is_empty());
+    }
+
+    #[test]
+    fn a_drift_is_believed_as_far_as_the_taps_reach() {
+        let tapped = |t: &[f64], noise_s: f64| {
+            let device: Vec<f64> = t
+                .iter()
+                .enumerate()
+                .map(|(k, t)| t - 0.2 - 40e-6 * t + noise_s * (k as f64 * 2.4).sin())
+                .collect();
+            from_events(&device, t, 5.0, 0.02).unwrap().believed()
+        };
+        // At one end three milliseconds of scatter are no drift; at both ends, five minutes apart, forty ppm show.
+        let one = tapped(&[1.0, 1.7, 2.1, 3.4], 0.003);
+        assert!(one.drift_ppm.abs() < 1.0, "{one:?}");
+        assert!((one.drift_sd_ppm.unwrap() - PRIOR_PPM).abs() < 1.0);
+        let both = tapped(&[1.0, 1.7, 2.1, 3.4, 301.0, 301.9, 302.3, 303.0], 0.003);
+        let sd = both.drift_sd_ppm.unwrap();
+        assert!(
+            (both.drift_ppm - 40.0).abs() < 3.0 * sd && sd < 12.0,
+            "{both:?}"
+        );
+        let back = both.device_s(both.reference_s(200.0));
+        assert!((back - 200.0).abs() < 1e-9);
     }
 }

@@ -54,7 +54,15 @@ pub struct Beats {
 ///
 /// # Errors
 /// When the sound is too short, too slowly sampled, or holds nothing periodic.
-pub fn beats(sound: &[f64], rate_hz: f64) -> Result<Beats, BeatError> {
+pub fn beats(sound: &[f32], rate_hz: f64) -> Result<Beats, BeatError> {
+    beats_among(&onsets(sound, rate_hz)?)
+}
+
+/// Everything that begins in a sound, as for [`beats`].
+///
+/// # Errors
+/// When the sound is too short or too slowly sampled.
+pub fn onsets(sound: &[f32], rate_hz: f64) -> Result<Onsets, BeatError> {
     let found_s = sound.len() as f64 / rate_hz;
     if !(rate_hz >= 4000.0) {
         return Err(BeatError::TooSlow { found_hz: rate_hz });
@@ -62,8 +70,15 @@ pub fn beats(sound: &[f64], rate_hz: f64) -> Result<Beats, BeatError> {
     if found_s < 4.0 {
         return Err(BeatError::TooShort { found_s });
     }
-    let onsets = Onsets::of(sound, rate_hz);
-    let beat_s = track::beats(&onsets).ok_or(BeatError::NoBeat)?;
+    Ok(Onsets::of(sound, rate_hz))
+}
+
+/// The beats among what begins.
+///
+/// # Errors
+/// When nothing is periodic.
+pub fn beats_among(onsets: &Onsets) -> Result<Beats, BeatError> {
+    let beat_s = track::beats(onsets).ok_or(BeatError::NoBeat)?;
     let (tempo_hz, tempo_ci95_hz) = tempo_of(&beat_s).ok_or(BeatError::NoBeat)?;
     Ok(Beats {
         beat_s,

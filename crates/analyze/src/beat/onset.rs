@@ -39,7 +39,7 @@ pub struct Onsets {
 
 impl Onsets {
     /// Onset strengths of one channel.
-    pub fn of(sound: &[f64], rate_hz: f64) -> Self {
+    pub fn of(sound: &[f32], rate_hz: f64) -> Self {
         let window = (WINDOW_S * rate_hz).round().max(16.0) as usize;
         let edges = band_edges(rate_hz, window);
         let bands = edges.len() - 1;
@@ -51,7 +51,7 @@ impl Onsets {
         for frame in 0..frames {
             let first = (frame as f64 / FRAME_HZ * rate_hz) as usize;
             for (k, (x, w)) in input.iter_mut().zip(&taper).enumerate() {
-                let s = sound.get(first + k).copied().unwrap_or(0.0);
+                let s = sound.get(first + k).map_or(0.0, |s| f64::from(*s));
                 *x = if s.is_finite() { s * w } else { 0.0 };
             }
             // OK because both buffers were made by the plan.
@@ -79,6 +79,15 @@ impl Onsets {
             strength,
             accent,
         }
+    }
+
+    /// Everything that begins: the maxima of the strength that stand out, s.
+    pub fn times_s(&self) -> Vec<f64> {
+        let frames = self.strength.windows(3).enumerate();
+        frames
+            .filter(|(_, w)| w[1] > 1.0 && w[1] >= w[0] && w[1] > w[2])
+            .map(|(k, _)| self.time_s((k + 1) as f64))
+            .collect()
     }
 
     /// Time of a frame (which may be fractional), s.
@@ -169,13 +178,13 @@ mod tests {
     fn clicks_are_found_where_they_are() {
         for rate_hz in [8_000.0, 22_050.0, 44_100.0, 48_000.0] {
             let n = (10.0 * rate_hz) as usize;
-            let mut sound = vec![0.0; n];
+            let mut sound = vec![0.0f32; n];
             let clicks: Vec<f64> = (0..18).map(|k| 0.5 + 0.5013 * f64::from(k)).collect();
             for t in &clicks {
                 let first = (t * rate_hz) as usize;
                 for k in 0..(0.05 * rate_hz) as usize {
                     let t = k as f64 / rate_hz;
-                    sound[first + k] += (-t / 0.01).exp() * (2e3 * t).sin();
+                    sound[first + k] += ((-t / 0.01).exp() * (2e3 * t).sin()) as f32;
                 }
             }
             let onsets = Onsets::of(&sound, rate_hz);

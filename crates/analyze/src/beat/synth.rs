@@ -56,9 +56,9 @@ impl Random {
 }
 
 /// Sound, and the times of its beats, s.
-pub fn drums(d: &Drums) -> (Vec<f64>, Vec<f64>) {
+pub fn drums(d: &Drums) -> (Vec<f32>, Vec<f64>) {
     let mut random = Random(d.seed.wrapping_mul(0x9e37_79b9_7f4a_7c15) | 1);
-    let mut sound = vec![0.0; (d.length_s * d.rate_hz) as usize];
+    let mut sound = vec![0.0f64; (d.length_s * d.rate_hz) as usize];
     let mut beats = Vec::new();
     let mut t = 0.4;
     while t < d.length_s - 0.3 {
@@ -93,7 +93,7 @@ pub fn drums(d: &Drums) -> (Vec<f64>, Vec<f64>) {
     for s in &mut sound {
         *s += noise * random.normal();
     }
-    (sound, beats)
+    (sound.into_iter().map(|s| s as f32).collect(), beats)
 }
 
 fn add(

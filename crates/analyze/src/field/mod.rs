@@ -4,6 +4,7 @@
 //! nothing else gave; [`Field::finish`] adds intervals, step rates, clocks and, where asked, errors against the truth.
 
 mod carriers;
+mod clocks;
 mod judge;
 mod place;
 mod sound;
@@ -25,7 +26,9 @@ use crate::inputs::{Inputs, Window};
 use crate::metrics::{Metrics, Value, metrics_of};
 use crate::roles::{Role, Roles, Sensors};
 use carriers::Carriers;
+use clocks::Clocks;
 use judge::Judge;
+use sound::Heard;
 
 /// The six columns of an inertial message.
 const GYRO: [&str; 3] = [
@@ -63,7 +66,8 @@ struct Filled {
 }
 
 impl Field {
-    /// Reads the sensors' topics; nothing when the recording has none. The carriers' clocks are put on each other unless they are `one_clock`.
+    /// Reads the sensors' topics; nothing when the recording has none. Clocks are put on the rath's by taps, or the carriers' on each other by
+    /// their motion, unless they are `one_clock`.
     ///
     /// # Errors
     /// Where the file cannot be read.
@@ -85,7 +89,7 @@ impl Field {
             .iter()
             .chain(roles.patterns(Role::Carriers));
         let mut field = Self::default();
-        field.listen(recording)?;
+        let heard = field.listen(recording)?;
         if topics.is_empty() || (imus.clone().next().is_none() && !truth) {
             return Ok(field);
         }
@@ -125,11 +129,19 @@ impl Field {
         let columns = Columns { signals, start_ns };
         let places = place::places(recording);
         let options = options(place::is_simulated(recording), &roles.sensors);
+        let mut clocks = Clocks::default();
         for topic in imus {
-            let Some(track) = columns.track(topic) else {
+            let Some(mut track) = columns.track(topic) else {
                 continue;
             };
             let is_rath = roles.topic(Role::Imu) == Some(topic.as_str());
+            if !one_clock {
+                if is_rath {
+                    clocks = Clocks::of_rath(topic, &track);
+                } else {
+                    clocks.put_right(topic, &mut track);
+                }
+            }
             if is_rath {
                 let here = places.get(topic).copied().unwrap_or_default();
                 let settings = Settings {
@@ -151,9 +163,15 @@ impl Field {
                 (field.beat_s, field.beat_source) = (told, "beat");
             }
         }
-        if !one_clock {
+        if let Some(heard) = heard
+            && field.beat_source == "sound"
+        {
+            clocks.put_sound_right(&heard.topic, &heard.onset_s, &mut field.beat_s);
+        }
+        if !one_clock && !clocks.any() {
             field.align(roles);
         }
+        field.quality.append(&mut clocks.remarks);
         if truth {
             field.judge = Judge::read(&columns, roles, recording);
         }
@@ -161,16 +179,25 @@ impl Field {
     }
 
     /// Beats from sound, where the recording has sound.
-    fn listen(&mut self, recording: &Recording) -> Result<(), ReadError> {
-        match sound::sound_beats(recording)? {
-            Some((_, Ok(found))) => (self.beat_s, self.beat_source) = (found.beat_s, "sound"),
-            Some((topic, Err(error))) => {
-                self.quality
-                    .push(remark(&topic, "no_beat", error.to_string()))
+    fn listen(&mut self, recording: &Recording) -> Result<Option<Heard>, ReadError> {
+        let Some(mut heard) = sound::listen(recording)? else {
+            return Ok(None);
+        };
+        let said = std::mem::take(&mut heard.remarks);
+        self.quality.extend(
+            said.into_iter()
+                .map(|text| remark(&heard.topic, "sound", text)),
+        );
+        match &heard.beats {
+            Ok(found) => {
+                self.beat_s.clone_from(&found.beat_s);
+                self.beat_source = "sound";
             }
-            None => {}
+            Err(error) => self
+                .quality
+                .push(remark(&heard.topic, "no_beat", error.to_string())),
         }
-        Ok(())
+        Ok(Some(heard))
     }
 
     fn motion(&mut self, columns: &Columns, topic: &str, track: &Track, settings: Settings) {
@@ -301,7 +328,9 @@ impl Field {
             Carriers::interval(&mut together);
             out.0.extend(together.0);
         }
-        if let Some((hz, half)) = tempo_of(&self.beat_s) {
+        // Taps and talk before and behind the music are heard too.
+        let inside = &self.beat_s[window.range(&self.beat_s)];
+        if let Some((hz, half)) = tempo_of(inside) {
             out.0.retain(|(name, _)| *name != "beat_hz");
             out.0.push((
                 "beat_hz",

@@ -2,35 +2,96 @@
 
 use prost::Message;
 use recording::read::{ReadError, Recording};
+use recording::schema::foxglove::RawAudio;
 
-use crate::beat::{BeatError, Beats, beats};
+use crate::beat::{BeatError, Beats, beats_among, onsets};
 
-/// The message, as far as it is needed (Foxglove's schema `RawAudio`).
-#[derive(Clone, PartialEq, Message)]
-struct RawAudio {
-    #[prost(bytes = "vec", tag = "2")]
-    data: Vec<u8>,
-    #[prost(string, tag = "3")]
-    format: String,
-    #[prost(fixed32, tag = "4")]
-    sample_rate: u32,
-    #[prost(fixed32, tag = "5")]
-    number_of_channels: u32,
+/// Sound is thinned to no less than this, Hz: enough for what a drum begins.
+const RATE_HZ: u32 = 16_000;
+/// Longest sound that is listened to, s.
+const LONGEST_S: f64 = 3600.0;
+/// A message that comes so much later than the sound before it ends stands behind a hole, s.
+const HOLE_S: f64 = 0.1;
+
+/// What is heard in a recording; times on the sound's own clock, s since the recording's first message.
+pub struct Heard {
+    /// Topic of the sound.
+    pub topic: String,
+    /// Everything that begins.
+    pub onset_s: Vec<f64>,
+    /// The beats among it.
+    pub beats: Result<Beats, BeatError>,
+    /// What is odd about it, a sentence each.
+    pub remarks: Vec<String>,
 }
 
-/// Longest sound that is analysed, samples: an hour at 48 kHz.
-const MOST_SAMPLES: usize = 3600 * 48_000;
+/// One channel of sound, thinned.
+#[derive(Default)]
+struct Joined {
+    first_ns: Option<i64>,
+    /// Sampling rate as recorded, Hz, and how many samples make one here.
+    rate: u32,
+    factor: usize,
+    sound: Vec<f32>,
+    /// Samples that wait for the rest of their group: their sum and number.
+    waiting: (f32, usize),
+    holes_s: f64,
+    refused: usize,
+    cut: bool,
+}
 
-/// The first topic with sound, and its beats on the recording's clock (s since its first message).
+impl Joined {
+    fn take(&mut self, t_ns: i64, audio: &RawAudio) {
+        let channels = audio.number_of_channels.max(1) as usize;
+        let other = self.rate != 0 && self.rate != audio.sample_rate;
+        if audio.format != "pcm-s16" || audio.sample_rate == 0 || other {
+            self.refused += 1;
+            return;
+        }
+        self.rate = audio.sample_rate;
+        self.factor = (audio.sample_rate / RATE_HZ).max(1) as usize;
+        let first_ns = *self.first_ns.get_or_insert(t_ns);
+        let late_s = (t_ns.saturating_sub(first_ns)) as f64 / 1e9 - self.length_s();
+        if late_s > HOLE_S {
+            self.holes_s += late_s;
+            let silence = (late_s.min(LONGEST_S) * self.rate_hz()) as usize;
+            self.sound.resize(self.sound.len() + silence, 0.0);
+        }
+        if self.length_s() >= LONGEST_S {
+            self.cut = true;
+            return;
+        }
+        for frame in audio.data.chunks_exact(2 * channels) {
+            let sum: i32 = frame
+                .chunks_exact(2)
+                .map(|b| i32::from(i16::from_le_bytes([b[0], b[1]])))
+                .sum();
+            self.waiting.0 += sum as f32 / channels as f32;
+            self.waiting.1 += 1;
+            if self.waiting.1 == self.factor {
+                self.sound.push(self.waiting.0 / self.factor as f32);
+                self.waiting = (0.0, 0);
+            }
+        }
+    }
+
+    fn rate_hz(&self) -> f64 {
+        f64::from(self.rate) / self.factor as f64
+    }
+
+    fn length_s(&self) -> f64 {
+        self.sound.len() as f64 / self.rate_hz()
+    }
+}
+
+/// Listens to the first topic with sound. `None` where there is no sound.
 ///
-/// `None` where there is no sound. Channels are averaged. Messages are taken to follow each other without holes, beginning at the log time of
-/// the first; those that are not `pcm-s16` or cannot be decoded are passed over.
+/// Channels are averaged, sound of more than 32 kHz is thinned, holes between messages are silence. Messages that are not `pcm-s16` of one rate or
+/// cannot be decoded are counted and passed over.
 ///
 /// # Errors
 /// Where the file cannot be read.
-pub fn sound_beats(
-    recording: &Recording,
-) -> Result<Option<(String, Result<Beats, BeatError>)>, ReadError> {
+pub fn listen(recording: &Recording) -> Result<Option<Heard>, ReadError> {
     let info = recording.info();
     let Some(channel) = info
         .channels
@@ -39,35 +100,47 @@ pub fn sound_beats(
     else {
         return Ok(None);
     };
-    let (mut sound, mut rate, mut first_ns) = (Vec::new(), 0u32, None);
-    recording.messages(&|topic| topic == channel.topic, &mut |message| {
-        let Ok(audio) = RawAudio::decode(message.data) else {
-            return;
-        };
-        let channels = audio.number_of_channels.max(1) as usize;
-        if audio.format != "pcm-s16"
-            || sound.len() > MOST_SAMPLES
-            || (rate != 0 && rate != audio.sample_rate)
-        {
-            return;
+    let mut joined = Joined::default();
+    recording.messages(
+        &|topic| topic == channel.topic,
+        &mut |message| match RawAudio::decode(message.data) {
+            Ok(audio) => joined.take(message.log_time_ns, &audio),
+            Err(_) => joined.refused += 1,
+        },
+    )?;
+    let mut remarks = Vec::new();
+    if joined.refused > 0 {
+        remarks.push(format!(
+            "{} messages are no 16-bit PCM of one rate and were passed over",
+            joined.refused
+        ));
+    }
+    if joined.holes_s > 0.0 {
+        remarks.push(format!(
+            "{:.1} s of sound are missing between messages and are taken for silence",
+            joined.holes_s
+        ));
+    }
+    if joined.cut {
+        remarks.push(format!("only the first {LONGEST_S} s are listened to"));
+    }
+    let (mut onset_s, mut beats) = (Vec::new(), Err(BeatError::TooShort { found_s: 0.0 }));
+    if let Some(first_ns) = joined.first_ns {
+        let start_s = (i128::from(first_ns) - i128::from(info.start_ns)) as f64 / 1e9;
+        let begins = onsets(&joined.sound, joined.rate_hz());
+        if let Ok(begins) = &begins {
+            onset_s = begins.times_s();
+            onset_s.iter_mut().for_each(|t| *t += start_s);
         }
-        rate = audio.sample_rate;
-        first_ns.get_or_insert(message.log_time_ns);
-        sound.extend(audio.data.chunks_exact(2 * channels).map(|frame| {
-            let sum: f64 = frame
-                .chunks_exact(2)
-                .map(|b| f64::from(i16::from_le_bytes([b[0], b[1]])))
-                .sum();
-            sum / channels as f64
-        }));
-    })?;
-    let Some(first_ns) = first_ns else {
-        return Ok(None);
-    };
-    let start_s = (i128::from(first_ns) - i128::from(info.start_ns)) as f64 / 1e9;
-    let found = beats(&sound, f64::from(rate)).map(|mut b| {
-        b.beat_s.iter_mut().for_each(|t| *t += start_s);
-        b
-    });
-    Ok(Some((channel.topic.clone(), found)))
+        beats = begins.and_then(|begins| beats_among(&begins)).map(|mut b| {
+            b.beat_s.iter_mut().for_each(|t| *t += start_s);
+            b
+        });
+    }
+    Ok(Some(Heard {
+        topic: channel.topic.clone(),
+        onset_s,
+        beats,
+        remarks,
+    }))
 }
