@@ -10,7 +10,7 @@ set -eu
 WHAT=${1:-all}
 TARGET=${CARGO_TARGET_DIR:-target}
 ON_IN_MUSIC="frequency_spread music noise gait lift contact sling pole_friction"
-OFF_IN_MUSIC="coupling hold friction feedback path flexure imu drum"
+OFF_IN_MUSIC="coupling hold friction feedback measured flexure imu drum"
 
 cargo build --quiet --release -p sim --bin sim --example cost
 COST=$TARGET/release/examples/cost
@@ -66,7 +66,7 @@ workspace() { # [EFFECT]...: a workspace in which these are not: their files, th
 }
 
 absent() { # [GROUP]...: the effects to leave out together, a build for each group; without groups one for every effect
-    [ $# -gt 0 ] || set -- $ON_IN_MUSIC $OFF_IN_MUSIC
+    [ $# -gt 0 ] || set -- $ON_IN_MUSIC $OFF_IN_MUSIC "path measured" # measured motion asks whether the path turns
     COPY=$TARGET/without/workspace
     there=$TARGET/without/target/release/examples/cost
     workspace

@@ -270,11 +270,12 @@ pub fn twin(condition: &Condition, seed: u64) -> Result<Twin, String> {
     Ok(Twin { seed, seen })
 }
 
-/// Simulates `seeds` twins of every condition on `jobs` threads (0: one per core); `done` is called after each.
+/// Simulates `seeds` twins of every condition from seed `first` on, on `jobs` threads (0: one per core); `done` is called after each.
 ///
 /// # Errors
 /// The first run that fails, or when `stop` was set, as a sentence.
 pub fn twins(
+    first: u64,
     seeds: u64,
     jobs: usize,
     stop: &AtomicBool,
@@ -290,8 +291,8 @@ pub fn twins(
     let count = seeds * CONDITIONS.len() as u64;
     let work = |k: u64| {
         let condition = &CONDITIONS[(k / seeds) as usize];
-        twin(condition, FIRST_SEED + k % seeds)
-            .map_err(|e| format!("{} seed {}: {e}", condition.name, FIRST_SEED + k % seeds))
+        twin(condition, first + k % seeds)
+            .map_err(|e| format!("{} seed {}: {e}", condition.name, first + k % seeds))
     };
     in_order(count, jobs, stop, work, |k, twin| {
         found[(k / seeds) as usize].twins.push(twin?);
@@ -354,12 +355,16 @@ pub fn coverage(found: &[Found]) -> [usize; 2] {
 
 /// The table, as Markdown.
 pub fn table(found: &[Found]) -> String {
-    let seeds = found.first().map_or(0, |f| f.twins.len()) as u64;
+    let seeds = |pick: fn(&[Twin]) -> Option<&Twin>| {
+        let twin = found.first().and_then(|f| pick(&f.twins));
+        twin.map_or(FIRST_SEED, |t| t.seed)
+    };
     let mut out = format!(
-        "Twins of `field-imu`, seeds {FIRST_SEED} to {}: sensors alone minus truth\n\n\
+        "Twins of `field-imu`, seeds {} to {}: sensors alone minus truth\n\n\
          | | metric | truth, mean | error, mean ± SD | largest | bound | kept | in its 95 % interval |\n\
          |---|---|---|---|---|---|---|---|\n",
-        FIRST_SEED + seeds.max(1) - 1
+        seeds(<[Twin]>::first),
+        seeds(<[Twin]>::last)
     );
     for f in found {
         for (k, row) in ROWS.iter().enumerate() {

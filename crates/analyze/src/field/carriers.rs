@@ -316,11 +316,17 @@ impl Carriers {
             .unwrap_or_default()
     }
 
-    /// 95 % interval of the synchrony: the phases' own error, as twins show it.
-    pub fn interval(metrics: &mut Metrics) {
+    /// 95 % interval of the synchrony: the phases' own error, and that of clocks that were put on each other by motion, as twins show them.
+    pub fn interval(&self, metrics: &mut Metrics) {
+        let moved = self.0.iter().any(|worn| worn.ahead_s != 0.0);
+        let half = if moved {
+            PHASE_ERROR.hypot(MOVED_ERROR)
+        } else {
+            PHASE_ERROR
+        };
         for (name, value) in &mut metrics.0 {
             if let ("synchrony", Datum::Number(x)) = (*name, &value.datum) {
-                value.ci95 = Some([(x - PHASE_ERROR).max(0.0), (x + PHASE_ERROR).min(1.0)]);
+                value.ci95 = Some([(x - half).max(0.0), (x + half).min(1.0)]);
             }
         }
     }
@@ -394,7 +400,10 @@ impl Carriers {
 }
 
 /// Half the 95 % interval of a synchrony from gait phases, 1: by simulated twins (docs/field.md).
-const PHASE_ERROR: f64 = 0.006;
+const PHASE_ERROR: f64 = 0.0014;
+/// What is added to it where clocks were put right by motion: 20 ms of a clock are 0.13 of half a relative phase at 2 Hz, and cos 0.13 = 0.99; twins
+/// show a third more.
+const MOVED_ERROR: f64 = 0.013;
 
 /// 1 to 5 Hz, zero phase; `None` where the sensor is too slow or the record too short.
 fn gait_band(x: &[f64], rate_hz: f64) -> Option<Vec<f64>> {

@@ -18,6 +18,8 @@ const SHARE: f64 = 0.6;
 const SEARCH_S: f64 = 300.0;
 /// A tap of one and the same tap of the other are this near, s: half a sample of each at 50 Hz.
 const TOLERANCE_S: f64 = 0.02;
+/// Standard error of every moment heard alike, s: windows of 32 ms every 10 ms tell when a sound begins.
+const HEARD_SD_S: f64 = 0.003;
 
 /// The clocks that taps have set.
 #[derive(Default)]
@@ -71,6 +73,10 @@ impl Clocks {
             from_events(&self.tap_s, onset_s, SEARCH_S, TOLERANCE_S),
             self.tap_s.len(),
         ) {
+            let clock = Clock {
+                offset_sd_s: clock.offset_sd_s.hypot(HEARD_SD_S),
+                ..clock
+            };
             heard_s.iter_mut().for_each(|t| *t = clock.device_s(*t));
             let ahead = |t: f64| clock.reference_s(t) - t;
             self.say(topic, &clock, ahead(clock.at_s), clock.drift_ppm);

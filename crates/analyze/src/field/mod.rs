@@ -325,7 +325,7 @@ impl Field {
             let mut inputs = Inputs::default();
             self.fill_phases(&mut inputs, t_s, phases);
             let mut together = metrics_of(&inputs, window, carriers::gives);
-            Carriers::interval(&mut together);
+            self.carriers.interval(&mut together);
             out.0.extend(together.0);
         }
         // Taps and talk before and behind the music are heard too.

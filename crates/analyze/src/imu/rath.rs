@@ -19,7 +19,7 @@ use super::track::Track;
 use super::vertical;
 use crate::filter::{Band, butter, sosfiltfilt};
 use crate::inputs::{Inputs, Window, interpolate};
-use crate::metrics::{Datum, Metrics, Value, metrics_of};
+use crate::metrics::{Datum, Metrics, Value, metrics_of, rival_hz};
 use nalgebra::{UnitQuaternion, Vector3};
 
 /// How the sensor's axes lie on the body (x forward along the pole, y left, z up).
@@ -423,6 +423,8 @@ pub fn metrics(motion: &Motion, window: Window) -> Metrics {
             })
         })
         .collect();
+    let range = window.range(&motion.inputs.t_s);
+    let support_ratio = &motion.inputs.support_ratio[range];
     for (name, value) in &mut out.0 {
         if let Some((_, why)) = BEYOND.iter().find(|(n, _)| n == name) {
             *value = Value {
@@ -438,11 +440,22 @@ pub fn metrics(motion: &Motion, window: Window) -> Metrics {
         if drawn.len() < DRAWS / 2 {
             continue;
         }
-        let mean = drawn.iter().sum::<f64>() / drawn.len() as f64;
         // About the estimate, not about the draws' mean: what the draws add on average is theirs.
-        let variance =
-            drawn.iter().map(|d| (d - mean).powi(2)).sum::<f64>() / (drawn.len() - 1) as f64;
-        let half = 1.96 * (variance + beyond_the_budget(name, motion, window).powi(2)).sqrt();
+        if MEAN_SQUARES.contains(name) {
+            let (root, ci95) = without_noise(x, &drawn);
+            value.datum = Datum::Number(root);
+            value.ci95 = Some(ci95);
+            continue;
+        }
+        let x = if *name == "t_float" && !support_ratio.is_empty() {
+            let share = floating(support_ratio);
+            value.datum = Datum::Number(share);
+            share
+        } else {
+            x
+        };
+        let half =
+            1.96 * (variance(&drawn) + beyond_the_budget(name, motion, window).powi(2)).sqrt();
         value.ci95 = Some([x - half, x + half]);
     }
     if out
@@ -461,13 +474,71 @@ pub fn metrics(motion: &Motion, window: Window) -> Metrics {
     out
 }
 
+/// Roots of mean squares, to which noise adds and from which it never takes.
+const MEAN_SQUARES: &[&str] = &["rms_roll_deg", "rms_pitch_deg"];
+
+/// A root mean square without what noise added to it, and its 95 % interval: the same noise, `drawn`, adds as much once more.
+///
+/// ```text
+/// s = 2 x² − ⟨d²⟩,    x' = √s,    √(s ± 1.96 SD(d²)),    none below 0
+/// ```
+/// x as estimated, d as drawn about it. Source: Cook & Stefanski, "Simulation-extrapolation estimation", J. Am. Stat. Assoc. 89 (1994), to first
+/// order in the noise's power.
+fn without_noise(x: f64, drawn: &[f64]) -> (f64, [f64; 2]) {
+    let squares: Vec<f64> = drawn.iter().map(|d| d * d).collect();
+    let noisier = squares.iter().sum::<f64>() / squares.len() as f64;
+    let square = 2.0 * x * x - noisier;
+    let half = 1.96 * variance(&squares).sqrt();
+    let root = |square: f64| square.max(0.0).sqrt();
+    (root(square), [root(square - half), root(square + half)])
+}
+
+/// Share of samples with a support of a twentieth of the weight or less, without what noise makes of it: where the support stays a little below
+/// that for long and passes above it fast, noise takes more samples out than it brings in. The same noise takes out as much once more.
+///
+/// ```text
+/// 2 ⟨s ≤ c⟩ − ⟨Φ((c − s)/σ)⟩,    σ = median |s₋₁ − 2 s₀ + s₊₁| / (0.6745 √6)
+/// ```
+/// c = 0.05; the median is of samples up to 2c, where little else bends; σ takes the noise for white. Source: as [`without_noise`].
+fn floating(support_ratio: &[f64]) -> f64 {
+    let n = support_ratio.len() as f64;
+    let c = crate::metrics::FLOAT_SHARE;
+    let counted = support_ratio.iter().filter(|s| **s <= c).count() as f64 / n;
+    let mut bends: Vec<f64> = support_ratio
+        .windows(3)
+        .filter(|w| w.iter().all(|s| s.abs() <= 2.0 * c))
+        .map(|w| (w[0] - 2.0 * w[1] + w[2]).abs())
+        .collect();
+    if bends.is_empty() {
+        return counted;
+    }
+    let middle = bends.len() / 2;
+    let (_, median, _) = bends.select_nth_unstable_by(middle, f64::total_cmp);
+    let sigma = *median / (0.6745 * 6f64.sqrt());
+    if !(sigma > 0.0) {
+        return counted;
+    }
+    let blurred = support_ratio
+        .iter()
+        .map(|s| 0.5 * libm::erfc((s - c) / (sigma * std::f64::consts::SQRT_2)))
+        .sum::<f64>()
+        / n;
+    (2.0 * counted - blurred).clamp(0.0, 1.0)
+}
+
+/// Of a sample about its mean.
+fn variance(x: &[f64]) -> f64 {
+    let mean = x.iter().sum::<f64>() / x.len() as f64;
+    x.iter().map(|x| (x - mean).powi(2)).sum::<f64>() / (x.len() as f64 - 1.0).max(1.0)
+}
+
 /// Metrics of the roll's lines.
 const OF_ROLL: &[&str] = &["roll_peak_hz", "subharmonic_ratio"];
 /// RMS roll from which its lines are looked for, in standard deviations of the tilt's constant error.
 const SEEN: f64 = 5.0;
 
 /// How far an edge of the support is moved by what smooths it, samples.
-const EDGE_SAMPLES: f64 = 0.15;
+const EDGE_SAMPLES: f64 = 0.1;
 
 /// Standard error of a metric that no draw shows, in its own unit: what the window holds and the estimate does not.
 fn beyond_the_budget(name: &str, motion: &Motion, window: Window) -> f64 {
@@ -484,7 +555,13 @@ fn beyond_the_budget(name: &str, motion: &Motion, window: Window) -> f64 {
     match name {
         // Lines sit on bins of 1/T, and the estimate's T is shorter than the window's: up to half a bin each, evenly spread.
         "peak_hz" | "roll_peak_hz" if !seen.is_empty() => {
-            0.5 / (seen.len() as f64 * period_s) / 3f64.sqrt() * 2f64.sqrt()
+            let bin = 0.5 / (seen.len() as f64 * period_s) / 3f64.sqrt() * 2f64.sqrt();
+            let x = if name == "peak_hz" {
+                &seen[..]
+            } else {
+                &inputs.roll_rad[range.clone()]
+            };
+            bin.hypot(rival_hz(&inputs.t_s[range][..x.len()], x) / 1.96)
         }
         // The definition counts samples at 30 Hz; others of the same motion come up to one of them later, evenly spread.
         "onset_time_s" => (1.0 / 30.0) / 3f64.sqrt(),
@@ -692,6 +769,25 @@ mod tests {
         let [low, high] = value.ci95.unwrap();
         assert!(low < true_deg && true_deg < high);
         assert!(m.get("z_mean_m").unwrap().reason.is_some());
+    }
+
+    #[test]
+    fn noise_is_taken_out_of_a_mean_square() {
+        // A constant of 1 seen through errors of 0.3: its square is 1, not 1.09.
+        let (sd, rounds) = (0.3, 4000);
+        let mut random = Random(7);
+        let (mut sum, mut kept) = (0.0, 0);
+        for _ in 0..rounds {
+            let x = 1.0 + sd * random.normal();
+            let drawn: Vec<f64> = (0..DRAWS).map(|_| x + sd * random.normal()).collect();
+            let (root, [low, high]) = without_noise(x, &drawn);
+            sum += root * root;
+            kept += usize::from(low <= 1.0 && 1.0 <= high);
+        }
+        let mean = sum / f64::from(rounds);
+        assert!((mean - 1.0).abs() < 0.03, "{mean}");
+        let covers = kept as f64 / f64::from(rounds);
+        assert!((0.92..0.98).contains(&covers), "{covers}");
     }
 
     #[test]

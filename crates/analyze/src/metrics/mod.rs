@@ -13,6 +13,7 @@ mod together;
 pub use contact::FLOAT_SHARE;
 pub use context::{Context, Need};
 pub use drive::evidence as mechanism_evidence;
+pub(crate) use lines::rival_hz;
 pub use onset::{ONSET_ROLL_DEG, ONSET_STRETCH_S, onset_s};
 
 use serde::ser::{Serialize, SerializeMap, Serializer};

@@ -3,15 +3,18 @@
 use super::{Format, print, progress, watch_interrupts};
 use anyhow::Result;
 use std::time::Instant;
-use study::twin::{table, to_json, twins};
+use study::twin::{FIRST_SEED, table, to_json, twins};
 
 /// Arguments of `study twin`.
 #[derive(clap::Args)]
 #[command(after_help = EXAMPLES)]
 pub struct Args {
-    /// Seeds of each condition, from 1001 on.
+    /// Seeds of each condition.
     #[arg(long, value_name = "N", default_value_t = 20, value_parser = clap::value_parser!(u64).range(1..=10_000))]
     seeds: u64,
+    /// The first of them.
+    #[arg(long, value_name = "SEED", default_value_t = FIRST_SEED, value_parser = clap::value_parser!(u64).range(..=1 << 53))]
+    first_seed: u64,
     /// Threads; 0 is one per core. The result does not depend on it.
     #[arg(long, value_name = "N", default_value_t = 0)]
     jobs: usize,
@@ -23,6 +26,7 @@ pub struct Args {
 const EXAMPLES: &str = "Examples:
   study twin                        field-imu in music and in baseline, clocks right and off: the table in docs/field.md
   study twin --seeds 3
+  study twin --first-seed 2001      others than those by which the intervals were set
   study twin --format json > twins.json";
 
 /// Simulates the twins and prints how far their sensors are off.
@@ -30,7 +34,8 @@ pub fn run(args: &Args) -> Result<()> {
     let began = Instant::now();
     let stop = watch_interrupts()?;
     let bar = progress(args.seeds * study::twin::CONDITIONS.len() as u64)?;
-    let found = twins(args.seeds, args.jobs, stop, || bar.inc(1)).map_err(anyhow::Error::msg)?;
+    let found = twins(args.first_seed, args.seeds, args.jobs, stop, || bar.inc(1))
+        .map_err(anyhow::Error::msg)?;
     bar.finish_and_clear();
     eprintln!(
         "{} twins in {:.1} s",
