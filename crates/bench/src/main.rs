@@ -81,7 +81,8 @@ fn ours(model: &Model, method: &Method, setting: f64) -> Course {
     let settings = Settings {
         tolerance: setting,
         step_s: setting,
-        most_evaluations: 50_000_000,
+        // What takes longer wins nothing.
+        most_evaluations: 2_000_000,
     };
     let mut turn = Vec::with_capacity(1801);
     let (stats, _) = run_model(model, method, &settings, &mut |s: &Sample| {
