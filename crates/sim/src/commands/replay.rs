@@ -424,5 +424,12 @@ fn table(take: &Take, window_s: [f64; 2], found: &[Misfit]) -> String {
             some(m.correlation, 4)
         );
     }
+    let against = |m: &&Misfit| m.signal == "roll_deg" && m.correlation.is_some_and(|r| r < -0.5);
+    if found.iter().any(|m| against(&m)) {
+        text.push_str(
+            "the model rolls against the measured body: at half the beat roll has two phases, half a turn apart, and how it starts decides; \
+             start elsewhere with --from, where the body rolls already\n",
+        );
+    }
     text
 }
