@@ -59,7 +59,7 @@ pub(super) fn run(args: &IngestArgs) -> anyhow::Result<Done> {
     let mut writer = RecordingWriter::create(&args.out, &WriterOptions::default())?;
     let done = import::ingest(&args.files, &options, &mut writer)?;
     writer.finish()?;
-    for note in &done.notes {
+    for note in done.notes.iter().chain(&done.losses) {
         eprintln!("analyze: {note}");
     }
     let topics: Vec<String> = done
@@ -72,5 +72,9 @@ pub(super) fn run(args: &IngestArgs) -> anyhow::Result<Done> {
         args.out.display(),
         topics.join(", ")
     );
-    Ok(Done::Well)
+    Ok(if done.losses.is_empty() {
+        Done::Well
+    } else {
+        Done::WithLoss
+    })
 }

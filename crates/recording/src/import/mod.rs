@@ -56,6 +56,8 @@ pub struct Ingested {
     pub topics: Vec<(String, u64)>,
     /// What was decided on the way (units, signs, gravity, clocks), one line each, with the file's name.
     pub notes: Vec<String>,
+    /// What the files promise and do not hold, one line each.
+    pub losses: Vec<String>,
 }
 
 /// What files do not tell of themselves.
@@ -120,6 +122,7 @@ pub fn ingest(
         return Ok(Ingested {
             topics: topics.map(|topic| (topic.to_owned(), messages / 4)).into(),
             notes: vec!["the archive's axes were turned: (x, y, z) became (x, -z, y); its pitch is yaw here".to_owned()],
+            losses: Vec::new(),
         });
     }
     let layout = options.layout.map(layout::find).transpose()?;
@@ -174,12 +177,15 @@ pub fn ingest(
     }
     writer.metadata("rath", &metadata)?;
     let topics = write(&logs, &mut sounds, writer)?;
-    notes.extend(
-        sounds
-            .iter()
-            .filter_map(|s| Some(format!("{}: {}", s.name, s.loss()?))),
-    );
-    Ok(Ingested { topics, notes })
+    let losses = sounds
+        .iter()
+        .filter_map(|s| Some(format!("{}: {}", s.name, s.loss()?)))
+        .collect();
+    Ok(Ingested {
+        topics,
+        notes,
+        losses,
+    })
 }
 
 /// Writes logs and sounds as one recording, in the order of time. Returns topics and how many messages each got.

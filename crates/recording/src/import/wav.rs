@@ -29,6 +29,8 @@ pub(super) struct Sound {
     /// What was decided on the way.
     pub notes: Vec<String>,
     spec: WavSpec,
+    /// Frames that the head promises, and as many of them as the file can hold.
+    promised: u32,
     frames: u32,
     /// Frames asked for and frames found so far.
     asked: u32,
@@ -41,10 +43,16 @@ enum Samples {
     Float(WavIntoSamples<BufReader<File>, f32>),
 }
 
-/// Whether a file begins as WAV files do.
+/// Whether a file begins as WAV files do, or is named like one.
 pub(super) fn is_wav(path: &Path) -> Result<bool, ImportError> {
     if path.is_dir() {
         return Ok(false);
+    }
+    if path
+        .extension()
+        .is_some_and(|e| e.eq_ignore_ascii_case("wav"))
+    {
+        return Ok(true);
     }
     let mut head = Vec::new();
     File::open(path)
@@ -83,9 +91,13 @@ impl Sound {
             name: name.clone(),
             problem,
         };
-        let reader =
-            WavReader::open(path).map_err(|error| content(format!("is no WAV file: {error}")))?;
-        let (spec, claimed) = (reader.spec(), reader.duration());
+        let file = File::open(path).map_err(|cause| ImportError::Io {
+            name: name.clone(),
+            cause,
+        })?;
+        let reader = WavReader::new(BufReader::new(file))
+            .map_err(|error| content(format!("is no WAV file: {error}")))?;
+        let (spec, promised) = (reader.spec(), reader.duration());
         if spec.channels == 0 || spec.sample_rate == 0 {
             return Err(content(format!(
                 "has {} channels at {} Hz; expected one or more at 4000 Hz or more",
@@ -95,7 +107,7 @@ impl Sound {
         // A recorder that lost its power leaves any number for the length.
         let frame_bytes = u64::from(spec.channels) * u64::from(spec.bits_per_sample.div_ceil(8));
         let bytes = path.metadata().map_or(0, |file| file.len());
-        let frames = claimed.min(u32::try_from(bytes / frame_bytes.max(1)).unwrap_or(u32::MAX));
+        let frames = promised.min(u32::try_from(bytes / frame_bytes.max(1)).unwrap_or(u32::MAX));
         let mut notes = Vec::new();
         let samples = match spec.sample_format {
             SampleFormat::Int => {
@@ -114,6 +126,7 @@ impl Sound {
             start_ns: 0,
             notes,
             spec,
+            promised,
             frames,
             asked: 0,
             found: 0,
@@ -137,11 +150,12 @@ impl Sound {
 
     /// What the file lacks, once every block was asked for.
     pub fn loss(&self) -> Option<String> {
-        let missing = self.asked - self.found;
-        (missing > 0).then(|| {
+        let seconds = |frames: u32| f64::from(frames) / f64::from(self.spec.sample_rate);
+        (self.found < self.promised).then(|| {
             format!(
-                "ends {:.1} s before its head says",
-                f64::from(missing) / f64::from(self.spec.sample_rate)
+                "its head promises {:.1} s of sound, {:.1} s are there",
+                seconds(self.promised),
+                seconds(self.found)
             )
         })
     }
