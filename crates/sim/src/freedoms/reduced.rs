@@ -294,9 +294,7 @@ impl<T: Turning> Freedoms for Reduced<T> {
     fn accelerate(&self, y: &[f64], w: &mut Workspace, dy: &mut [f64]) {
         let (rails, n) = (&self.rails, self.rails.free);
         let [force, torque] = pull(&w.pair);
-        for p in 0..n {
-            dy[p] = y[n + p];
-        }
+        dy[..n].copy_from_slice(&y[n..2 * n]);
         for &(c, p) in &rails.translations {
             dy[n + p] = force[c] * rails.inverse_mass + rails.gravity[c];
         }
