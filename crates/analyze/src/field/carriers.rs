@@ -91,6 +91,8 @@ pub fn gives(name: &str) -> bool {
         "plv",
         "beat_synchrony",
         "beat_hz",
+        "beat_lead_deg",
+        "captured",
     ]
     .contains(&name)
 }

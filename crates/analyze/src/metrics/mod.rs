@@ -2,6 +2,7 @@
 //! in a family's file and add its line to [`METRICS`].
 
 mod angles;
+mod beat;
 mod contact;
 mod context;
 mod drive;
@@ -280,6 +281,33 @@ pub const METRICS: &[Metric] = &[
         compute: together::beat_hz,
         origin: "docs/metrics.md",
         definition: "Advance of the beat's phase over 2π and the time, over the part of W in which a beat sounds.",
+    },
+    Metric {
+        name: "beat_lead_deg",
+        unit: "deg",
+        label: "lead over the beat",
+        needs: &[Need::Phases, Need::Beat],
+        compute: beat::beat_lead_deg,
+        origin: "Mardia & Jupp 2000",
+        definition: "Circular mean of φ_j − ψ over the part of W in which a beat sounds, positive ahead of the beat; `per` lists the carriers. A step detector's own offset is in it.",
+    },
+    Metric {
+        name: "captured",
+        unit: "bool",
+        label: "captured by the beat",
+        needs: &[Need::Phases, Need::Beat],
+        compute: beat::captured,
+        origin: "Adler 1946",
+        definition: "Whether every carrier stays with the beat over the part of W in which it sounds: |⟨exp(i(φ_j − ψ))⟩| ≥ 0.9. By Adler's equation it is then inside the capture range, |Δω| ≤ K.",
+    },
+    Metric {
+        name: "roll_lock",
+        unit: "-",
+        label: "roll to beat",
+        needs: &[Need::Roll, Need::Beat],
+        compute: beat::roll_lock,
+        origin: "Tass et al. 1998",
+        definition: "The ratio q:p of 1:1, 1:2, 2:1, 2:3, 3:2 cycles of roll to cycles of the beat that holds most firmly over W, by |⟨exp(i(pφ − qψ))⟩| with φ from the analytic signal of the roll, 2 s left out at both ends; `none` below 0.9, no value below 8 s. The reason gives all of them.",
     },
     Metric {
         name: "onset_time_s",

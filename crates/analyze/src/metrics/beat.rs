@@ -1,0 +1,142 @@
+//! How carriers and body stand to the beat: lead or lag, capture, p:q locking of the roll.
+
+use super::contact::mean;
+use super::{Context, Value};
+use crate::beat::lock::RATIOS;
+use crate::inputs::interpolate;
+use crate::phase::{Circular, circular, hilbert, relative_phase, unwrap};
+
+/// A relative phase of this resultant or more stays.
+const STAYS: f64 = 0.9;
+/// The analytic signal knows no phase so near its ends, s.
+const ENDS_S: f64 = 2.0;
+/// Any two rhythms keep step for a shorter time than this, s.
+const SHORTEST_S: f64 = 8.0;
+
+/// φ_j − ψ of every carrier, over the part of the window in which a beat sounds.
+fn carriers(c: &Context) -> Vec<Circular> {
+    let table = c.beat();
+    let (beat, carriers) = (&table.columns[0], &table.columns[1..]);
+    let to_beat = |p: &std::borrow::Cow<[f64]>| relative_phase(p, beat, 1.0, 1.0);
+    carriers.iter().filter_map(to_beat).collect()
+}
+
+pub fn beat_lead_deg(c: &Context) -> Value {
+    let leads: Vec<f64> = carriers(c).iter().map(|p| p.mean_rad).collect();
+    match circular(leads.iter().copied()) {
+        Some(all) => Value::number(all.mean_rad.to_degrees())
+            .per(leads.iter().map(|lead| lead.to_degrees()).collect()),
+        None => Value::missing("no carrier's phase in the window"),
+    }
+}
+
+pub fn captured(c: &Context) -> Value {
+    let found = carriers(c);
+    Value::bool(!found.is_empty() && found.iter().all(|p| p.resultant >= STAYS))
+}
+
+pub fn roll_lock(c: &Context) -> Value {
+    let (i, roll) = (c.inputs, c.roll());
+    let (times, beat): (Vec<f64>, Vec<f64>) = i
+        .phase_times()
+        .iter()
+        .zip(&i.beat_phase_rad)
+        .filter(|(_, b)| b.is_finite())
+        .map(|(t, b)| (*t, *b))
+        .unzip();
+    let (Some(first), Some(last)) = (times.first(), times.last()) else {
+        return Value::missing("no beat in the window");
+    };
+    let level = mean(&roll.x);
+    let swing: Vec<f64> = roll.x.iter().map(|x| x - level).collect();
+    let phase: Vec<f64> = hilbert(&swing).iter().map(|z| z.im.atan2(z.re)).collect();
+    let (from, to) = match (roll.t_s.first(), roll.t_s.last()) {
+        (Some(a), Some(b)) => (first.max(a + ENDS_S), last.min(b - ENDS_S)),
+        _ => (0.0, 0.0),
+    };
+    if to - from < SHORTEST_S {
+        return Value::missing(format!(
+            "roll and beat share less than {SHORTEST_S} s of the window"
+        ));
+    }
+    let inside = roll.t_s.partition_point(|t| *t < from)..roll.t_s.partition_point(|t| *t <= to);
+    let phi = unwrap(&phase[inside.clone()]);
+    let psi = interpolate(&times, &unwrap(&beat), &roll.t_s[inside]);
+    let firm = |p: u32, q: u32| {
+        relative_phase(&phi, &psi, p.into(), q.into()).map_or(0.0, |found| found.resultant)
+    };
+    let mut found = RATIOS.map(|(p, q)| (p, q, firm(p, q)));
+    found.sort_by(|a, b| b.2.total_cmp(&a.2));
+    let each: Vec<String> = found
+        .iter()
+        .map(|(p, q, resultant)| format!("{q}:{p} {resultant:.3}"))
+        .collect();
+    let word = match found[0] {
+        (.., resultant) if resultant < STAYS => "none",
+        (1, 1, _) => "1:1",
+        (2, 1, _) => "1:2",
+        (1, 2, _) => "2:1",
+        (3, 2, _) => "2:3",
+        _ => "3:2",
+    };
+    Value::word(
+        word,
+        format!("|⟨exp(i(pφ − qψ))⟩| of q:p: {}", each.join(", ")),
+    )
+}
+
+#[cfg(test)]
+mod tests {
+    use crate::inputs::{Inputs, Window};
+    use crate::metrics::metrics;
+    use std::f64::consts::TAU;
+
+    /// Two carriers 30° and 50° ahead of a beat of 2 Hz, a body that rolls at `roll_hz`.
+    fn walk(roll_hz: f64, slip_hz: f64) -> Inputs {
+        let t_s: Vec<f64> = (0..1800).map(|k| f64::from(k) / 30.0).collect();
+        let of = |hz: f64, ahead: f64| -> Vec<f64> {
+            t_s.iter().map(|t| TAU * hz * t + ahead).collect()
+        };
+        Inputs {
+            roll_rad: t_s
+                .iter()
+                .map(|t| 0.2 * (TAU * roll_hz * t + 1.0).sin())
+                .collect(),
+            phase_rad: vec![
+                of(2.0 + slip_hz, 30f64.to_radians()),
+                of(2.0, 50f64.to_radians()),
+            ],
+            beat_phase_rad: of(2.0, 0.0),
+            t_s,
+            ..Inputs::default()
+        }
+    }
+
+    #[test]
+    fn a_roll_at_half_the_beat_is_locked_one_to_two() {
+        for (hz, word) in [(1.0, "1:2"), (2.0, "1:1"), (3.0, "3:2"), (1.13, "none")] {
+            let m = metrics(&walk(hz, 0.0), Window::from(10.0));
+            assert_eq!(m.get("roll_lock").unwrap().as_word(), Some(word), "{hz} Hz");
+        }
+        let m = metrics(
+            &walk(1.0, 0.0),
+            Window {
+                start_s: 10.0,
+                end_s: 20.0,
+            },
+        );
+        assert!(m.get("roll_lock").unwrap().reason.is_some());
+        assert_eq!(m.get("roll_lock").unwrap().as_word(), None);
+    }
+
+    #[test]
+    fn carriers_ahead_of_the_beat_lead_it_and_those_who_slip_are_not_captured() {
+        let m = metrics(&walk(1.0, 0.0), Window::ALL);
+        let lead = m.get("beat_lead_deg").unwrap();
+        assert!((lead.as_f64().unwrap() - 40.0).abs() < 1e-6);
+        assert!((lead.per[0] - 30.0).abs() < 1e-6 && (lead.per[1] - 50.0).abs() < 1e-6);
+        assert_eq!(m.get("captured").unwrap().as_bool(), Some(true));
+        let slips = metrics(&walk(1.0, 0.05), Window::ALL);
+        assert_eq!(slips.get("captured").unwrap().as_bool(), Some(false));
+    }
+}
