@@ -77,7 +77,7 @@ def tapped(t):
 def with_rest(phone, rows, state):
     """The rows of a walk with rest before and behind."""
     offset, drift = CLOCKS[phone]
-    first = rows[0][0] - round((offset + drift * 0.0) * 1e9)
+    first = rows[0][0] - round(offset * 1e9)
     knock = random.normal(size=3)
     knock /= np.linalg.norm(knock)
 

@@ -10,6 +10,7 @@
 //! Source: gyro-norm alignment as in Faizullin et al., "Twist-n-Sync", Sensors 21 (2021) 68.
 
 use crate::inputs::interpolate;
+use crate::median::median;
 use crate::spectrum::{Complex64, rfft};
 use realfft::RealFftPlanner;
 
@@ -42,12 +43,6 @@ impl Clock {
         (reference_s - self.offset_s + d * self.at_s) / (1.0 + d)
     }
 
-    /// Standard error of what is added to the device's time at `device_s`, s.
-    pub fn sd_s(&self, device_s: f64) -> f64 {
-        let drift = 1e-6 * self.drift_sd_ppm.unwrap_or(PRIOR_PPM);
-        self.offset_sd_s.hypot(drift * (device_s - self.at_s))
-    }
-
     /// The drift as one believes it who knows what quartz does: the mean of what was found and of none, each by its certainty.
     ///
     /// ```text
@@ -57,27 +52,12 @@ impl Clock {
     /// Taps at one end leave the drift at none, taps at both ends minutes apart set it. Source: normal prior, normal likelihood.
     pub fn believed(&self) -> Self {
         let found = self.drift_sd_ppm.unwrap_or(f64::INFINITY);
-        let share = if found.is_finite() {
-            PRIOR_PPM.powi(2) / (PRIOR_PPM.powi(2) + found.powi(2))
-        } else {
-            0.0
-        };
+        let share = PRIOR_PPM.powi(2) / (PRIOR_PPM.powi(2) + found.powi(2));
         Self {
             drift_ppm: share * self.drift_ppm,
             drift_sd_ppm: Some(PRIOR_PPM * (1.0 - share).sqrt()),
             ..*self
         }
-    }
-
-    /// Whether the offset or the drift differ from zero by more than two standard errors and more than a millisecond over
-    /// the recording of `length_s`.
-    pub fn is_off(&self, length_s: f64) -> bool {
-        let drifted_s = 1e-6 * self.drift_ppm.abs() * length_s;
-        let sure = self
-            .drift_sd_ppm
-            .is_none_or(|sd| self.drift_ppm.abs() > 2.0 * sd);
-        (self.offset_s.abs() > 1e-3 && self.offset_s.abs() > 2.0 * self.offset_sd_s)
-            || (drifted_s > 1e-3 && sure)
     }
 }
 
@@ -329,38 +309,33 @@ pub fn from_events(
     let mut best: (usize, f64, f64, f64) = (0, f64::MAX, 0.0, 0.0);
     let mut alike: Vec<f64> = Vec::new();
     let late = &device_s[device_s.len().saturating_sub(ENDS)..];
-    for &d in device_s.iter().take(ENDS) {
-        let from = reference_s.partition_point(|r| *r < d - search_s);
-        for &r in reference_s[from..]
-            .iter()
-            .take_while(|r| **r <= d + search_s)
-        {
-            for &l in late.iter().filter(|l| **l > d) {
+    // Two pairs, one from each end of the device's list, fix an offset and a drift.
+    let fits = device_s.iter().take(ENDS).flat_map(|&d| {
+        within(reference_s, d, search_s).iter().flat_map(move |&r| {
+            late.iter().filter(move |l| **l > d).flat_map(move |&l| {
                 let there = l + r - d;
                 let reach = MOST_DRIFT * (l - d) + tolerance_s;
-                let from = reference_s.partition_point(|r| *r < there - reach);
-                for &r2 in reference_s[from..]
-                    .iter()
-                    .take_while(|r| **r <= there + reach)
-                {
+                within(reference_s, there, reach).iter().map(move |r2| {
                     let drift = ((r2 - there) / (l - d)).clamp(-MOST_DRIFT, MOST_DRIFT);
-                    let offset = r - d + drift * (middle - d);
-                    let (mut count, mut spread) = (0, 0.0);
-                    for (at, found) in pairs_at(offset, drift) {
-                        count += 1;
-                        spread += (found - offset - drift * (at - middle)).abs();
-                    }
-                    if count > best.0 || (count == best.0 && spread < best.1) {
-                        if count > best.0 {
-                            alike.clear();
-                        }
-                        best = (count, spread, offset, drift);
-                    }
-                    if count == best.0 && alike.last() != Some(&offset) {
-                        alike.push(offset);
-                    }
-                }
+                    (r - d + drift * (middle - d), drift)
+                })
+            })
+        })
+    });
+    for (offset, drift) in fits {
+        let (mut count, mut spread) = (0, 0.0);
+        for (at, found) in pairs_at(offset, drift) {
+            count += 1;
+            spread += (found - offset - drift * (at - middle)).abs();
+        }
+        if count > best.0 || (count == best.0 && spread < best.1) {
+            if count > best.0 {
+                alike.clear();
             }
+            best = (count, spread, offset, drift);
+        }
+        if count == best.0 && alike.last() != Some(&offset) {
+            alike.push(offset);
         }
     }
     if best.0 < 2 {
@@ -395,6 +370,13 @@ pub fn from_events(
         clock = line(&pairs, 1.0, EVENT_SD_S);
     }
     Ok(clock)
+}
+
+/// Those of ascending `times` that are at most `reach` from `t`.
+fn within(times: &[f64], t: f64, reach: f64) -> &[f64] {
+    let first = times.partition_point(|x| *x < t - reach);
+    let count = times[first..].partition_point(|x| *x <= t + reach);
+    &times[first..first + count]
 }
 
 /// Least squares through (time, offset); `shared` points are one independent measurement, which errs by `least_sd_s` or more (s).
@@ -484,12 +466,6 @@ pub fn taps(t_s: &[f64], accel_norm_m_per_s2: &[f64]) -> Vec<f64> {
         }
     }
     out.into_iter().map(|tap| tap.1).collect()
-}
-
-/// The upper median; `None` of nothing.
-fn median(x: &mut [f64]) -> Option<f64> {
-    let middle = x.len() / 2;
-    (!x.is_empty()).then(|| *x.select_nth_unstable_by(middle, f64::total_cmp).1)
 }
 
 #[cfg(test)]

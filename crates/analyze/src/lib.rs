@@ -18,6 +18,7 @@ pub mod filter;
 pub mod imu;
 pub mod inputs;
 pub mod mechanism;
+mod median;
 pub mod metrics;
 pub mod peaks;
 pub mod phase;

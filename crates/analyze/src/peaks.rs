@@ -3,6 +3,7 @@
 use serde::Serialize;
 
 use crate::inputs::{Window, mean_step_s};
+use crate::median::median;
 use crate::spectrum::{DEFAULT_SEGMENT_S, Options, Spectrum, welch};
 
 /// A line of a spectrum.
@@ -112,9 +113,9 @@ fn peaks(s: &Spectrum, f_hz: Option<f64>) -> Vec<Peak> {
     if p.len() < 5 {
         return Vec::new();
     }
-    let mut bins = p[1..].to_vec();
-    let middle = bins.len() / 2;
-    let median = *bins.select_nth_unstable_by(middle, f64::total_cmp).1;
+    let Some(median) = median(&mut p[1..].to_vec()) else {
+        return Vec::new();
+    };
     let largest = p[1..].iter().copied().fold(median, f64::max);
     let floor = (ABOVE_MEDIAN * median).max(BELOW_PEAK * largest);
     // Maxima of five bins: the taper's main lobe is four wide.

@@ -12,6 +12,28 @@ pub mod foxglove {
     include!(concat!(env!("OUT_DIR"), "/foxglove.rs"));
 }
 
+impl foxglove::RawAudio {
+    /// A block of 16-bit PCM, little endian, channels interleaved.
+    pub fn pcm_s16(t_ns: i64, data: Vec<u8>, sample_rate: u32, number_of_channels: u32) -> Self {
+        Self {
+            timestamp: Some(timestamp(t_ns)),
+            data,
+            format: "pcm-s16".into(),
+            sample_rate,
+            number_of_channels,
+        }
+    }
+}
+
+/// A moment, ns since 1970, as Protobuf has it.
+pub fn timestamp(t_ns: i64) -> prost_types::Timestamp {
+    prost_types::Timestamp {
+        seconds: t_ns.div_euclid(1_000_000_000),
+        // OK because the rest is below 1e9.
+        nanos: t_ns.rem_euclid(1_000_000_000) as i32,
+    }
+}
+
 macro_rules! descriptor_sets {
     ($($name:literal),* $(,)?) => {
         /// The serialized `FileDescriptorSet` (with imports) of a message that a channel may carry, by its full name.

@@ -10,7 +10,7 @@ use recording::cdr::{
     TransformStamped, Vector3,
 };
 use recording::load::Load;
-use recording::schema::{foxglove, rath};
+use recording::schema::{foxglove, rath, timestamp};
 use recording::topics::{self, MessageKind};
 use recording::write::{ChannelId, RecordingWriter, WriteError};
 use std::collections::BTreeMap;
@@ -258,13 +258,8 @@ impl<'m> Recorder<'m> {
                 break;
             }
             let t_ns = self.epoch_ns + (block.stamp_s * 1e9).round() as i64;
-            let message = foxglove::RawAudio {
-                timestamp: Some(timestamp(t_ns)),
-                data: block.sound.iter().flat_map(|s| s.to_le_bytes()).collect(),
-                format: "pcm-s16".into(),
-                sample_rate: track.rate_hz,
-                number_of_channels: 1,
-            };
+            let data = block.sound.iter().flat_map(|s| s.to_le_bytes()).collect();
+            let message = foxglove::RawAudio::pcm_s16(t_ns, data, track.rate_hz, 1);
             self.writer.message(channel, t_ns, &message)?;
             self.next_block += 1;
         }
@@ -479,13 +474,6 @@ fn vector([x, y, z]: [f64; 3]) -> rath::Vector3 {
 
 fn point([x, y, z]: [f64; 3]) -> foxglove::Vector3 {
     foxglove::Vector3 { x, y, z }
-}
-
-fn timestamp(t_ns: i64) -> prost_types::Timestamp {
-    prost_types::Timestamp {
-        seconds: t_ns.div_euclid(1_000_000_000),
-        nanos: t_ns.rem_euclid(1_000_000_000) as i32,
-    }
 }
 
 fn transform(

@@ -355,16 +355,13 @@ pub fn coverage(found: &[Found]) -> [usize; 2] {
 
 /// The table, as Markdown.
 pub fn table(found: &[Found]) -> String {
-    let seeds = |pick: fn(&[Twin]) -> Option<&Twin>| {
-        let twin = found.first().and_then(|f| pick(&f.twins));
-        twin.map_or(FIRST_SEED, |t| t.seed)
-    };
+    let seeds = || found.iter().flat_map(|f| &f.twins).map(|t| t.seed);
     let mut out = format!(
         "Twins of `field-imu`, seeds {} to {}: sensors alone minus truth\n\n\
          | | metric | truth, mean | error, mean ± SD | largest | bound | kept | in its 95 % interval |\n\
          |---|---|---|---|---|---|---|---|\n",
-        seeds(<[Twin]>::first),
-        seeds(<[Twin]>::last)
+        seeds().min().unwrap_or(FIRST_SEED),
+        seeds().max().unwrap_or(FIRST_SEED)
     );
     for f in found {
         for (k, row) in ROWS.iter().enumerate() {

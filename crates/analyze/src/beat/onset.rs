@@ -9,6 +9,7 @@
 //! Source: D. Ellis, "Beat tracking by dynamic programming", J. New Music Res. 36 (2007); spectral flux as in S. Dixon,
 //! "Onset detection revisited", DAFx (2006).
 
+use crate::median::median;
 use crate::spectrum::{Complex64, Taper};
 use realfft::RealFftPlanner;
 
@@ -118,12 +119,9 @@ fn flux(energy: &[f64], bands: usize, count: usize, logarithmic: bool) -> Vec<f6
     for b in 0..count {
         let mut level: Vec<f64> = (0..frames).map(|f| energy[f * bands + b]).collect();
         if logarithmic {
-            let mut sorted = level.clone();
-            let middle = frames / 2;
-            if frames == 0 {
+            let Some(median) = median(&mut level.clone()) else {
                 continue;
-            }
-            let median = *sorted.select_nth_unstable_by(middle, f64::total_cmp).1;
+            };
             let peak = level.iter().copied().fold(0.0, f64::max);
             // Silence between strokes: take a thousandth of the peak as the floor.
             let floor = median.max(1e-4 * peak);

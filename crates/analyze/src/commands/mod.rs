@@ -94,7 +94,7 @@ struct AnalyzeArgs {
     /// Judge estimates by the truth that the recording holds
     #[arg(long)]
     truth: bool,
-    /// All sensors were stamped by one clock: leave the carriers' clocks as they are
+    /// All sensors were stamped by one clock: leave the clocks of carriers and sound as they are
     #[arg(long)]
     one_clock: bool,
     #[command(flatten)]

@@ -2,8 +2,6 @@
 //!
 //! The clock of the rath's own sensor is everybody's. A device keeps its own where too little is shared, and that is said.
 
-use std::collections::BTreeMap;
-
 use crate::clock::{Clock, ClockError, from_events, taps};
 use crate::examine::Quality;
 use crate::imu::Track;
@@ -28,8 +26,8 @@ pub struct Clocks {
     rath: String,
     /// Taps on it, s.
     tap_s: Vec<f64>,
-    /// Whose clock is known, by topic.
-    set: BTreeMap<String, Clock>,
+    /// Whether any other clock was set.
+    pub any_set: bool,
     /// What there is to say.
     pub remarks: Vec<Quality>,
 }
@@ -44,21 +42,19 @@ impl Clocks {
         }
     }
 
-    /// Whether any other clock was set.
-    pub fn any(&self) -> bool {
-        !self.set.is_empty()
-    }
-
     /// Puts the samples of another sensor on the rath's clock, where taps tell how.
     pub fn put_right(&mut self, topic: &str, track: &mut Track) {
         if self.tap_s.len() < FEWEST {
             return;
         }
-        if let Some(clock) = self.find(topic, &felt(track)) {
-            track
-                .t_s
-                .iter_mut()
-                .for_each(|t| *t = clock.reference_s(*t));
+        let tap_s = felt(track);
+        let fit = from_events(&tap_s, &self.tap_s, SEARCH_S, TOLERANCE_S);
+        if let Some(clock) = self.found(topic, fit, tap_s.len().min(self.tap_s.len())) {
+            let ahead_s = clock.at_s - clock.reference_s(clock.at_s);
+            self.say(topic, &clock, ahead_s, -clock.drift_ppm);
+            for t in &mut track.t_s {
+                *t = clock.reference_s(*t);
+            }
         }
     }
 
@@ -68,31 +64,18 @@ impl Clocks {
             return;
         }
         // The other way round: the taps are few, and sound begins all the time.
-        if let Some(clock) = self.found(
-            topic,
-            from_events(&self.tap_s, onset_s, SEARCH_S, TOLERANCE_S),
-            self.tap_s.len(),
-        ) {
+        let fit = from_events(&self.tap_s, onset_s, SEARCH_S, TOLERANCE_S);
+        if let Some(clock) = self.found(topic, fit, self.tap_s.len()) {
             let clock = Clock {
                 offset_sd_s: clock.offset_sd_s.hypot(HEARD_SD_S),
                 ..clock
             };
-            heard_s.iter_mut().for_each(|t| *t = clock.device_s(*t));
-            let ahead = |t: f64| clock.reference_s(t) - t;
-            self.say(topic, &clock, ahead(clock.at_s), clock.drift_ppm);
+            let ahead_s = clock.reference_s(clock.at_s) - clock.at_s;
+            self.say(topic, &clock, ahead_s, clock.drift_ppm);
+            for t in heard_s {
+                *t = clock.device_s(*t);
+            }
         }
-    }
-
-    fn find(&mut self, topic: &str, tap_s: &[f64]) -> Option<Clock> {
-        let fewer = tap_s.len().min(self.tap_s.len());
-        let clock = self.found(
-            topic,
-            from_events(tap_s, &self.tap_s, SEARCH_S, TOLERANCE_S),
-            fewer,
-        )?;
-        let ahead_s = clock.at_s - clock.reference_s(clock.at_s);
-        self.say(topic, &clock, ahead_s, -clock.drift_ppm);
-        Some(clock)
     }
 
     /// A clock that rests on enough of `taps`; otherwise it is said why there is none.
@@ -140,7 +123,7 @@ impl Clocks {
                 clock.points
             ),
         ));
-        self.set.insert(topic.to_owned(), *clock);
+        self.any_set = true;
     }
 }
 

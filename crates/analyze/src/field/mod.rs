@@ -89,7 +89,7 @@ impl Field {
             .iter()
             .chain(roles.patterns(Role::Carriers));
         let mut field = Self::default();
-        let heard = field.listen(recording)?;
+        let sound = field.listen(recording)?;
         if topics.is_empty() || (imus.clone().next().is_none() && !truth) {
             return Ok(field);
         }
@@ -163,12 +163,12 @@ impl Field {
                 (field.beat_s, field.beat_source) = (told, "beat");
             }
         }
-        if let Some(heard) = heard
+        if let Some((topic, onset_s)) = sound
             && field.beat_source == "sound"
         {
-            clocks.put_sound_right(&heard.topic, &heard.onset_s, &mut field.beat_s);
+            clocks.put_sound_right(&topic, &onset_s, &mut field.beat_s);
         }
-        if !one_clock && !clocks.any() {
+        if !one_clock && !clocks.any_set {
             field.align(roles);
         }
         field.quality.append(&mut clocks.remarks);
@@ -178,26 +178,30 @@ impl Field {
         Ok(field)
     }
 
-    /// Beats from sound, where the recording has sound.
-    fn listen(&mut self, recording: &Recording) -> Result<Option<Heard>, ReadError> {
-        let Some(mut heard) = sound::listen(recording)? else {
+    /// Beats from sound, where the recording has sound; its topic and all that begins in it (s).
+    fn listen(&mut self, recording: &Recording) -> Result<Option<(String, Vec<f64>)>, ReadError> {
+        let Some(heard) = sound::listen(recording)? else {
             return Ok(None);
         };
-        let said = std::mem::take(&mut heard.remarks);
-        self.quality.extend(
-            said.into_iter()
-                .map(|text| remark(&heard.topic, "sound", text)),
-        );
-        match &heard.beats {
+        let Heard {
+            topic,
+            onset_s,
+            beats,
+            remarks,
+        } = heard;
+        let said = remarks.into_iter();
+        self.quality
+            .extend(said.map(|text| remark(&topic, "sound", text)));
+        match beats {
             Ok(found) => {
-                self.beat_s.clone_from(&found.beat_s);
+                self.beat_s = found.beat_s;
                 self.beat_source = "sound";
             }
             Err(error) => self
                 .quality
-                .push(remark(&heard.topic, "no_beat", error.to_string())),
+                .push(remark(&topic, "no_beat", error.to_string())),
         }
-        Ok(Some(heard))
+        Ok(Some((topic, onset_s)))
     }
 
     fn motion(&mut self, columns: &Columns, topic: &str, track: &Track, settings: Settings) {

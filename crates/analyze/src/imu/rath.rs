@@ -19,6 +19,7 @@ use super::track::Track;
 use super::vertical;
 use crate::filter::{Band, butter, sosfiltfilt};
 use crate::inputs::{Inputs, Window, interpolate};
+use crate::median::median;
 use crate::metrics::{Datum, Metrics, Value, metrics_of, rival_hz};
 use nalgebra::{UnitQuaternion, Vector3};
 
@@ -447,15 +448,13 @@ pub fn metrics(motion: &Motion, window: Window) -> Metrics {
             value.ci95 = Some(ci95);
             continue;
         }
-        let x = if *name == "t_float" && !support_ratio.is_empty() {
-            let share = floating(support_ratio);
-            value.datum = Datum::Number(share);
-            share
-        } else {
-            x
+        let x = match *name {
+            "t_float" => floating(support_ratio),
+            _ => x,
         };
         let half =
             1.96 * (variance(&drawn) + beyond_the_budget(name, motion, window).powi(2)).sqrt();
+        value.datum = Datum::Number(x);
         value.ci95 = Some([x - half, x + half]);
     }
     if out
@@ -509,12 +508,7 @@ fn floating(support_ratio: &[f64]) -> f64 {
         .filter(|w| w.iter().all(|s| s.abs() <= 2.0 * c))
         .map(|w| (w[0] - 2.0 * w[1] + w[2]).abs())
         .collect();
-    if bends.is_empty() {
-        return counted;
-    }
-    let middle = bends.len() / 2;
-    let (_, median, _) = bends.select_nth_unstable_by(middle, f64::total_cmp);
-    let sigma = *median / (0.6745 * 6f64.sqrt());
+    let sigma = median(&mut bends).unwrap_or(0.0) / (0.6745 * 6f64.sqrt());
     if !(sigma > 0.0) {
         return counted;
     }
@@ -557,11 +551,13 @@ fn beyond_the_budget(name: &str, motion: &Motion, window: Window) -> f64 {
         "peak_hz" | "roll_peak_hz" if !seen.is_empty() => {
             let bin = 0.5 / (seen.len() as f64 * period_s) / 3f64.sqrt() * 2f64.sqrt();
             let x = if name == "peak_hz" {
-                &seen[..]
+                &seen
             } else {
                 &inputs.roll_rad[range.clone()]
             };
-            bin.hypot(rival_hz(&inputs.t_s[range][..x.len()], x) / 1.96)
+            // The height lacks its ends: its steps count, not its moments.
+            let t_s = &inputs.t_s[range][..x.len()];
+            bin.hypot(rival_hz(t_s, x) / 1.96)
         }
         // The definition counts samples at 30 Hz; others of the same motion come up to one of them later, evenly spread.
         "onset_time_s" => (1.0 / 30.0) / 3f64.sqrt(),

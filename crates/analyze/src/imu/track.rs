@@ -1,5 +1,7 @@
 //! A clean series of inertial samples.
 
+use crate::median::median;
+
 /// Beyond these a sample is an error of the file, not a motion [rad/s, m/s²].
 const GYRO_LIMIT_RAD_PER_S: f64 = 1e3;
 const ACCEL_LIMIT_M_PER_S2: f64 = 1e5;
@@ -77,12 +79,7 @@ impl Track {
 /// The median step of ascending times, s. `None` below two samples.
 pub fn period_s(t_s: &[f64]) -> Option<f64> {
     let mut steps: Vec<f64> = t_s.windows(2).map(|w| w[1] - w[0]).collect();
-    if steps.is_empty() {
-        return None;
-    }
-    let middle = steps.len() / 2;
-    let (_, median, _) = steps.select_nth_unstable_by(middle, f64::total_cmp);
-    Some(*median).filter(|dt| *dt > 0.0)
+    median(&mut steps).filter(|dt| *dt > 0.0)
 }
 
 #[cfg(test)]

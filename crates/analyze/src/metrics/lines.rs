@@ -47,17 +47,6 @@ impl Line {
         })
     }
 
-    /// How far away the frequency is that comes nearest to being the strongest and farthest from it: of a magnitude of `share` of the line's
-    /// own or more (Hz).
-    fn rival_hz(&self, share: f64) -> f64 {
-        let least = share * self.magnitude[self.bin];
-        let strong = self.hz_grid.iter().zip(&self.magnitude);
-        strong
-            .filter(|(_, m)| **m >= least)
-            .map(|(f, _)| (f - self.hz).abs())
-            .fold(0.0, f64::max)
-    }
-
     /// The largest magnitude within `half_width_hz` of `hz`, over the magnitude of the line itself.
     fn ratio_near(&self, hz: f64, half_width_hz: f64) -> Option<f64> {
         let near = self
@@ -77,14 +66,23 @@ pub fn peak_hz(c: &Context) -> Value {
         .map_or_else(|| Value::missing(NO_LINE), |line| Value::number(line.hz))
 }
 
-/// How far the strongest line of `x`, evenly spaced at `t_s`, may be from that of the same motion in a window cut a little otherwise (Hz): a line
-/// that phase noise has torn into several of like strength is where the strongest of them happens to be. Half the power counts as like.
+/// How far the strongest line of `x`, evenly spaced at `t_s`, is from the farthest one of at least half its power (Hz).
+///
+/// A line that phase noise has torn into several is where the strongest of them happens to be; in a window cut a little otherwise it is another.
+/// 0 without a line.
 pub fn rival_hz(t_s: &[f64], x: &[f64]) -> f64 {
     let series = Series {
         t_s: t_s.into(),
         x: x.into(),
     };
-    Line::strongest(&series).map_or(0.0, |line| line.rival_hz(std::f64::consts::FRAC_1_SQRT_2))
+    let Some(line) = Line::strongest(&series) else {
+        return 0.0;
+    };
+    let half_power = std::f64::consts::FRAC_1_SQRT_2 * line.magnitude[line.bin];
+    let all = line.hz_grid.iter().zip(&line.magnitude);
+    all.filter(|(_, m)| **m >= half_power)
+        .map(|(f, _)| (f - line.hz).abs())
+        .fold(0.0, f64::max)
 }
 
 pub fn h2_ratio(c: &Context) -> Value {

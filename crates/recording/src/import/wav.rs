@@ -189,15 +189,8 @@ impl Sound {
         data.truncate(data.len() - data.len() % frame_bytes);
         // OK because a block is a tenth of a second.
         self.found += (data.len() / frame_bytes) as u32;
-        (!data.is_empty()).then(|| RawAudio {
-            timestamp: Some(prost_types::Timestamp {
-                seconds: t_ns.div_euclid(1_000_000_000),
-                nanos: t_ns.rem_euclid(1_000_000_000) as i32,
-            }),
-            data,
-            format: "pcm-s16".into(),
-            sample_rate: self.spec.sample_rate,
-            number_of_channels: self.spec.channels.into(),
+        (!data.is_empty()).then(|| {
+            RawAudio::pcm_s16(t_ns, data, self.spec.sample_rate, self.spec.channels.into())
         })
     }
 }
