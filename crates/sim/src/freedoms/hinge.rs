@@ -13,7 +13,8 @@ use crate::lanes::{f64x2, sum};
 use crate::model::{Pair, Workspace};
 use nalgebra::{Rotation3, Vector3};
 
-pub(super) struct Hinge {
+/// With n along the world's axis `AXIS` (0, 1, 2); any other number: anywhere.
+pub(super) struct Hinge<const AXIS: usize> {
     /// Place of θ in the state.
     place: Option<usize>,
     /// j
@@ -28,7 +29,10 @@ pub(super) struct Hinge {
     rotation: [[[f64; 3]; 3]; 3],
 }
 
-impl Turning for Hinge {
+/// [`Hinge`] for an axis that lies askew.
+pub(super) const ASKEW: usize = 3;
+
+impl<const AXIS: usize> Turning for Hinge<AXIS> {
     fn new(rails: &Rails, handles: Vec<[f64x2; 3]>) -> Self {
         let free = (0..3).find(|a| rails.place[3 + a].is_some());
         let mut angles = [rails.held[3], rails.held[4], rails.held[5]];
@@ -77,8 +81,20 @@ impl Turning for Hinge {
         let [sin, cos, rate] = [sin, cos, rate].map(f64x2::splat);
         place_handles(&mut w.pair, &self.handles, motion, |[a, b, c]| {
             [
-                [0, 1, 2].map(|k| a[k] + b[k] * cos + c[k] * sin),
-                [0, 1, 2].map(|k| (c[k] * cos - b[k] * sin) * rate),
+                [0, 1, 2].map(|k| {
+                    if k == AXIS {
+                        a[k]
+                    } else {
+                        a[k] + b[k] * cos + c[k] * sin
+                    }
+                }),
+                [0, 1, 2].map(|k| {
+                    if k == AXIS {
+                        f64x2::ZERO
+                    } else {
+                        (c[k] * cos - b[k] * sin) * rate
+                    }
+                }),
             ]
         });
     }
@@ -104,7 +120,11 @@ impl Turning for Hinge {
         dy: &mut [f64],
     ) {
         if let Some(p) = self.place {
-            let turned = dot(self.in_world, torque) + dot(self.in_body, w.body_torque);
+            let along = match AXIS {
+                ASKEW.. => dot(self.in_world, torque),
+                axis => torque[axis],
+            };
+            let turned = along + dot(self.in_body, w.body_torque);
             dy[rails.free + p] = turned * self.inverse_moment;
         }
     }

@@ -12,7 +12,7 @@
 //! Source: Landau & Lifshitz, *Mechanics*, §35 (Euler angles); Kane & Levinson, *Dynamics* (1985), ch. 6.
 
 use super::gimbal::Gimbal;
-use super::hinge::Hinge;
+use super::hinge::{ASKEW, Hinge};
 use super::{Freedoms, Pose, Six, pull};
 use crate::body::Body;
 use crate::lanes::{f64x2, pack, sum};
@@ -40,7 +40,19 @@ pub fn choose(
         [.., roll, tilt, yaw] if u8::from(roll) + u8::from(tilt) + u8::from(yaw) == 2 => {
             Box::new(Reduced::<Gimbal>::new(rails(), handles_m))
         }
-        _ => Box::new(Reduced::<Hinge>::new(rails(), handles_m)),
+        [.., roll, tilt, yaw] => {
+            let [_, pitch_deg, yaw_deg] = start.roll_pitch_yaw_deg;
+            match (roll, tilt, yaw) {
+                (true, ..) if pitch_deg == 0.0 && yaw_deg == 0.0 => {
+                    Box::new(Reduced::<Hinge<0>>::new(rails(), handles_m))
+                }
+                (_, true, _) if yaw_deg == 0.0 => {
+                    Box::new(Reduced::<Hinge<1>>::new(rails(), handles_m))
+                }
+                (.., true) => Box::new(Reduced::<Hinge<2>>::new(rails(), handles_m)),
+                _ => Box::new(Reduced::<Hinge<ASKEW>>::new(rails(), handles_m)),
+            }
+        }
     }
 }
 
