@@ -74,6 +74,36 @@ impl BlockResult {
     }
 }
 
+/// Memory of results that have been used, for those to come: asking the system for it again and again would take a twentieth of the time.
+#[derive(Default)]
+struct Spare {
+    values: Vec<Vec<f64>>,
+    times: Vec<Vec<i64>>,
+}
+
+impl Spare {
+    fn keep(&mut self, result: BlockResult) {
+        for batch in result.batches {
+            self.times.extend([batch.times, batch.stamps]);
+            self.values
+                .extend(batch.columns.into_iter().map(|column| column.values));
+        }
+    }
+}
+
+/// A vector for about `length` numbers out of the spare ones. One that is far too long is given back: small columns would end up with the
+/// memory of the largest.
+fn empty<T>(spare: &mut Vec<Vec<T>>, length: usize) -> Vec<T> {
+    let fits = |v: &Vec<T>| v.capacity() >= length && v.capacity() <= 4 * length + 64;
+    match spare.pop().filter(fits) {
+        Some(mut v) => {
+            v.clear();
+            v
+        }
+        None => Vec::with_capacity(length + length / 8),
+    }
+}
+
 enum State {
     Ready(Box<dyn Decoder>),
     /// Nothing can decode the channel; why, and how that is called.
@@ -107,6 +137,7 @@ pub(super) struct Worker<'a> {
     unknown: BTreeMap<u16, (u64, u64)>,
     /// Message records too short for their header.
     short: u64,
+    spare: Spare,
 }
 
 impl<'a> Worker<'a> {
@@ -121,7 +152,13 @@ impl<'a> Worker<'a> {
             touched: Vec::new(),
             unknown: BTreeMap::new(),
             short: 0,
+            spare: Spare::default(),
         }
+    }
+
+    /// Takes the memory of a result that nobody needs any more.
+    pub fn reuse(&mut self, result: BlockResult) {
+        self.spare.keep(result);
     }
 
     /// Decodes a block.
@@ -318,7 +355,7 @@ impl<'a> Worker<'a> {
             let Some(channel) = &mut self.channels[index] else {
                 continue;
             };
-            channel.harvest(result);
+            channel.harvest(result, &mut self.spare);
         }
     }
 }
@@ -401,7 +438,7 @@ impl<'a> ChannelState<'a> {
         self.waiting.clear();
     }
 
-    fn harvest(&mut self, result: &mut BlockResult) {
+    fn harvest(&mut self, result: &mut BlockResult, spare: &mut Spare) {
         let troubles = &mut result.troubles;
         let mut trouble = |kind, count, time, text, lost| {
             troubles.push(Trouble {
@@ -438,8 +475,8 @@ impl<'a> ChannelState<'a> {
                 .iter_mut()
                 .filter(|column| !column.values.is_empty())
                 .map(|column| {
-                    let hint = column.values.len();
-                    let values = std::mem::replace(&mut column.values, Vec::with_capacity(hint));
+                    let next = empty(&mut spare.values, column.values.len());
+                    let values = std::mem::replace(&mut column.values, next);
                     let rows = std::mem::take(&mut column.rows);
                     let odd = not_finite(&values, &rows);
                     BatchColumn {
@@ -452,8 +489,10 @@ impl<'a> ChannelState<'a> {
                 .collect();
             result.batches.push(ChannelBatch {
                 channel: self.index,
-                times: std::mem::take(&mut self.times),
-                stamps: self.rows.take_stamps(),
+                times: std::mem::replace(&mut self.times, empty(&mut spare.times, rows)),
+                stamps: self
+                    .rows
+                    .take_stamps(|length| empty(&mut spare.times, length)),
                 columns,
                 absent: self
                     .rows

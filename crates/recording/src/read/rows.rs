@@ -140,9 +140,10 @@ impl<'a> Rows<'a> {
         self.stamps.extend(stamps);
     }
 
-    /// The header stamps of the rows; none where not every row has one.
-    pub fn take_stamps(&mut self) -> Vec<i64> {
-        let stamps = std::mem::take(&mut self.stamps);
+    /// The header stamps of the rows; none where not every row has one. `empty` gives memory for about so many of the next batch.
+    pub fn take_stamps(&mut self, empty: impl FnOnce(usize) -> Vec<i64>) -> Vec<i64> {
+        let next = empty(self.stamps.len());
+        let stamps = std::mem::replace(&mut self.stamps, next);
         if stamps.len() == self.row as usize {
             stamps
         } else {

@@ -69,6 +69,8 @@ struct Progress {
     next: usize,
     taken: usize,
     ready: BTreeMap<usize, BlockResult>,
+    /// Results whose memory can be used again.
+    spent: Vec<BlockResult>,
     stop: bool,
 }
 
@@ -111,6 +113,7 @@ pub(super) fn run(
             next: 0,
             taken: 0,
             ready: BTreeMap::new(),
+            spent: Vec::new(),
             stop: false,
         }),
         changed: Condvar::new(),
@@ -123,15 +126,16 @@ pub(super) fn run(
         }
         let mut worker = Worker::new(recording, select);
         for (position, block) in blocks.iter().enumerate() {
-            let result = wait_for(position, &shared, &mut worker, blocks, window);
+            let mut result = wait_for(position, &shared, &mut worker, blocks, window);
             if result.large {
-                worker.large(block, &mut |result| taker.take(result, sink));
+                worker.large(block, &mut |mut result| taker.take(&mut result, sink));
             } else {
-                taker.take(result, sink);
+                taker.take(&mut result, sink);
             }
             recording.data.forget(block.range());
             let mut progress = shared.lock();
             progress.taken = position + 1;
+            progress.spent.push(result);
             drop(progress);
             shared.changed.notify_all();
         }
@@ -142,7 +146,7 @@ pub(super) fn run(
 /// A helper's life: take the next block, decode it, put it down.
 fn help(shared: &Shared, mut worker: Worker<'_>, blocks: &[Block], window: usize) {
     loop {
-        let position = {
+        let (position, spent) = {
             let mut progress = shared.lock();
             loop {
                 if progress.stop || progress.next >= blocks.len() {
@@ -157,8 +161,9 @@ fn help(shared: &Shared, mut worker: Worker<'_>, blocks: &[Block], window: usize
                     .unwrap_or_else(PoisonError::into_inner);
             }
             progress.next += 1;
-            progress.next - 1
+            (progress.next - 1, progress.spent.pop())
         };
+        spent.into_iter().for_each(|spent| worker.reuse(spent));
         let result = worker.block(&blocks[position]);
         shared.lock().ready.insert(position, result);
         shared.changed.notify_all();
@@ -181,7 +186,9 @@ fn wait_for(
         if progress.next < blocks.len() && progress.next < progress.taken + window {
             let mine = progress.next;
             progress.next += 1;
+            let spent = progress.spent.pop();
             drop(progress);
+            spent.into_iter().for_each(|spent| worker.reuse(spent));
             let result = worker.block(&blocks[mine]);
             if mine == position {
                 return result;
@@ -267,10 +274,10 @@ impl<'a> Taker<'a> {
         }
     }
 
-    fn take(&mut self, result: BlockResult, sink: &mut dyn FnMut(&Batch<'_>)) {
+    fn take(&mut self, result: &mut BlockResult, sink: &mut dyn FnMut(&Batch<'_>)) {
         self.messages += result.messages;
         self.contradictions += result.contradictions;
-        for (channel, count) in result.per_channel {
+        for (channel, count) in result.per_channel.drain(..) {
             self.per_channel[channel] += count;
         }
         if let Some((first, last)) = result.times {
@@ -278,7 +285,7 @@ impl<'a> Taker<'a> {
             *start = first.min(*start);
             *end = last.max(*end);
         }
-        for trouble in result.troubles {
+        for trouble in result.troubles.drain(..) {
             // Messages are named by their first; chunks each by their own place.
             let key = match trouble.kind {
                 Kind::Undecodable => (trouble.channel, trouble.kind, String::new()),
@@ -322,12 +329,12 @@ impl<'a> Taker<'a> {
                 text: trouble.text,
             });
         }
-        for batch in result.batches {
+        for batch in &mut result.batches {
             self.batch(batch, sink);
         }
     }
 
-    fn batch(&mut self, batch: ChannelBatch, sink: &mut dyn FnMut(&Batch<'_>)) {
+    fn batch(&mut self, batch: &mut ChannelBatch, sink: &mut dyn FnMut(&Batch<'_>)) {
         let watch = &mut self.watches[batch.channel];
         watch.messages += batch.times.len() as u64;
         watch.log.observe(&batch.times);
@@ -335,11 +342,11 @@ impl<'a> Taker<'a> {
             watch.clocks.observe(&batch.times, &batch.stamps);
             watch.stamps.observe(&batch.stamps);
         }
-        add(&mut watch.absent, batch.absent);
-        add(&mut watch.long, batch.long);
+        add(&mut watch.absent, std::mem::take(&mut batch.absent));
+        add(&mut watch.long, std::mem::take(&mut batch.long));
         watch.trailing += batch.trailing;
         let info = &self.recording.info.channels[batch.channel];
-        if let Some(text) = batch.remark {
+        if let Some(text) = batch.remark.take() {
             let key = (Some(batch.channel), Kind::OddSchema, text.clone());
             if !self.known.contains_key(&key) {
                 self.known.insert(key, self.findings.len());
