@@ -3,8 +3,8 @@
 //! ```text
 //! cargo +nightly fuzz run TARGET corpus/TARGET -- -max_total_time=600 -rss_limit_mb=512 -timeout=10
 //! ```
-//! with a decoder as the target, `ros2msg`, `ros2idl`, `ros1`, `protobuf` or `json`, or with `container`, whose corpus is `../tests/data`.
-//! The seeds in `corpus` are made from those recordings by `cargo run --bin seeds`.
+//! with a decoder as the target, `ros2msg`, `ros2idl`, `ros1`, `protobuf` or `json`, or with `container`. The seeds in `corpus` are made by
+//! `cargo run --bin seeds`; `tar -xf found.tar.zst -C corpus` adds what earlier runs found, `cargo +nightly fuzz cmin` thins it.
 
 use recording::read::{ReadOptions, Recording};
 

@@ -1,7 +1,8 @@
-//! Makes the seeds in `corpus` from the recordings under `../tests/data`: run it in this folder.
+//! Makes the seeds in `corpus`, those of the decoders from the recordings under `../tests/data`: run it in this folder.
 
-use std::{fs, path::Path};
+use std::{borrow::Cow, fs, io::Cursor, path::Path, sync::Arc};
 
+use mcap::{Channel, Compression, Message, Schema, WriteOptions};
 use recording::read::{ReadOptions, Recording};
 
 fn main() -> Result<(), Box<dyn std::error::Error>> {
@@ -39,6 +40,54 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
             folder.join(channel.topic.trim_start_matches('/').replace('/', "_")),
             seed,
         )?;
+    }
+    containers()
+}
+
+/// One small file of each make: large ones take a fuzzer too long.
+fn containers() -> Result<(), Box<dyn std::error::Error>> {
+    let folder = Path::new("corpus/container");
+    fs::create_dir_all(folder)?;
+    let bare = || WriteOptions::new().compression(None).library("");
+    let makes = [
+        ("zstd", bare().compression(Some(Compression::Zstd))),
+        ("none", bare()),
+        ("tiny_chunks", bare().chunk_size(Some(64))),
+        ("unchunked", bare().use_chunks(false)),
+        (
+            "no_summary",
+            bare()
+                .emit_summary_records(false)
+                .emit_summary_offsets(false),
+        ),
+    ];
+    let schema = Arc::new(Schema {
+        id: 1,
+        name: "n".into(),
+        encoding: "jsonschema".into(),
+        data: Cow::Borrowed(b"{}"),
+    });
+    for (name, options) in makes {
+        let mut file = Cursor::new(Vec::new());
+        let mut writer = options.create(&mut file)?;
+        for (k, topic) in (0u32..8).zip(["/a", "/b"].into_iter().cycle()) {
+            writer.write(&Message {
+                channel: Arc::new(Channel {
+                    id: 1 + (k % 2) as u16,
+                    topic: topic.to_owned(),
+                    schema: (topic == "/a").then(|| schema.clone()),
+                    message_encoding: "json".into(),
+                    metadata: Default::default(),
+                }),
+                sequence: k,
+                log_time: u64::from(k) * 1_000_000_000,
+                publish_time: u64::from(k) * 1_000_000_000,
+                data: format!("{{\"x\":{k}}}").into_bytes().into(),
+            })?;
+        }
+        writer.finish()?;
+        drop(writer);
+        fs::write(folder.join(name), file.into_inner())?;
     }
     Ok(())
 }
