@@ -8,7 +8,7 @@ pub use reduced::{Pinned, choose};
 
 use crate::body::Body;
 use crate::lanes::{f64x2, pack, sum};
-use crate::model::{Pair, Workspace};
+use crate::model::{All, Block, Pair, Part, Workspace};
 use crate::scene::Start;
 use nalgebra::{Matrix3, Quaternion, UnitQuaternion, Vector3};
 
@@ -61,6 +61,8 @@ pub trait Freedoms: Send + Sync {
     fn place(&self, start: &Start, height_m: f64, y: &mut [f64]);
     /// Fills `arm`, `gap`, `gap_rate` and `spin` of the workspace, and `rotation` where that is on the way.
     fn gaps(&self, y: &[f64], w: &mut Workspace);
+    /// The same for the handles of a block alone.
+    fn gaps_of(&self, y: &[f64], w: &mut Workspace, block: Block);
     /// Fills `rotation` of the workspace where [`Self::gaps`] did not.
     fn orient(&self, _y: &[f64], _w: &mut Workspace) {}
     /// Writes the derivatives of the body's states from the forces in the workspace.
@@ -154,6 +156,23 @@ impl Six {
             inverse_inertia: Tensor::new(&body.inverse_inertia),
         }
     }
+
+    #[inline(always)]
+    fn place_handles(&self, y: &[f64], w: &mut Workspace, part: impl Part) {
+        let y: &[f64; 13] = y.first_chunk().expect("thirteen states");
+        let r = rotation(&y[3..7]);
+        let spin = [y[10], y[11], y[12]];
+        w.spin = spin;
+        w.rotation = r;
+        let (position, velocity) = ([y[0], y[1], y[2]], [y[7], y[8], y[9]]);
+        place_handles(
+            &mut w.pair,
+            &self.handle,
+            part,
+            [position, velocity],
+            turning(r, spin),
+        );
+    }
 }
 
 /// Places the handles, two by two: arm and its rate from `arm_of`, gap and its rate against a centre of mass at
@@ -162,11 +181,12 @@ impl Six {
 fn place_handles<H>(
     pairs: &mut [Pair],
     handles: &[H],
+    part: impl Part,
     motion: [[f64; 3]; 2],
     arm_of: impl Fn(&H) -> [[f64x2; 3]; 2],
 ) {
     let [position, velocity] = motion.map(|v| v.map(f64x2::splat));
-    for (p, h) in pairs.iter_mut().zip(handles) {
+    for (p, h) in part.of_mut(pairs).iter_mut().zip(part.of(handles)) {
         let [arm, arm_rate] = arm_of(h);
         for a in 0..3 {
             p.arm[a] = arm[a];
@@ -295,18 +315,11 @@ impl Freedoms for Six {
     }
 
     fn gaps(&self, y: &[f64], w: &mut Workspace) {
-        let y: &[f64; 13] = y.first_chunk().expect("thirteen states");
-        let r = rotation(&y[3..7]);
-        let spin = [y[10], y[11], y[12]];
-        w.spin = spin;
-        w.rotation = r;
-        let (position, velocity) = ([y[0], y[1], y[2]], [y[7], y[8], y[9]]);
-        place_handles(
-            &mut w.pair,
-            &self.handle,
-            [position, velocity],
-            turning(r, spin),
-        );
+        self.place_handles(y, w, All);
+    }
+
+    fn gaps_of(&self, y: &[f64], w: &mut Workspace, block: Block) {
+        self.place_handles(y, w, block);
     }
 
     fn accelerate(&self, y: &[f64], w: &mut Workspace, dy: &mut [f64]) {

@@ -19,11 +19,86 @@ use crate::random::{Stream, normal};
 use crate::scene::Scene;
 use crate::sensors::drum::Track;
 use crate::sensors::{Clock, Imu};
+use std::ops::Range;
 
 /// A part of the right-hand side.
 pub trait Term: Send + Sync {
     /// Adds its part to the workspace at time `t_s`.
     fn apply(&self, t_s: f64, w: &mut Workspace);
+    /// The same for a block of pairs, if each is treated by itself.
+    fn on_block(&self) -> Option<&dyn OnBlock> {
+        None
+    }
+}
+
+/// Which pairs are treated.
+pub trait Part {
+    /// Their places among `pairs`.
+    fn range(&self, pairs: usize) -> Range<usize>;
+    /// What belongs to them.
+    fn of<'a, T>(&self, all: &'a [T]) -> &'a [T];
+    /// The same, to be changed.
+    fn of_mut<'a, T>(&self, all: &'a mut [T]) -> &'a mut [T];
+}
+
+/// All of them.
+pub struct All;
+
+impl Part for All {
+    #[inline(always)]
+    fn range(&self, pairs: usize) -> Range<usize> {
+        0..pairs
+    }
+    #[inline(always)]
+    fn of<'a, T>(&self, all: &'a [T]) -> &'a [T] {
+        all
+    }
+    #[inline(always)]
+    fn of_mut<'a, T>(&self, all: &'a mut [T]) -> &'a mut [T] {
+        all
+    }
+}
+
+/// As many as the first cache holds.
+pub type Block = Range<usize>;
+
+impl Part for Block {
+    fn range(&self, _pairs: usize) -> Range<usize> {
+        self.clone()
+    }
+    fn of<'a, T>(&self, all: &'a [T]) -> &'a [T] {
+        &all[self.clone()]
+    }
+    fn of_mut<'a, T>(&self, all: &'a mut [T]) -> &'a mut [T] {
+        &mut all[self.clone()]
+    }
+}
+
+/// A term that treats every pair by itself: where there are thousands, all such terms are applied block by block.
+pub trait Local: Send + Sync {
+    /// As [`Term::apply`], on some of the pairs.
+    fn act(&self, t_s: f64, w: &mut Workspace, part: impl Part);
+}
+
+/// [`Local::act`] on a block.
+pub trait OnBlock {
+    /// Adds its part to a block.
+    fn apply_to(&self, t_s: f64, w: &mut Workspace, block: Block);
+}
+
+impl<T: Local> OnBlock for T {
+    fn apply_to(&self, t_s: f64, w: &mut Workspace, block: Block) {
+        self.act(t_s, w, block);
+    }
+}
+
+impl<T: Local> Term for T {
+    fn apply(&self, t_s: f64, w: &mut Workspace) {
+        self.act(t_s, w, All);
+    }
+    fn on_block(&self) -> Option<&dyn OnBlock> {
+        Some(self)
+    }
 }
 
 /// Where a term belongs in an evaluation.
@@ -62,8 +137,8 @@ pub struct Power {
 
 /// An effect's page in the energy ledger.
 pub trait Account: Send + Sync {
-    /// Power at the evaluated state.
-    fn power(&self, w: &Workspace) -> Power;
+    /// Power at the evaluated state, of `pairs` alone: those from the pair numbered `first` on.
+    fn power(&self, w: &Workspace, pairs: &[Pair], first: usize) -> Power;
     /// Energy stored in the effect's springs, J.
     fn stored_j(&self, _w: &Workspace) -> f64 {
         0.0
@@ -71,18 +146,14 @@ pub trait Account: Send + Sync {
 }
 
 /// The numbers of two carriers in one evaluation, and in the present segment. Padding exerts nothing.
+///
+/// What is used together lies together, in whole lines of the cache: with thousands of carriers these are fetched anew by every term that treats
+/// all of them.
 #[derive(Clone, Copy, Debug)]
+#[repr(C, align(64))]
 pub struct Pair {
-    /// 1 for a carrier, 0 for padding.
-    pub present: f64x2,
-    /// Resting shoulders, m.
-    pub rest: [f64x2; 3],
     /// Natural frequency and the segment's noise, rad/s.
     pub constant_rate: f64x2,
-    /// What multiplies N*: 1 where it acts, 0 on a slack handle.
-    pub contact_gain: f64x2,
-    /// The least that N can be: 0 (slack, or undecided), −∞ (in contact for the whole segment).
-    pub contact_floor: f64x2,
     /// sin φ
     pub sin: f64x2,
     /// cos φ
@@ -91,20 +162,37 @@ pub struct Pair {
     pub rate: f64x2,
     /// Shoulders b, m.
     pub base: [f64x2; 3],
+    /// What multiplies N*: 1 where it acts, 0 on a slack handle.
+    pub contact_gain: f64x2,
     /// ḃ, m/s
     pub base_rate: [f64x2; 3],
-    /// Handles relative to the centre of mass, in the world, m.
-    pub arm: [f64x2; 3],
+    /// The least that N can be: 0 (slack, or undecided), −∞ (in contact for the whole segment).
+    pub contact_floor: f64x2,
     /// Shoulder minus handle, m.
     pub gap: [f64x2; 3],
-    /// Its rate, m/s.
-    pub gap_rate: [f64x2; 3],
     /// N* before the clamp, N.
     pub unclamped: f64x2,
+    /// Rate of the gap, m/s.
+    pub gap_rate: [f64x2; 3],
     /// N, N
     pub normal: f64x2,
+    /// Handles relative to the centre of mass, in the world, m.
+    pub arm: [f64x2; 3],
     /// T in x and y, N
     pub tangential: [f64x2; 2],
+    /// Resting shoulders, m.
+    pub rest: [f64x2; 3],
+}
+
+impl Pair {
+    /// Puts the shoulders at rest.
+    #[inline(always)]
+    fn rest(&mut self) {
+        for axis in 0..3 {
+            self.base[axis] = self.rest[axis];
+            self.base_rate[axis] = f64x2::ZERO;
+        }
+    }
 }
 
 /// The numbers of one evaluation and of the present segment.
@@ -144,6 +232,12 @@ impl Workspace {
     }
 }
 
+/// Pairs by blocks.
+fn blocks(pairs: usize) -> impl Iterator<Item = Block> {
+    let starts = (0..pairs).step_by(BLOCK);
+    starts.map(move |start| start..pairs.min(start + BLOCK))
+}
+
 /// Where things are in the state vector.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Layout {
@@ -164,21 +258,24 @@ impl Layout {
     }
 
     /// Where the phases are.
-    pub fn phase_range(&self) -> std::ops::Range<usize> {
+    pub fn phase_range(&self) -> Range<usize> {
         self.body..self.body + self.phases
     }
 
     /// Where the effects' own states are.
-    pub fn extra_range(&self) -> std::ops::Range<usize> {
+    pub fn extra_range(&self) -> Range<usize> {
         let first = self.body + self.phases;
         first..first + self.extra
     }
 
     /// Where the ledger is.
-    pub fn ledger_range(&self) -> std::ops::Range<usize> {
+    pub fn ledger_range(&self) -> Range<usize> {
         self.extra_range().end..self.size()
     }
 }
+
+/// So many pairs, with what the terms know of them, leave room in the first cache of any processor (32 kB).
+const BLOCK: usize = 32;
 
 /// The unit of a coordinate of the body, m or rad.
 const COORDINATE: f64 = 0.1;
@@ -211,6 +308,8 @@ pub struct Model {
     contact_exponent: f64,
     contact_damping: Vec<f64x2>,
     watches_contact: bool,
+    /// Whether there are so many carriers that they are treated block by block.
+    in_blocks: bool,
     sensor_clocks: Vec<Clock>,
     imus: Vec<Imu>,
     track: Option<Track>,
@@ -260,6 +359,7 @@ impl Model {
             contact_damping: Vec::new(),
             extra: Vec::new(),
             watches_contact: false,
+            in_blocks: false,
             sensor_clocks: Vec::new(),
             imus: Vec::new(),
             track: None,
@@ -271,6 +371,13 @@ impl Model {
         if !scene.solver.energy {
             model.accounts.clear();
         }
+        // What bends a pole or moves the party is not the affair of one pair.
+        let stage = |stage: Stage| model.terms[stage as usize].iter();
+        model.in_blocks = pairs(n) > BLOCK
+            && stage(Stage::Party).chain(stage(Stage::Bends)).count() == 0
+            && stage(Stage::Shoulders)
+                .chain(stage(Stage::Handles))
+                .all(|term| term.on_block().is_some());
         // Only now, when every effect has said what it does to gravity and to the springs that the body rests on.
         let height_m = scene
             .start
@@ -493,7 +600,6 @@ impl Model {
         let pair = |p: usize| {
             let rest = [rest[0][p], rest[1][p], rest[2][p]];
             Pair {
-                present: present[p],
                 rest,
                 constant_rate: zero,
                 contact_gain: present[p],
@@ -634,13 +740,30 @@ impl Model {
 
     #[inline(always)]
     fn powers(&self, dy: &mut [f64], w: &Workspace) {
+        if self.in_blocks {
+            return self.powers_in_blocks(dy, w);
+        }
         for ((_, account), out) in self
             .accounts
             .iter()
             .zip(dy[self.layout.ledger_range()].chunks_exact_mut(2))
         {
-            let power = account.power(w);
+            let power = account.power(w, &w.pair, 0);
             out.copy_from_slice(&[power.work_w, power.dissipated_w]);
+        }
+    }
+
+    #[cold]
+    fn powers_in_blocks(&self, dy: &mut [f64], w: &Workspace) {
+        let ledger = &mut dy[self.layout.ledger_range()];
+        ledger.fill(0.0);
+        for block in blocks(w.pair.len()) {
+            let pairs = &w.pair[block.clone()];
+            for ((_, account), out) in self.accounts.iter().zip(ledger.chunks_exact_mut(2)) {
+                let power = account.power(w, pairs, block.start);
+                out[0] += power.work_w;
+                out[1] += power.dissipated_w;
+            }
         }
     }
 
@@ -653,6 +776,25 @@ impl Model {
         }
         if self.has_phases {
             self.phases(t_s, y, w);
+        }
+        if self.in_blocks {
+            self.handles_in_blocks(t_s, y, w);
+        } else {
+            self.handles(t_s, y, w);
+        }
+        w.body_torque = [0.0; 3];
+        for term in &self.terms[Stage::Body as usize] {
+            term.apply(t_s, w);
+        }
+    }
+
+    /// Shoulders, handles and the forces between them.
+    #[inline(always)]
+    fn handles(&self, t_s: f64, y: &[f64], w: &mut Workspace) {
+        if self.has_phases {
+            for term in &self.terms[Stage::Shoulders as usize] {
+                term.apply(t_s, w);
+            }
         }
         if !self.terms[Stage::Party as usize].is_empty() {
             self.party(t_s, w);
@@ -668,9 +810,22 @@ impl Model {
         for term in &self.terms[Stage::Handles as usize] {
             term.apply(t_s, w);
         }
-        w.body_torque = [0.0; 3];
-        for term in &self.terms[Stage::Body as usize] {
-            term.apply(t_s, w);
+    }
+
+    /// The same, with everything about a block done before it leaves the first cache.
+    #[cold]
+    fn handles_in_blocks(&self, t_s: f64, y: &[f64], w: &mut Workspace) {
+        let local = |stage: Stage| {
+            let terms = self.terms[stage as usize].iter();
+            terms.filter_map(|term| term.on_block())
+        };
+        for block in blocks(w.pair.len()) {
+            if self.has_phases {
+                w.pair[block.clone()].iter_mut().for_each(Pair::rest);
+                local(Stage::Shoulders).for_each(|term| term.apply_to(t_s, w, block.clone()));
+            }
+            self.freedoms.gaps_of(y, w, block.clone());
+            local(Stage::Handles).for_each(|term| term.apply_to(t_s, w, block.clone()));
         }
     }
 
@@ -683,15 +838,12 @@ impl Model {
         {
             (pair.sin, pair.cos) = lanes::sin_cos(phase);
             pair.rate = pair.constant_rate;
-            for axis in 0..3 {
-                pair.base[axis] = pair.rest[axis];
-                pair.base_rate[axis] = f64x2::ZERO;
+            // Blocks do it when they are at hand.
+            if !self.in_blocks {
+                pair.rest();
             }
         }
         for term in &self.terms[Stage::Phases as usize] {
-            term.apply(t_s, w);
-        }
-        for term in &self.terms[Stage::Shoulders as usize] {
             term.apply(t_s, w);
         }
     }
@@ -699,9 +851,7 @@ impl Model {
     #[cold]
     fn party(&self, t_s: f64, w: &mut Workspace) {
         if !self.has_phases {
-            for pair in &mut w.pair {
-                (pair.base, pair.base_rate) = (pair.rest, [f64x2::ZERO; 3]);
-            }
+            w.pair.iter_mut().for_each(Pair::rest);
         }
         for term in &self.terms[Stage::Party as usize] {
             term.apply(t_s, w);
@@ -745,6 +895,77 @@ impl Model {
             let spring_j = self.contact_stiffness[handle] * gap_m.abs().powf(p + 1.0) / (p + 1.0);
             y[self.layout.ledger_range().start + 2 * page + 1] +=
                 if opened { spring_j } else { -spring_j };
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::scene::parse;
+
+    #[test]
+    fn blocks_give_what_all_pairs_at_once_give() {
+        let springs = "[effects.contact]\n[effects.hold]\n[effects.friction]";
+        let bristles =
+            "[effects.contact]\nlaw = \"hunt-crossley\"\n[effects.friction]\nlaw = \"bristle\"";
+        let straps = "[effects.contact]\n[effects.sling]\ndamping_s = 0.1\n[effects.pole_friction]";
+        for freedom in [
+            "[\"height\", \"roll\"]",
+            "[\"height\", \"roll\", \"yaw\"]",
+            "[\"height\", \"roll\", \"tilt\", \"yaw\"]",
+            "[\"x\", \"y\", \"height\", \"roll\", \"tilt\", \"yaw\"]",
+        ] {
+            for forces in [springs, bristles, straps] {
+                let text = format!(
+                    r#"
+                    name = "crowd"
+                    duration_s = 60.0
+                    freedom = {freedom}
+                    [body]
+                    mass_kg = 4500.0
+                    inertia_kg_m2 = {{ xx = 300.0, yy = 9000.0, zz = 9300.0 }}
+                    [start]
+                    roll_pitch_yaw_deg = [3.0, 2.0, 1.0]
+                    angular_velocity_rad_per_s = [0.3, 0.2, 0.1]
+                    [carriers]
+                    initial_phase_sd_rad = 1.0
+                    [carriers.along_poles]
+                    count = 151
+                    {forces}
+                    [effects.gait]
+                    [[effects.gait.harmonics]]
+                    order = 2
+                    amplitude_m = [0.0, 0.01, 0.02]
+                    [effects.lift]
+                    build_up_s = 5.0
+                    [effects.coupling]
+                    [effects.music]
+                    "#
+                );
+                let scene = parse("crowd", &text, &[]).unwrap_or_else(|e| panic!("{e}"));
+                let mut model = Model::new(&scene);
+                assert!(model.in_blocks, "{freedom} {forces}");
+                let y = model.initial_state();
+                let rates = |model: &Model| {
+                    let (mut dy, mut w) = (vec![f64::NAN; y.len()], model.workspace());
+                    model.begin_segment(30.0, &mut w);
+                    model.rhs(31.0, &y, &mut dy, &mut w);
+                    dy
+                };
+                let blocks = rates(&model);
+                model.in_blocks = false;
+                let ledger = model.layout().ledger_range();
+                for (k, (a, b)) in blocks.iter().zip(rates(&model)).enumerate() {
+                    // Only sums of the ledger come in another order.
+                    let same = if ledger.contains(&k) {
+                        (a - b).abs() <= 1e-12 * (1e3 + b.abs())
+                    } else {
+                        a.to_bits() == b.to_bits()
+                    };
+                    assert!(same, "{freedom} {forces} {k}: {a} {b}");
+                }
+            }
         }
     }
 }

@@ -15,7 +15,7 @@
 //! Source: paper, eq. (unilateral); Brogliato, Nonsmooth Mechanics (1999), ch. 2.
 
 use crate::lanes::{f64x2, pack};
-use crate::model::{Account, Model, Pair, Power, Stage, Term, Workspace};
+use crate::model::{Account, Local, Model, Pair, Part, Power, Stage, Workspace};
 use crate::scene::{Checker, PerCarrier, Problem, Scene, problem};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -165,9 +165,9 @@ impl HuntCrossley {
     }
 }
 
-impl Term for HuntCrossley {
-    fn apply(&self, _t_s: f64, w: &mut Workspace) {
-        for p in 0..w.pair.len() {
+impl Local for HuntCrossley {
+    fn act(&self, _t_s: f64, w: &mut Workspace, part: impl Part) {
+        for p in part.range(w.pair.len()) {
             let spring = self.spring(p, w.pair[p].gap[2]);
             let factor = self.per_rate[p] * w.pair[p].gap_rate[2] + 1.0;
             let apart = spring.simd_lt(f64x2::ZERO);
@@ -179,13 +179,12 @@ impl Term for HuntCrossley {
 }
 
 impl Account for HuntCrossley {
-    fn power(&self, w: &Workspace) -> Power {
+    fn power(&self, _w: &Workspace, pairs: &[Pair], first: usize) -> Power {
         let (mut work, mut absorbed) = (f64x2::ZERO, f64x2::ZERO);
-        for p in 0..w.pair.len() {
-            let in_contact = in_contact(&w.pair[p]);
-            let spring = in_contact & self.spring(p, w.pair[p].gap[2]);
-            work += w.pair[p].normal * w.pair[p].base_rate[2];
-            absorbed += (w.pair[p].normal - spring) * w.pair[p].gap_rate[2];
+        for (k, p) in pairs.iter().enumerate() {
+            let spring = in_contact(p) & self.spring(first + k, p.gap[2]);
+            work += p.normal * p.base_rate[2];
+            absorbed += (p.normal - spring) * p.gap_rate[2];
         }
         Power {
             work_w: crate::lanes::sum(work),
@@ -210,9 +209,10 @@ impl Account for HuntCrossley {
 #[derive(Clone, Debug)]
 struct SpringDampers(Vec<(f64x2, f64x2)>);
 
-impl Term for SpringDampers {
-    fn apply(&self, _t_s: f64, w: &mut Workspace) {
-        for (p, &(stiffness, damping)) in w.pair.iter_mut().zip(&self.0) {
+impl Local for SpringDampers {
+    fn act(&self, _t_s: f64, w: &mut Workspace, part: impl Part) {
+        for (p, &(stiffness, damping)) in part.of_mut(&mut w.pair).iter_mut().zip(part.of(&self.0))
+        {
             let free = stiffness * p.gap[2] + damping * p.gap_rate[2];
             p.unclamped = free;
             p.normal = (free * p.contact_gain).fast_max(p.contact_floor);
@@ -226,9 +226,9 @@ fn in_contact(p: &Pair) -> f64x2 {
 }
 
 impl Account for SpringDampers {
-    fn power(&self, w: &Workspace) -> Power {
+    fn power(&self, _w: &Workspace, pairs: &[Pair], first: usize) -> Power {
         let (mut work, mut absorbed) = (f64x2::ZERO, f64x2::ZERO);
-        for (p, &(stiffness, _)) in w.pair.iter().zip(&self.0) {
+        for (p, &(stiffness, _)) in pairs.iter().zip(&self.0[first..]) {
             // N δ̇ goes into the spring and the damper; the spring's part returns through `stored_j`.
             let spring = in_contact(p) & (stiffness * p.gap[2]);
             work += p.normal * p.base_rate[2];

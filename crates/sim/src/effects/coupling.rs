@@ -9,7 +9,7 @@
 //! K_c strength [rad/s]; φ phases (rad). The mean-field form is the same sum in O(N); a graph costs O(edges). For N = 2, δ = φ₂ − φ₁ locks where
 //! |Δω| < K_c, at sin δ* = Δω/K_c. Source: paper, eq. (kuramoto); Kuramoto (1975), Strogatz (2000).
 
-use crate::lanes::{f64x2, sum};
+use crate::lanes::{LANES, f64x2, sum};
 use crate::model::{Model, Stage, Term, Workspace};
 use crate::scene::{Checker, Problem, Scene, problem};
 use schemars::JsonSchema;
@@ -114,6 +114,7 @@ impl Coupling {
                 Stage::Phases,
                 MeanField {
                     gain: self.strength_rad_per_s / n as f64,
+                    padding: (n % LANES) as f64,
                 },
             ),
             Some(edges) => {
@@ -153,6 +154,8 @@ impl Term for Network {
 #[derive(Debug)]
 struct MeanField {
     gain: f64,
+    /// Carriers that only fill the last pair; their phase is 0, their cosine 1.
+    padding: f64,
 }
 
 impl Term for MeanField {
@@ -160,9 +163,9 @@ impl Term for MeanField {
         let (mut s, mut c) = (f64x2::ZERO, f64x2::ZERO);
         for p in &w.pair {
             s += p.sin;
-            c += p.cos * p.present;
+            c += p.cos;
         }
-        let (s, c) = (sum(s) * self.gain, sum(c) * self.gain);
+        let (s, c) = (sum(s) * self.gain, (sum(c) - self.padding) * self.gain);
         for p in &mut w.pair {
             p.rate += p.cos * s - p.sin * c;
         }

@@ -12,7 +12,7 @@
 //! Materials* I, §39; modal reduction: Meirovitch, *Fundamentals of Vibrations* (2001), ch. 8.
 
 use crate::lanes::{f64x2, pack, sum};
-use crate::model::{Account, Model, Power, Stage, Term, Workspace};
+use crate::model::{Account, Model, Pair, Power, Stage, Term, Workspace};
 use crate::scene::{Checker, Problem, Scene};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -151,7 +151,7 @@ impl Term for Bending {
 }
 
 impl Account for Bending {
-    fn power(&self, w: &Workspace) -> Power {
+    fn power(&self, w: &Workspace, _pairs: &[Pair], _first: usize) -> Power {
         let rate2: f64 = self
             .poles
             .iter()

@@ -20,11 +20,12 @@
 //!
 //! Source: paper, section 3.3 ("regularized friction"); Stewart & Trinkle (1996) for what is regularised.
 
-use crate::lanes::{f64x2, sum};
-use crate::model::{Account, Model, Power, Stage, Term, Workspace};
+use crate::lanes::{LANES, f64x2, sum};
+use crate::model::{Account, Local, Model, Pair, Part, Power, Stage, Workspace};
 use crate::scene::{Checker, Problem, Scene, problem};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
+use std::ops::Range;
 
 /// `[effects.friction]`
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
@@ -158,9 +159,10 @@ struct Bristles {
     per_length: f64,
 }
 
-impl Term for Bristles {
-    fn apply(&self, _t_s: f64, w: &mut Workspace) {
-        for i in 0..self.carriers {
+impl Local for Bristles {
+    fn act(&self, _t_s: f64, w: &mut Workspace, part: impl Part) {
+        let Range { start, end } = part.range(w.pair.len());
+        for i in LANES * start..self.carriers.min(LANES * end) {
             let slide = [0, 1].map(|a| w.of(i, |p| p.gap_rate[a]));
             let speed = slide[0].hypot(slide[1]);
             let load = w.of(i, |p| p.normal).max(0.0);
@@ -179,9 +181,9 @@ impl Term for Bristles {
 #[derive(Debug)]
 struct Limit(Coulomb);
 
-impl Term for Limit {
-    fn apply(&self, _t_s: f64, w: &mut Workspace) {
-        for p in &mut w.pair {
+impl Local for Limit {
+    fn act(&self, _t_s: f64, w: &mut Workspace, part: impl Part) {
+        for p in part.of_mut(&mut w.pair) {
             p.tangential = self
                 .0
                 .limited(p.normal, p.tangential, [p.gap_rate[0], p.gap_rate[1]]);
@@ -192,9 +194,9 @@ impl Term for Limit {
 #[derive(Debug)]
 struct Alone(Coulomb);
 
-impl Term for Alone {
-    fn apply(&self, _t_s: f64, w: &mut Workspace) {
-        for p in &mut w.pair {
+impl Local for Alone {
+    fn act(&self, _t_s: f64, w: &mut Workspace, part: impl Part) {
+        for p in part.of_mut(&mut w.pair) {
             p.tangential =
                 self.0
                     .limited(p.normal, [f64x2::ZERO; 2], [p.gap_rate[0], p.gap_rate[1]]);
@@ -203,9 +205,9 @@ impl Term for Alone {
 }
 
 impl Account for Coulomb {
-    fn power(&self, w: &Workspace) -> Power {
+    fn power(&self, _w: &Workspace, pairs: &[Pair], _first: usize) -> Power {
         let (mut work, mut absorbed) = (f64x2::ZERO, f64x2::ZERO);
-        for p in &w.pair {
+        for p in pairs {
             for axis in 0..2 {
                 work += p.tangential[axis] * p.base_rate[axis];
                 absorbed += p.tangential[axis] * p.gap_rate[axis];

@@ -8,7 +8,7 @@
 //! Source: paper, eq. (base).
 
 use crate::lanes::{f64x2, pack};
-use crate::model::{Model, Pair, Stage, Term, Workspace};
+use crate::model::{Local, Model, Pair, Part, Stage, Workspace};
 use crate::scene::{Checker, PerCarrier, Problem, Scene, problem};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -131,9 +131,13 @@ struct Wave {
 impl Wave {
     /// `turn` gives sin kφ and cos kφ.
     #[inline(always)]
-    fn add(&self, w: &mut Workspace, turn: impl Fn(&Pair) -> (f64x2, f64x2)) {
+    fn add(&self, w: &mut Workspace, part: &impl Part, turn: impl Fn(&Pair) -> (f64x2, f64x2)) {
         let (axis, order) = (self.axis % 3, f64::from(self.order));
-        for (p, &(sine, cosine)) in w.pair.iter_mut().zip(&self.parts) {
+        for (p, &(sine, cosine)) in part
+            .of_mut(&mut w.pair)
+            .iter_mut()
+            .zip(part.of(&self.parts))
+        {
             let (sin, cos) = turn(p);
             p.base[axis] += sine * sin + cosine * cos;
             p.base_rate[axis] += p.rate * order * (sine * cos - cosine * sin);
@@ -144,10 +148,10 @@ impl Wave {
 #[derive(Debug)]
 struct First(Vec<Wave>);
 
-impl Term for First {
-    fn apply(&self, _t_s: f64, w: &mut Workspace) {
+impl Local for First {
+    fn act(&self, _t_s: f64, w: &mut Workspace, part: impl Part) {
         for wave in &self.0 {
-            wave.add(w, |p| (p.sin, p.cos));
+            wave.add(w, &part, |p| (p.sin, p.cos));
         }
     }
 }
@@ -155,11 +159,11 @@ impl Term for First {
 #[derive(Debug)]
 struct Higher(Vec<Wave>);
 
-impl Term for Higher {
-    fn apply(&self, _t_s: f64, w: &mut Workspace) {
+impl Local for Higher {
+    fn act(&self, _t_s: f64, w: &mut Workspace, part: impl Part) {
         for wave in &self.0 {
             // sin and cos of kφ by repeated addition of φ: k − 1 complex products, error of the order of kε.
-            wave.add(w, |p| {
+            wave.add(w, &part, |p| {
                 let (mut s, mut c) = (p.sin, p.cos);
                 for _ in 1..wave.order {
                     (s, c) = (s * p.cos + c * p.sin, c * p.cos - s * p.sin);

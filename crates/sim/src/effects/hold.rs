@@ -8,7 +8,7 @@
 //! Source: paper, section 3.3 ("tangential forces can be added"); palanquin-bench, law of T.
 
 use crate::lanes::{f64x2, pack};
-use crate::model::{Account, Model, Power, Stage, Term, Workspace};
+use crate::model::{Account, Local, Model, Pair, Part, Power, Stage, Workspace};
 use crate::scene::{Checker, PerCarrier, Problem, Scene};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -59,9 +59,9 @@ impl Hold {
 #[derive(Clone, Debug)]
 struct SpringDampers(Vec<(f64x2, f64x2)>);
 
-impl Term for SpringDampers {
-    fn apply(&self, _t_s: f64, w: &mut Workspace) {
-        for (p, &(k, c)) in w.pair.iter_mut().zip(&self.0) {
+impl Local for SpringDampers {
+    fn act(&self, _t_s: f64, w: &mut Workspace, part: impl Part) {
+        for (p, &(k, c)) in part.of_mut(&mut w.pair).iter_mut().zip(part.of(&self.0)) {
             p.tangential[0] = k * p.gap[0] + c * p.gap_rate[0];
             p.tangential[1] = k * p.gap[1] + c * p.gap_rate[1];
         }
@@ -70,9 +70,9 @@ impl Term for SpringDampers {
 
 impl Account for SpringDampers {
     /// Books the whole tangential force, a friction limit on it included: what the cap takes counts as dissipated.
-    fn power(&self, w: &Workspace) -> Power {
+    fn power(&self, _w: &Workspace, pairs: &[Pair], first: usize) -> Power {
         let (mut work, mut absorbed) = (f64x2::ZERO, f64x2::ZERO);
-        for (p, &(stiffness, _)) in w.pair.iter().zip(&self.0) {
+        for (p, &(stiffness, _)) in pairs.iter().zip(&self.0[first..]) {
             for axis in 0..2 {
                 let spring = stiffness * p.gap[axis];
                 work += p.tangential[axis] * p.base_rate[axis];

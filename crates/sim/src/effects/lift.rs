@@ -6,7 +6,7 @@
 //! g gain (1); t₀ onset (s); τ build-up (s), where 0 means g from t₀ on (then the shoulders jump at t₀ > 0, so a build-up
 //! is asked for there). Source: the archive's music logs, whose summed force is large before the phases lock.
 
-use crate::model::{Model, Stage, Switch, Term, Workspace};
+use crate::model::{Local, Model, Pair, Part, Stage, Switch, Workspace};
 use crate::scene::{Checker, Problem, Scene, problem};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -74,8 +74,8 @@ impl Lift {
 }
 
 #[inline(always)]
-fn amplify(w: &mut Workspace, gain: f64, gain_rate: f64) {
-    for p in &mut w.pair {
+fn amplify(pairs: &mut [Pair], gain: f64, gain_rate: f64) {
+    for p in pairs {
         let lifted = p.base[2] - p.rest[2];
         p.base[2] = p.rest[2] + lifted * gain;
         p.base_rate[2] = p.base_rate[2] * gain + lifted * gain_rate;
@@ -85,9 +85,9 @@ fn amplify(w: &mut Workspace, gain: f64, gain_rate: f64) {
 #[derive(Debug)]
 struct Constant(f64);
 
-impl Term for Constant {
-    fn apply(&self, _t_s: f64, w: &mut Workspace) {
-        amplify(w, self.0, 0.0);
+impl Local for Constant {
+    fn act(&self, _t_s: f64, w: &mut Workspace, part: impl Part) {
+        amplify(part.of_mut(&mut w.pair), self.0, 0.0);
     }
 }
 
@@ -98,8 +98,8 @@ struct Growing {
     per_s: f64,
 }
 
-impl Term for Growing {
-    fn apply(&self, t_s: f64, w: &mut Workspace) {
+impl Local for Growing {
+    fn act(&self, t_s: f64, w: &mut Workspace, part: impl Part) {
         // Stages of a step that ends at the onset see t ≤ t₀; a step never straddles it.
         let decay = (-(t_s - self.onset_s).max(0.0) * self.per_s).exp();
         let growing = if t_s >= self.onset_s {
@@ -107,7 +107,11 @@ impl Term for Growing {
         } else {
             0.0
         };
-        amplify(w, 1.0 + self.excess * (1.0 - decay), growing);
+        amplify(
+            part.of_mut(&mut w.pair),
+            1.0 + self.excess * (1.0 - decay),
+            growing,
+        );
     }
 }
 

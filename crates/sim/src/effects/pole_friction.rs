@@ -10,7 +10,7 @@
 //! regularised Coulomb law of [`super::friction`], about an axis.
 
 use crate::lanes::{f64x2, sum};
-use crate::model::{Account, Model, Power, Stage, Term, Workspace};
+use crate::model::{Account, Model, Pair, Power, Stage, Term, Workspace};
 use crate::scene::{Checker, Problem, Scene};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -64,9 +64,9 @@ struct Rub {
 
 impl Rub {
     #[inline(always)]
-    fn torque_n_m(&self, w: &Workspace) -> f64 {
+    fn torque_n_m(&self, w: &Workspace, pairs: &[Pair]) -> f64 {
         let (mut load, least) = (f64x2::ZERO, f64x2::splat(w.least_load_n));
-        for p in &w.pair {
+        for p in pairs {
             load += if self.bilateral {
                 p.normal.abs()
             } else {
@@ -80,15 +80,15 @@ impl Rub {
 
 impl Term for Rub {
     fn apply(&self, _t_s: f64, w: &mut Workspace) {
-        w.body_torque[0] += self.torque_n_m(w);
+        w.body_torque[0] += self.torque_n_m(w, &w.pair);
     }
 }
 
 impl Account for Rub {
-    fn power(&self, w: &Workspace) -> Power {
+    fn power(&self, w: &Workspace, pairs: &[Pair], _first: usize) -> Power {
         Power {
             work_w: 0.0,
-            dissipated_w: -self.torque_n_m(w) * w.spin[0],
+            dissipated_w: -self.torque_n_m(w, pairs) * w.spin[0],
         }
     }
 }

@@ -13,7 +13,7 @@
 //! h = 0.1 m, M = 60 kg and a = 0.04795 it asks for L = 0.70 m and I_xx = 2.68 kg·m²), a spring of its own does not.
 
 use crate::lanes::{f64x2, sum};
-use crate::model::{Account, Model, Pair, Power, Stage, Term, Workspace};
+use crate::model::{Account, Local, Model, Pair, Part, Power, Stage, Workspace};
 use crate::scene::{Checker, Problem, Scene};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -80,10 +80,11 @@ impl Strap {
     }
 }
 
-impl Term for Strap {
-    fn apply(&self, _t_s: f64, w: &mut Workspace) {
-        for p in &mut w.pair {
-            p.tangential = self.force(p, w.least_load_n);
+impl Local for Strap {
+    fn act(&self, _t_s: f64, w: &mut Workspace, part: impl Part) {
+        let least_n = w.least_load_n;
+        for p in part.of_mut(&mut w.pair) {
+            p.tangential = self.force(p, least_n);
         }
     }
 }
@@ -92,10 +93,11 @@ impl Term for Strap {
 #[derive(Debug)]
 struct Beside(Strap);
 
-impl Term for Beside {
-    fn apply(&self, _t_s: f64, w: &mut Workspace) {
-        for p in &mut w.pair {
-            let [x, y] = self.0.force(p, w.least_load_n);
+impl Local for Beside {
+    fn act(&self, _t_s: f64, w: &mut Workspace, part: impl Part) {
+        let least_n = w.least_load_n;
+        for p in part.of_mut(&mut w.pair) {
+            let [x, y] = self.0.force(p, least_n);
             p.tangential[0] += x;
             p.tangential[1] += y;
         }
@@ -103,9 +105,9 @@ impl Term for Beside {
 }
 
 impl Account for Strap {
-    fn power(&self, w: &Workspace) -> Power {
+    fn power(&self, w: &Workspace, pairs: &[Pair], _first: usize) -> Power {
         let (mut work, mut absorbed) = (f64x2::ZERO, f64x2::ZERO);
-        for p in &w.pair {
+        for p in pairs {
             for (axis, force) in self.force(p, w.least_load_n).into_iter().enumerate() {
                 work += force * p.base_rate[axis];
                 absorbed += force * p.gap_rate[axis];

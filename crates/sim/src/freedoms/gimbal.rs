@@ -9,7 +9,7 @@
 use super::reduced::{Rails, Turning, cross, dot, sin_cos};
 use super::{place_handles, times, turning};
 use crate::lanes::f64x2;
-use crate::model::Workspace;
+use crate::model::{Part, Workspace};
 
 pub(super) struct Gimbal {
     handles: Vec<[f64x2; 3]>,
@@ -84,13 +84,21 @@ impl Turning for Gimbal {
     }
 
     #[inline(always)]
-    fn gaps(&self, rails: &Rails, y: &[f64], motion: [[f64; 3]; 2], w: &mut Workspace) {
+    fn gaps(
+        &self,
+        rails: &Rails,
+        y: &[f64],
+        motion: [[f64; 3]; 2],
+        w: &mut Workspace,
+        part: impl Part,
+    ) {
         let at = self.attitude(rails, y);
         w.spin = at.spin();
         w.rotation = at.rows();
         place_handles(
             &mut w.pair,
             &self.handles,
+            part,
             motion,
             turning(w.rotation, w.spin),
         );

@@ -10,7 +10,7 @@
 use super::reduced::{Rails, Turning, cross, dot, sin_cos};
 use super::{place_handles, times};
 use crate::lanes::{f64x2, sum};
-use crate::model::{Pair, Workspace};
+use crate::model::{Pair, Part, Workspace};
 use nalgebra::{Rotation3, Vector3};
 
 /// With n along the world's axis `AXIS` (0, 1, 2); any other number: anywhere.
@@ -72,14 +72,21 @@ impl<const AXIS: usize> Turning for Hinge<AXIS> {
     }
 
     #[inline(always)]
-    fn gaps(&self, rails: &Rails, y: &[f64], motion: [[f64; 3]; 2], w: &mut Workspace) {
+    fn gaps(
+        &self,
+        rails: &Rails,
+        y: &[f64],
+        motion: [[f64; 3]; 2],
+        w: &mut Workspace,
+        part: impl Part,
+    ) {
         let ((sin, cos), rate) = match self.place {
             Some(p) => (sin_cos(y[p]), y[rails.free + p]),
             None => ((0.0, 1.0), 0.0),
         };
         w.spin = self.in_body.map(|j| j * rate);
         let [sin, cos, rate] = [sin, cos, rate].map(f64x2::splat);
-        place_handles(&mut w.pair, &self.handles, motion, |[a, b, c]| {
+        place_handles(&mut w.pair, &self.handles, part, motion, |[a, b, c]| {
             [
                 [0, 1, 2].map(|k| {
                     if k == AXIS {

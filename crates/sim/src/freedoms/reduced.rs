@@ -16,7 +16,7 @@ use super::hinge::{ASKEW, Hinge};
 use super::{Freedoms, Pose, Six, pull};
 use crate::body::Body;
 use crate::lanes::{f64x2, pack, sum};
-use crate::model::{Pair, Workspace};
+use crate::model::{All, Block, Pair, Part, Workspace};
 use crate::scene::{Freedom, Start};
 use nalgebra::{DMatrix, DVector, Matrix3, UnitQuaternion, Vector3};
 
@@ -88,6 +88,9 @@ impl Freedoms for Pinned {
     }
     fn gaps(&self, y: &[f64], w: &mut Workspace) {
         self.six.gaps(y, w);
+    }
+    fn gaps_of(&self, y: &[f64], w: &mut Workspace, block: Block) {
+        self.six.gaps_of(y, w, block);
     }
     fn accelerate(&self, y: &[f64], w: &mut Workspace, dy: &mut [f64]) {
         self.six.accelerate(y, w, dy);
@@ -192,7 +195,14 @@ pub(super) trait Turning: Send + Sync {
     /// For handles in body coordinates, packed two by two (m).
     fn new(rails: &Rails, handles: Vec<[f64x2; 3]>) -> Self;
     /// Fills `spin` of the workspace and places the handles; `motion` of the centre of mass as in [`super::place_handles`].
-    fn gaps(&self, rails: &Rails, y: &[f64], motion: [[f64; 3]; 2], w: &mut Workspace);
+    fn gaps(
+        &self,
+        rails: &Rails,
+        y: &[f64],
+        motion: [[f64; 3]; 2],
+        w: &mut Workspace,
+        part: impl Part,
+    );
     /// Fills `rotation` of the workspace, if `gaps` did not.
     fn orient(&self, _y: &[f64], _w: &mut Workspace) {}
     /// Writes the second derivatives of the free angles; `torque` of the handle forces in the world (N·m).
@@ -227,6 +237,17 @@ impl<T: Turning> Reduced<T> {
             turning: T::new(&rails, handles),
             rails,
         }
+    }
+
+    #[inline(always)]
+    fn place_handles(&self, y: &[f64], w: &mut Workspace, part: impl Part) {
+        let rails = &self.rails;
+        let (mut position, mut velocity) = ([0, 1, 2].map(|c| rails.held[c]), [0.0; 3]);
+        for &(c, p) in &rails.translations {
+            (position[c], velocity[c]) = (y[p], y[rails.free + p]);
+        }
+        let motion = [position, velocity];
+        self.turning.gaps(rails, y, motion, w, part);
     }
 
     /// J (φ̇, θ̇, ψ̇), or with the rates of a state J (φ̈, θ̈, ψ̈).
@@ -291,12 +312,11 @@ impl<T: Turning> Freedoms for Reduced<T> {
     }
 
     fn gaps(&self, y: &[f64], w: &mut Workspace) {
-        let rails = &self.rails;
-        let (mut position, mut velocity) = ([0, 1, 2].map(|c| rails.held[c]), [0.0; 3]);
-        for &(c, p) in &rails.translations {
-            (position[c], velocity[c]) = (y[p], y[rails.free + p]);
-        }
-        self.turning.gaps(rails, y, [position, velocity], w);
+        self.place_handles(y, w, All);
+    }
+
+    fn gaps_of(&self, y: &[f64], w: &mut Workspace, block: Block) {
+        self.place_handles(y, w, block);
     }
 
     fn orient(&self, y: &[f64], w: &mut Workspace) {
