@@ -22,7 +22,7 @@ pub enum Role {
     Phases,
     /// Phase of the beat (rad).
     BeatPhase,
-    /// Topic of the IMU on what is carried.
+    /// Topic of the IMU on what is carried; further ones there follow it.
     Imu,
     /// Topic of the IMU of one carrier.
     Carriers,
@@ -84,7 +84,9 @@ pub struct RolesFile {
     #[serde(default)]
     phases: Vec<String>,
     beat_phase: Option<String>,
-    imu: Option<String>,
+    /// The first is what motion is estimated from; others on the load are held against it.
+    #[serde(default, deserialize_with = "one_or_more")]
+    imu: Vec<String>,
     #[serde(default)]
     carriers: Vec<String>,
     beats: Option<String>,
@@ -107,6 +109,20 @@ pub struct RolesFile {
     /// How old an accelerometer's sample is at its stamp (s).
     #[serde(default, deserialize_with = "age")]
     pub accel_age_s: Option<f64>,
+}
+
+/// One name, or a list of them.
+fn one_or_more<'de, D: serde::Deserializer<'de>>(from: D) -> Result<Vec<String>, D::Error> {
+    #[derive(Deserialize)]
+    #[serde(untagged, expecting = "expected a topic or a list of topics")]
+    enum Names {
+        One(String),
+        More(Vec<String>),
+    }
+    Ok(match Names::deserialize(from)? {
+        Names::One(name) => vec![name],
+        Names::More(names) => names,
+    })
 }
 
 /// An age that a sensor's sample can have.
@@ -141,7 +157,7 @@ impl RolesFile {
             Role::Forces => self.forces.clone(),
             Role::Phases => self.phases.clone(),
             Role::BeatPhase => self.beat_phase.iter().cloned().collect(),
-            Role::Imu => self.imu.iter().cloned().collect(),
+            Role::Imu => self.imu.clone(),
             Role::Carriers => self.carriers.clone(),
             Role::Beats => self.beats.iter().cloned().collect(),
             Role::Truth => self.truth.iter().cloned().collect(),
@@ -263,7 +279,12 @@ impl Roles {
             .into_iter()
             .partition(|t| is_carrier(t));
         if !others.is_empty() {
-            roles.patterns.insert(Role::Imu, vec![preferred(&others)]);
+            let first = preferred(&others);
+            let also = others.into_iter().filter(|t| about_the_load(t));
+            let also: Vec<String> = also.filter(|t| *t != first).collect();
+            roles
+                .patterns
+                .insert(Role::Imu, [vec![first], also].concat());
         }
         if !carriers.is_empty() {
             roles
@@ -346,12 +367,19 @@ fn is_carrier(topic: &str) -> bool {
 
 /// Of several IMUs the one whose name speaks of what is carried, else the first by name.
 fn preferred(topics: &[String]) -> String {
-    let about = ["rath", "palanquin", "palki", "pole", "load", "body"];
     topics
         .iter()
-        .find(|t| about.iter().any(|word| t.to_lowercase().contains(word)))
+        .find(|t| about_the_load(t) || t.to_lowercase().contains("body"))
         .unwrap_or(&topics[0])
         .clone()
+}
+
+/// Whether a topic's name speaks of what is carried.
+pub(crate) fn about_the_load(topic: &str) -> bool {
+    let topic = topic.to_lowercase();
+    ["rath", "palanquin", "palki", "pole", "load"]
+        .iter()
+        .any(|word| topic.contains(word))
 }
 
 /// `carrier_2` before `carrier_10`.

@@ -2,7 +2,7 @@
 //!
 //! The clock of the rath's own sensor is everybody's. A device keeps its own where too little is shared, and that is said.
 
-use crate::clock::{Clock, ClockError, from_events, taps};
+use crate::clock::{Clock, ClockError, from_events, from_signals, taps};
 use crate::examine::Quality;
 use crate::imu::Track;
 
@@ -16,6 +16,8 @@ const SHARE: f64 = 0.6;
 const SEARCH_S: f64 = 300.0;
 /// A tap of one and the same tap of the other are this near, s: half a sample of each at 50 Hz.
 const TOLERANCE_S: f64 = 0.02;
+/// How far the clocks of two sensors on the load are looked for by its motion, s.
+const TURNING_SEARCH_S: f64 = 10.0;
 /// Standard error of every moment heard alike, s: windows of 32 ms every 10 ms tell when a sound begins.
 const HEARD_SD_S: f64 = 0.003;
 
@@ -26,6 +28,8 @@ pub struct Clocks {
     rath: String,
     /// Taps on it, s.
     tap_s: Vec<f64>,
+    /// When and how fast it turns, s and rad/s.
+    turning: (Vec<f64>, Vec<f64>),
     /// Whether any other clock was set.
     pub any_set: bool,
     /// What there is to say.
@@ -38,6 +42,7 @@ impl Clocks {
         Self {
             rath: topic.to_owned(),
             tap_s: felt(track),
+            turning: (track.t_s.clone(), norms(&track.gyro_rad_per_s)),
             ..Self::default()
         }
     }
@@ -56,6 +61,36 @@ impl Clocks {
                 *t = clock.reference_s(*t);
             }
         }
+    }
+
+    /// Says how the clock of another sensor on the load goes, by how fast both turn: on a rigid body that is the same everywhere, whichever way a
+    /// sensor is mounted. Nothing is put right: no estimate rests on it.
+    pub fn hold_against(&mut self, topic: &str, track: &Track) {
+        let (t_s, turning) = &self.turning;
+        let own = norms(&track.gyro_rad_per_s);
+        let found = from_signals((&track.t_s, &own), (t_s, turning), TURNING_SEARCH_S);
+        let (kind, text) = match found {
+            Ok(clock) => (
+                "clock_offset",
+                format!(
+                    "{}, by how fast both turn; motion is estimated from {} alone",
+                    self.against(
+                        &clock,
+                        clock.at_s - clock.reference_s(clock.at_s),
+                        -clock.drift_ppm
+                    ),
+                    self.rath
+                ),
+            ),
+            Err(error) => (
+                "turns_otherwise",
+                format!(
+                    "is named as a sensor on the load and held against {}: {error}",
+                    self.rath
+                ),
+            ),
+        };
+        self.remarks.push(remark(topic, kind, text));
     }
 
     /// Puts what was heard on the rath's clock; `onset_s` is everything that begins in the sound.
@@ -109,17 +144,25 @@ impl Clocks {
         None
     }
 
+    /// A clock beside that of the rath's sensor, in words.
+    fn against(&self, clock: &Clock, ahead_s: f64, fast_ppm: f64) -> String {
+        format!(
+            "runs {:+.1} ± {:.1} ms off {} and {:+.0} ± {:.0} ppm fast",
+            1e3 * ahead_s,
+            1.96e3 * clock.offset_sd_s,
+            self.rath,
+            fast_ppm,
+            1.96 * clock.drift_sd_ppm.unwrap_or_default(),
+        )
+    }
+
     fn say(&mut self, topic: &str, clock: &Clock, ahead_s: f64, fast_ppm: f64) {
         self.remarks.push(remark(
             topic,
             "clock_offset",
             format!(
-                "runs {:+.1} ± {:.1} ms off {} and {:+.0} ± {:.0} ppm fast, by {} taps; put right",
-                1e3 * ahead_s,
-                1.96e3 * clock.offset_sd_s,
-                self.rath,
-                fast_ppm,
-                1.96 * clock.drift_sd_ppm.unwrap_or_default(),
+                "{}, by {} taps; put right",
+                self.against(clock, ahead_s, fast_ppm),
                 clock.points
             ),
         ));
@@ -129,10 +172,56 @@ impl Clocks {
 
 /// Taps that a sensor felt, s.
 fn felt(track: &Track) -> Vec<f64> {
-    let norm: Vec<f64> = track
-        .accel_m_per_s2
-        .iter()
-        .map(|a| nalgebra::Vector3::from(*a).norm())
-        .collect();
-    taps(&track.t_s, &norm)
+    taps(&track.t_s, &norms(&track.accel_m_per_s2))
+}
+
+/// Lengths of vectors.
+fn norms(vectors: &[[f64; 3]]) -> Vec<f64> {
+    let length = |v: &[f64; 3]| nalgebra::Vector3::from(*v).norm();
+    vectors.iter().map(length).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A body that turns without repeating itself, seen by a clock that is ahead by `ahead_s` at 30 s and fast by `fast_ppm`.
+    fn seen(ahead_s: f64, fast_ppm: f64, turned: bool) -> Track {
+        let mut track = Track::default();
+        for k in 0..6000 {
+            let t = f64::from(k) * 0.01;
+            let roll = (2.0 * t).sin() + 0.7 * (3.3 * t + (0.21 * t).sin() * 2.0).sin();
+            let pitch = 0.5 * (0.37 * t * t.sqrt()).cos();
+            track.t_s.push(t + ahead_s + 1e-6 * fast_ppm * (t - 30.0));
+            track.gyro_rad_per_s.push(if turned {
+                [pitch, 0.0, -roll]
+            } else {
+                [roll, pitch, 0.0]
+            });
+            track.accel_m_per_s2.push([0.0, 0.0, 9.8]);
+        }
+        track
+    }
+
+    #[test]
+    fn sensors_on_one_body_tell_each_others_clocks() {
+        let mut clocks = Clocks::of_rath("/imu/rath", &seen(0.0, 0.0, false));
+        clocks.hold_against("/imu/rath_2", &seen(0.12, 80.0, true));
+        let mut still = seen(0.0, 0.0, false);
+        still.gyro_rad_per_s.fill([0.0; 3]);
+        clocks.hold_against("/imu/pole", &still);
+        let [first, second] = &clocks.remarks[..] else {
+            panic!("{:?}", clocks.remarks)
+        };
+        let numbers: Vec<f64> = first
+            .text
+            .split_whitespace()
+            .filter_map(|word| word.parse().ok())
+            .collect();
+        assert_eq!(first.kind, "clock_offset");
+        assert!((numbers[0] - 120.0).abs() < 1.0, "{}", first.text);
+        assert!((numbers[2] - 80.0).abs() < 10.0, "{}", first.text);
+        assert_eq!(second.kind, "turns_otherwise", "{}", second.text);
+        assert!(!clocks.any_set);
+    }
 }

@@ -24,7 +24,7 @@ use crate::imu::orientation::Options;
 use crate::imu::rath::{self, Motion, Settings};
 use crate::inputs::{Inputs, Window};
 use crate::metrics::{Metrics, Value, metrics_of};
-use crate::roles::{Role, Roles, Sensors};
+use crate::roles::{Role, Roles, Sensors, about_the_load};
 use carriers::Carriers;
 use clocks::Clocks;
 use judge::Judge;
@@ -135,6 +135,12 @@ impl Field {
                 continue;
             };
             let is_rath = roles.topic(Role::Imu) == Some(topic.as_str());
+            if !is_rath && roles.patterns(Role::Imu).contains(topic) {
+                if !one_clock {
+                    clocks.hold_against(topic, &track);
+                }
+                continue;
+            }
             if !one_clock {
                 if is_rath {
                     clocks = Clocks::of_rath(topic, &track);
@@ -153,7 +159,7 @@ impl Field {
                 field.motion(&columns, topic, &track, settings);
             }
             // The one sensor of a walker's phone plays the rath's role for want of another: steps tell.
-            if !is_rath || (roles.patterns(Role::Carriers).is_empty() && !about_the_rath(topic)) {
+            if !is_rath || (roles.patterns(Role::Carriers).is_empty() && !about_the_load(topic)) {
                 field.carriers.add(topic, &track, options);
             }
         }
@@ -410,13 +416,6 @@ fn options(simulated: bool, said: &Sensors) -> Options {
         accel_latency_s: said.accel_age_s.unwrap_or(usual.accel_latency_s),
         ..usual
     }
-}
-
-fn about_the_rath(topic: &str) -> bool {
-    let topic = topic.to_lowercase();
-    ["rath", "palanquin", "palki", "pole", "load"]
-        .iter()
-        .any(|word| topic.contains(word))
 }
 
 pub(super) fn remark(topic: &str, kind: &'static str, text: String) -> Quality {
