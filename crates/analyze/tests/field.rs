@@ -135,6 +135,9 @@ fn raw_phone_files_become_the_papers_metrics() {
     assert!((off_ms("/imu/carrier_1") - 90.5).abs() < 2.0);
     assert!((off_ms("/imu/carrier_2") + 60.5).abs() < 2.0);
     assert!((off_ms("/audio/drum") + 3060.0).abs() < 6.0);
+    // And they are not taken for beats: the music begins at 17 s.
+    let first = found.events.iter().find(|e| e.kind == "beat").unwrap();
+    assert!(first.t_s > 16.9, "{}", first.t_s);
     // Left as they are they make nonsense of the carriers' synchrony.
     assert!(examined(true).metrics.number("synchrony").unwrap() < 0.6);
 }

@@ -187,7 +187,7 @@ pub struct Pair {
 impl Pair {
     /// Puts the shoulders at rest.
     #[inline(always)]
-    fn rest(&mut self) {
+    fn stand(&mut self) {
         for axis in 0..3 {
             self.base[axis] = self.rest[axis];
             self.base_rate[axis] = f64x2::ZERO;
@@ -371,13 +371,6 @@ impl Model {
         if !scene.solver.energy {
             model.accounts.clear();
         }
-        // What bends a pole or moves the party is not the affair of one pair.
-        let stage = |stage: Stage| model.terms[stage as usize].iter();
-        model.in_blocks = pairs(n) > BLOCK
-            && stage(Stage::Party).chain(stage(Stage::Bends)).count() == 0
-            && stage(Stage::Shoulders)
-                .chain(stage(Stage::Handles))
-                .all(|term| term.on_block().is_some());
         // Only now, when every effect has said what it does to gravity and to the springs that the body rests on.
         let height_m = scene
             .start
@@ -397,6 +390,14 @@ impl Model {
         model.carried = model.has_phases
             || !model.accounts.is_empty()
             || model.terms.iter().any(|stage| !stage.is_empty());
+        // What bends a pole or moves the party is not the affair of one pair.
+        let stage = |stage: Stage| model.terms[stage as usize].iter();
+        model.in_blocks = model.carried
+            && pairs(n) > BLOCK
+            && stage(Stage::Party).chain(stage(Stage::Bends)).count() == 0
+            && stage(Stage::Shoulders)
+                .chain(stage(Stage::Handles))
+                .all(|term| term.on_block().is_some());
         model
     }
 
@@ -821,7 +822,7 @@ impl Model {
         };
         for block in blocks(w.pair.len()) {
             if self.has_phases {
-                w.pair[block.clone()].iter_mut().for_each(Pair::rest);
+                w.pair[block.clone()].iter_mut().for_each(Pair::stand);
                 local(Stage::Shoulders).for_each(|term| term.apply_to(t_s, w, block.clone()));
             }
             self.freedoms.gaps_of(y, w, block.clone());
@@ -840,7 +841,7 @@ impl Model {
             pair.rate = pair.constant_rate;
             // Blocks do it when they are at hand.
             if !self.in_blocks {
-                pair.rest();
+                pair.stand();
             }
         }
         for term in &self.terms[Stage::Phases as usize] {
@@ -851,7 +852,7 @@ impl Model {
     #[cold]
     fn party(&self, t_s: f64, w: &mut Workspace) {
         if !self.has_phases {
-            w.pair.iter_mut().for_each(Pair::rest);
+            w.pair.iter_mut().for_each(Pair::stand);
         }
         for term in &self.terms[Stage::Party as usize] {
             term.apply(t_s, w);
@@ -967,5 +968,35 @@ mod tests {
                 }
             }
         }
+    }
+
+    #[test]
+    fn a_body_that_nobody_carries_turns_as_ever_however_many_its_handles() {
+        let rates = |count: usize| {
+            let text = format!(
+                r#"
+                name = "thrown"
+                duration_s = 1.0
+                [body]
+                mass_kg = 60.0
+                inertia_kg_m2 = {{ xx = 3.0, yy = 9.0, zz = 10.0 }}
+                [start]
+                height_m = 1.0
+                angular_velocity_rad_per_s = [0.3, 0.2, 0.1]
+                [carriers.along_poles]
+                count = {count}
+                "#
+            );
+            let scene = parse("thrown", &text, &[]).unwrap_or_else(|e| panic!("{e}"));
+            let model = Model::new(&scene);
+            let y = model.initial_state();
+            let (mut dy, mut w) = (vec![f64::NAN; y.len()], model.workspace());
+            model.begin_segment(0.0, &mut w);
+            model.rhs(0.0, &y, &mut dy, &mut w);
+            dy
+        };
+        let few = rates(2);
+        assert!(few[10] != 0.0);
+        assert_eq!(few, rates(200));
     }
 }

@@ -16,6 +16,12 @@ const SHARE: f64 = 0.6;
 const SEARCH_S: f64 = 300.0;
 /// A tap of one and the same tap of the other are this near, s: half a sample of each at 50 Hz.
 const TOLERANCE_S: f64 = 0.02;
+/// Taps so far apart are those before a walk and those behind it, s.
+const WALK_S: f64 = 10.0;
+/// A beat that comes so soon after the last tap is one, s.
+const TAPPING_S: f64 = 0.5;
+/// What begins so near a beat is on it, s.
+const ON_BEAT_S: f64 = 0.07;
 /// How far the clocks of two sensors on the load are looked for by its motion, s.
 const TURNING_SEARCH_S: f64 = 10.0;
 /// Standard error of every moment heard alike, s: windows of 32 ms every 10 ms tell when a sound begins.
@@ -93,8 +99,8 @@ impl Clocks {
         self.remarks.push(remark(topic, kind, text));
     }
 
-    /// Puts what was heard on the rath's clock; `onset_s` is everything that begins in the sound.
-    pub fn put_sound_right(&mut self, topic: &str, onset_s: &[f64], heard_s: &mut [f64]) {
+    /// Puts the beats that were heard on the rath's clock, and leaves out those that are taps; `onset_s` is everything that begins in the sound.
+    pub fn put_sound_right(&mut self, topic: &str, onset_s: &[f64], heard_s: &mut Vec<f64>) {
         if self.tap_s.len() < FEWEST {
             return;
         }
@@ -107,10 +113,31 @@ impl Clocks {
             };
             let ahead_s = clock.reference_s(clock.at_s) - clock.at_s;
             self.say(topic, &clock, ahead_s, clock.drift_ppm);
-            for t in heard_s {
+            for t in &mut *heard_s {
                 *t = clock.device_s(*t);
             }
+            let begins_s: Vec<f64> = onset_s.iter().map(|t| clock.device_s(*t)).collect();
+            self.leave_taps_out(&begins_s, heard_s);
         }
+    }
+
+    /// Leaves out what was taken for beats while somebody tapped, before the walk or behind it, and in the silence between taps and music, where
+    /// nothing begins (s).
+    fn leave_taps_out(&self, begins_s: &[f64], beat_s: &mut Vec<f64>) {
+        let middle_s = beat_s.get(beat_s.len() / 2).copied().unwrap_or_default();
+        let walk = self.tap_s.windows(2).position(|t| t[1] - t[0] > WALK_S);
+        let before = walk.map_or_else(
+            || self.tap_s.partition_point(|t| *t < middle_s),
+            |last| last + 1,
+        );
+        let (before, behind) = self.tap_s.split_at(before);
+        beat_s.retain(|beat| {
+            before.last().is_none_or(|tap| *beat > tap + TAPPING_S)
+                && behind.first().is_none_or(|tap| *beat < tap - TAPPING_S)
+        });
+        let heard = |beat: &f64| begins_s.iter().any(|t| (t - beat).abs() < ON_BEAT_S);
+        beat_s.truncate(beat_s.iter().rposition(heard).map_or(0, |last| last + 1));
+        beat_s.drain(..beat_s.iter().position(heard).unwrap_or_default());
     }
 
     /// A clock that rests on enough of `taps`; otherwise it is said why there is none.
@@ -201,6 +228,28 @@ mod tests {
             track.accel_m_per_s2.push([0.0, 0.0, 9.8]);
         }
         track
+    }
+
+    #[test]
+    fn taps_are_no_beats() {
+        let left = |tap_s: &[f64]| {
+            let clocks = Clocks {
+                tap_s: tap_s.to_vec(),
+                ..Clocks::default()
+            };
+            let mut beat_s = vec![1.0, 1.6, 2.4, 10.0, 10.5, 11.0, 30.0, 30.8, 31.1];
+            let begins_s = beat_s.clone();
+            clocks.leave_taps_out(&begins_s, &mut beat_s);
+            beat_s
+        };
+        assert_eq!(left(&[1.0, 1.6, 2.4, 30.0, 30.8, 31.1]), [10.0, 10.5, 11.0]);
+        assert_eq!(left(&[1.0, 1.6, 2.4])[0], 10.0);
+        assert_eq!(left(&[30.0, 30.8, 31.1]).last(), Some(&11.0));
+        assert_eq!(left(&[]).len(), 9);
+        // Beats are carried on into silence.
+        let (clocks, mut beat_s) = (Clocks::default(), vec![8.0, 9.0, 10.0, 11.0, 12.0, 13.0]);
+        clocks.leave_taps_out(&[1.0, 10.02, 11.98], &mut beat_s);
+        assert_eq!(beat_s, [10.0, 11.0, 12.0]);
     }
 
     #[test]
