@@ -66,6 +66,17 @@ pub(super) struct BlockResult {
 }
 
 impl BlockResult {
+    /// What its numbers take in memory.
+    pub fn bytes(&self) -> usize {
+        let column = |c: &BatchColumn| size_of_val(&c.values[..]) + size_of_val(&c.rows[..]);
+        let batch = |b: &ChannelBatch| {
+            size_of_val(&b.times[..])
+                + size_of_val(&b.stamps[..])
+                + b.columns.iter().map(column).sum::<usize>()
+        };
+        self.batches.iter().map(batch).sum()
+    }
+
     #[inline]
     fn see(&mut self, time: i64) {
         let (first, last) = self.times.get_or_insert((time, time));

@@ -64,14 +64,43 @@ pub struct RawMessage<'a> {
     pub data: &'a [u8],
 }
 
+/// How far blocks may be ahead of the one that is taken: the bound on memory.
+#[derive(Clone, Copy)]
+struct Window {
+    threads: usize,
+}
+
+/// While what is ready holds no more than this, further blocks are begun, so that threads seldom have to wait for each other (bytes).
+const READY_BYTES: usize = 16 << 20;
+
+impl Window {
+    /// Whether a block may be begun.
+    fn is_open(self, progress: &Progress, blocks: usize) -> bool {
+        let ahead = progress.next - progress.taken;
+        let most = match progress.ready_bytes {
+            0..READY_BYTES => 8 * self.threads + 1,
+            _ => 2 * self.threads + 1,
+        };
+        progress.next < blocks && ahead < most
+    }
+}
+
 /// The blocks in work: who has taken which, and what is ready.
 struct Progress {
     next: usize,
     taken: usize,
     ready: BTreeMap<usize, BlockResult>,
+    ready_bytes: usize,
     /// Results whose memory can be used again.
     spent: Vec<BlockResult>,
     stop: bool,
+}
+
+impl Progress {
+    fn put(&mut self, position: usize, result: BlockResult) {
+        self.ready_bytes += result.bytes();
+        self.ready.insert(position, result);
+    }
 }
 
 struct Shared {
@@ -106,13 +135,13 @@ pub(super) fn run(
         threads => threads,
     }
     .min(blocks.len().max(1));
-    // So many blocks may be ready or in work before the first of them is taken: the bound on memory.
-    let window = 2 * threads + 1;
+    let window = Window { threads };
     let shared = Shared {
         progress: Mutex::new(Progress {
             next: 0,
             taken: 0,
             ready: BTreeMap::new(),
+            ready_bytes: 0,
             spent: Vec::new(),
             stop: false,
         }),
@@ -144,7 +173,7 @@ pub(super) fn run(
 }
 
 /// A helper's life: take the next block, decode it, put it down.
-fn help(shared: &Shared, mut worker: Worker<'_>, blocks: &[Block], window: usize) {
+fn help(shared: &Shared, mut worker: Worker<'_>, blocks: &[Block], window: Window) {
     loop {
         let (position, spent) = {
             let mut progress = shared.lock();
@@ -152,7 +181,7 @@ fn help(shared: &Shared, mut worker: Worker<'_>, blocks: &[Block], window: usize
                 if progress.stop || progress.next >= blocks.len() {
                     return;
                 }
-                if progress.next < progress.taken + window {
+                if window.is_open(&progress, blocks.len()) {
                     break;
                 }
                 progress = shared
@@ -165,7 +194,7 @@ fn help(shared: &Shared, mut worker: Worker<'_>, blocks: &[Block], window: usize
         };
         spent.into_iter().for_each(|spent| worker.reuse(spent));
         let result = worker.block(&blocks[position]);
-        shared.lock().ready.insert(position, result);
+        shared.lock().put(position, result);
         shared.changed.notify_all();
     }
 }
@@ -176,14 +205,15 @@ fn wait_for(
     shared: &Shared,
     worker: &mut Worker<'_>,
     blocks: &[Block],
-    window: usize,
+    window: Window,
 ) -> BlockResult {
     let mut progress = shared.lock();
     loop {
         if let Some(result) = progress.ready.remove(&position) {
+            progress.ready_bytes -= result.bytes();
             return result;
         }
-        if progress.next < blocks.len() && progress.next < progress.taken + window {
+        if window.is_open(&progress, blocks.len()) {
             let mine = progress.next;
             progress.next += 1;
             let spent = progress.spent.pop();
@@ -194,7 +224,7 @@ fn wait_for(
                 return result;
             }
             progress = shared.lock();
-            progress.ready.insert(mine, result);
+            progress.put(mine, result);
         } else {
             progress = shared
                 .changed
