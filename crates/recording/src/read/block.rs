@@ -85,21 +85,11 @@ impl BlockResult {
     }
 }
 
-/// Memory of results that have been used, for those to come: asking the system for it again and again would take a twentieth of the time.
+/// Memory of a result that has been used, for one to come: asking the system for it again and again would take a twentieth of the time.
 #[derive(Default)]
 struct Spare {
     values: Vec<Vec<f64>>,
     times: Vec<Vec<i64>>,
-}
-
-impl Spare {
-    fn keep(&mut self, result: BlockResult) {
-        for batch in result.batches {
-            self.times.extend([batch.times, batch.stamps]);
-            self.values
-                .extend(batch.columns.into_iter().map(|column| column.values));
-        }
-    }
 }
 
 /// A vector for about `length` numbers out of the spare ones. One that is far too long is given back: small columns would end up with the
@@ -167,9 +157,15 @@ impl<'a> Worker<'a> {
         }
     }
 
-    /// Takes the memory of a result that nobody needs any more.
+    /// Takes the memory of a result that nobody needs any more, in place of what is left of the last one: a thread that is handed large results
+    /// and decodes small blocks must not pile them up.
     pub fn reuse(&mut self, result: BlockResult) {
-        self.spare.keep(result);
+        self.spare = Spare::default();
+        for batch in result.batches {
+            self.spare.times.extend([batch.times, batch.stamps]);
+            let values = batch.columns.into_iter().map(|column| column.values);
+            self.spare.values.extend(values);
+        }
     }
 
     /// Decodes a block.
