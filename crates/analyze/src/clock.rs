@@ -37,6 +37,11 @@ impl Clock {
         device_s + self.offset_s + 1e-6 * self.drift_ppm * (device_s - self.at_s)
     }
 
+    /// How far the device is ahead of the reference at `at_s`, s, and by how much it runs fast, ppm.
+    pub fn ahead(&self) -> [f64; 2] {
+        [self.at_s - self.reference_s(self.at_s), -self.drift_ppm]
+    }
+
     /// The device's time of a moment on the reference's clock, s.
     pub fn device_s(&self, reference_s: f64) -> f64 {
         let d = 1e-6 * self.drift_ppm;

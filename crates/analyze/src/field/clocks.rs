@@ -61,8 +61,7 @@ impl Clocks {
         let tap_s = felt(track);
         let fit = from_events(&tap_s, &self.tap_s, SEARCH_S, TOLERANCE_S);
         if let Some(clock) = self.found(topic, fit, tap_s.len().min(self.tap_s.len())) {
-            let ahead_s = clock.at_s - clock.reference_s(clock.at_s);
-            self.say(topic, &clock, ahead_s, -clock.drift_ppm);
+            self.say(topic, &clock, clock.ahead());
             for t in &mut track.t_s {
                 *t = clock.reference_s(*t);
             }
@@ -80,11 +79,7 @@ impl Clocks {
                 "clock_offset",
                 format!(
                     "{}, by how fast both turn; motion is estimated from {} alone",
-                    self.against(
-                        &clock,
-                        clock.at_s - clock.reference_s(clock.at_s),
-                        -clock.drift_ppm
-                    ),
+                    self.against(&clock, clock.ahead()),
                     self.rath
                 ),
             ),
@@ -111,8 +106,7 @@ impl Clocks {
                 offset_sd_s: clock.offset_sd_s.hypot(HEARD_SD_S),
                 ..clock
             };
-            let ahead_s = clock.reference_s(clock.at_s) - clock.at_s;
-            self.say(topic, &clock, ahead_s, clock.drift_ppm);
+            self.say(topic, &clock, clock.ahead().map(|of_rath| -of_rath));
             for t in &mut *heard_s {
                 *t = clock.device_s(*t);
             }
@@ -172,7 +166,7 @@ impl Clocks {
     }
 
     /// A clock beside that of the rath's sensor, in words.
-    fn against(&self, clock: &Clock, ahead_s: f64, fast_ppm: f64) -> String {
+    fn against(&self, clock: &Clock, [ahead_s, fast_ppm]: [f64; 2]) -> String {
         format!(
             "runs {:+.1} ± {:.1} ms off {} and {:+.0} ± {:.0} ppm fast",
             1e3 * ahead_s,
@@ -183,13 +177,13 @@ impl Clocks {
         )
     }
 
-    fn say(&mut self, topic: &str, clock: &Clock, ahead_s: f64, fast_ppm: f64) {
+    fn say(&mut self, topic: &str, clock: &Clock, ahead: [f64; 2]) {
         self.remarks.push(remark(
             topic,
             "clock_offset",
             format!(
                 "{}, by {} taps; put right",
-                self.against(clock, ahead_s, fast_ppm),
+                self.against(clock, ahead),
                 clock.points
             ),
         ));

@@ -14,7 +14,7 @@ const ENDS_S: f64 = 2.0;
 const SHORTEST_S: f64 = 8.0;
 
 /// φ_j − ψ of every carrier, over the part of the window in which a beat sounds.
-fn carriers(c: &Context) -> Vec<Circular> {
+pub(super) fn carriers(c: &Context) -> Vec<Circular> {
     let table = c.beat();
     let (beat, carriers) = (&table.columns[0], &table.columns[1..]);
     let to_beat = |p: &std::borrow::Cow<[f64]>| relative_phase(p, beat, 1.0, 1.0);

@@ -1,5 +1,6 @@
 //! How together the carriers are.
 
+use super::beat::carriers;
 use super::contact::mean;
 use super::{Context, Value};
 use crate::phase;
@@ -33,13 +34,7 @@ pub fn plv(c: &Context) -> Value {
 }
 
 pub fn beat_synchrony(c: &Context) -> Value {
-    let table = c.beat();
-    let (beat, carriers) = (&table.columns[0], &table.columns[1..]);
-    let per: Vec<f64> = carriers
-        .iter()
-        .filter_map(|p| phase::relative_phase(p, beat, 1.0, 1.0))
-        .map(|p| p.resultant)
-        .collect();
+    let per: Vec<f64> = carriers(c).iter().map(|p| p.resultant).collect();
     Value::number(mean(&per)).per(per)
 }
 
