@@ -1,7 +1,8 @@
 //! A recording in one pass: a line per signal, the roles' columns, what is odd; then metrics, spectra and events.
 
-use std::collections::HashMap;
+use std::collections::{HashMap, HashSet};
 
+use rayon::prelude::*;
 use recording::read::{Batch, ReadError, Recording};
 
 use crate::envelope::Envelope;
@@ -203,7 +204,11 @@ pub fn examine(
     let window = window(request, &metadata, said, duration_s, &mut warnings);
     let mut metrics = metrics::metrics(&inputs, window);
     field.finish(&mut metrics, window);
-    let spectra = spectra(&pass, &inputs, window, &metrics, request);
+    let f_hz = metrics
+        .number("beat_hz")
+        .or_else(|| metrics.number("peak_hz"));
+    let mut spectra = spectra(&pass, &inputs, window, f_hz);
+    let signals = pass.signals(f_hz, &mut spectra);
     let mut events = events(&inputs, window);
     events.extend(quality.iter().filter(|q| q.kind == "gap").filter_map(|q| {
         Some(Event {
@@ -233,7 +238,7 @@ pub fn examine(
         warnings,
         metadata,
         roles: pass.roles_played(),
-        signals: pass.signals(),
+        signals,
         quality,
         metrics,
         spectra,
@@ -501,19 +506,35 @@ impl<'a> Pass<'a> {
         topics
     }
 
-    fn signals(&self) -> Vec<(String, Summary)> {
-        let listed = self.entries.iter().filter(|e| e.listed);
-        let mut signals: Vec<(String, Summary)> = listed
+    /// A line for every listed signal. Spectra of those that were asked for by name are added to `spectra`, which are named after f.
+    fn signals(
+        &self,
+        f_hz: Option<f64>,
+        spectra: &mut Vec<(String, SpectrumSummary)>,
+    ) -> Vec<(String, Summary)> {
+        let known: HashSet<String> = spectra.iter().map(|(path, _)| path.clone()).collect();
+        let told = |e: &Entry| !self.request.signals.is_empty() && !known.contains(&e.path);
+        // Each signal by itself, so on all processors.
+        let found: Vec<(Summary, Option<SpectrumSummary>)> = self
+            .entries
+            .par_iter()
+            .filter(|e| e.listed)
             .map(|e| {
-                (
-                    e.path.clone(),
-                    e.stream
-                        .summary(e.times.as_ref().unwrap_or(&self.times[e.channel]), e.unit),
-                )
+                let times = e.times.as_ref().unwrap_or(&self.times[e.channel]);
+                let (summary, spectrum) = e.stream.finish(times, e.unit, told(e));
+                let spectrum = spectrum.map(|s| SpectrumSummary::new(s, f_hz, e.unit));
+                (summary, spectrum)
             })
             .collect();
-        // Angles of a quaternion that never held a rotation say nothing.
-        signals.retain(|(path, s)| s.count > 0 || !self.by_path.contains_key(path));
+        let mut signals = Vec::with_capacity(found.len());
+        let paths = self.entries.iter().filter(|e| e.listed).map(|e| &e.path);
+        for (path, (summary, told)) in paths.zip(found) {
+            spectra.extend(told.map(|told| (path.clone(), told)));
+            // Angles of a quaternion that never held a rotation say nothing.
+            if summary.count > 0 || !self.by_path.contains_key(path) {
+                signals.push((path.clone(), summary));
+            }
+        }
         signals.sort_by(|a, b| natural(&a.0, &b.0));
         signals
     }
@@ -722,17 +743,13 @@ fn at_times(t_s: &[f64], x: &[f64], axis: &[f64]) -> Vec<f64> {
         .collect()
 }
 
-/// Spectra of the roles' columns and of the signals that were asked for by name.
+/// Spectra of the roles' columns.
 fn spectra(
     pass: &Pass,
     inputs: &Inputs,
     window: Window,
-    metrics: &Metrics,
-    request: &Request,
+    f_hz: Option<f64>,
 ) -> Vec<(String, SpectrumSummary)> {
-    let f_hz = metrics
-        .number("beat_hz")
-        .or_else(|| metrics.number("peak_hz"));
     let name = |role: Role, k: usize| {
         let mut paths: Vec<&str> = pass.players(role).map(|e| e.path.as_str()).collect();
         paths.sort_by(|a, b| natural(a, b));
@@ -755,25 +772,6 @@ fn spectra(
             SpectrumSummary::of(inputs.force_times(), force, window, f_hz, "N")
                 .map(|s| (name(Role::Forces, k), s)),
         );
-    }
-    if !request.signals.is_empty() {
-        for entry in pass.entries.iter().filter(|e| e.listed) {
-            let hz = entry
-                .times
-                .as_ref()
-                .unwrap_or(&pass.times[entry.channel])
-                .hz();
-            let known = out.iter().any(|(path, _)| *path == entry.path);
-            if let Some(spectrum) = hz
-                .filter(|_| !known)
-                .and_then(|hz| entry.stream.spectrum(hz))
-            {
-                out.push((
-                    entry.path.clone(),
-                    SpectrumSummary::new(spectrum, f_hz, entry.unit),
-                ));
-            }
-        }
     }
     out
 }

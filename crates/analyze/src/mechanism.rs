@@ -100,7 +100,8 @@ impl Evidence {
 
 impl fmt::Display for Evidence {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        write!(f, "RMS roll {:.3}°", self.rms_roll_rad.to_degrees())?;
+        // No more digits than hold where noise is in it, which the metric of that name leaves out.
+        write!(f, "RMS roll {:.1}°", self.rms_roll_rad.to_degrees())?;
         if self.verdict() == Ok(Verdict::Quiet) {
             return write!(f, ", below {QUIET_DEG}°: nothing to explain");
         }

@@ -43,7 +43,7 @@ pub struct Moments {
 }
 
 /// Lanes of the inner sums: as many independent additions as the registers hold.
-const LANES: usize = 4;
+const LANES: usize = 8;
 
 impl Moments {
     /// The next values, all finite.
@@ -51,14 +51,20 @@ impl Moments {
         let Some(&shift) = x.first() else { return };
         let (mut sum, mut squares) = ([0.0f64; LANES], [0.0f64; LANES]);
         let (mut low, mut high) = ([shift; LANES], [shift; LANES]);
-        let chunks = x.chunks_exact(LANES);
-        let rest = chunks.remainder();
+        let (chunks, rest) = x.as_chunks::<LANES>();
         for chunk in chunks {
+            let d = chunk.map(|x| x - shift);
             for l in 0..LANES {
-                let d = chunk[l] - shift;
-                sum[l] += d;
-                squares[l] += d * d;
+                sum[l] += d[l];
+            }
+            for l in 0..LANES {
+                squares[l] += d[l] * d[l];
+            }
+            // Not `min`, which minds NaN: these become one instruction for several lanes.
+            for l in 0..LANES {
                 low[l] = if chunk[l] < low[l] { chunk[l] } else { low[l] };
+            }
+            for l in 0..LANES {
                 high[l] = if chunk[l] > high[l] {
                     chunk[l]
                 } else {
@@ -252,17 +258,15 @@ impl Stream {
         }
     }
 
-    /// The spectrum, its frequencies scaled to the rate `hz` that was found in the end.
-    pub fn spectrum(&self, hz: f64) -> Option<Spectrum> {
-        self.welch.as_ref()?.finish_at(hz).ok()
-    }
-
-    /// The line of the table.
-    pub fn summary(&self, times: &Times, unit: &str) -> Summary {
-        let range = self.moments.range();
+    /// The line of the table; with `told` the spectrum, at the rate that was found in the end.
+    pub fn finish(&self, times: &Times, unit: &str, told: bool) -> (Summary, Option<Spectrum>) {
         let hz = times.hz();
+        let range = self.moments.range();
         let moves = range.is_some_and(|(low, high)| high > low);
-        Summary {
+        let spectrum = hz
+            .filter(|_| moves || told)
+            .and_then(|hz| self.welch.as_ref()?.finish_at(hz).ok());
+        let summary = Summary {
             count: self.moments.count(),
             hz,
             jitter_s: times.jitter_s(),
@@ -270,12 +274,13 @@ impl Stream {
             max: range.map(|r| r.1),
             mean: self.moments.mean(),
             sd: self.moments.sd(),
-            peak_hz: hz
+            peak_hz: spectrum
+                .as_ref()
                 .filter(|_| moves)
-                .and_then(|hz| self.spectrum(hz))
-                .and_then(|s| s.peak_hz()),
+                .and_then(Spectrum::peak_hz),
             unit: unit.to_owned(),
-        }
+        };
+        (summary, spectrum.filter(|_| told))
     }
 }
 
@@ -331,7 +336,7 @@ mod tests {
             .collect();
         s.push(&x, false);
         times.push(&(0..1000).map(|k| k * 10_000_000).collect::<Vec<_>>());
-        let summary = s.summary(&times, "m");
+        let (summary, _) = s.finish(&times, "m", false);
         assert_eq!(summary.count, 990);
         assert!((summary.peak_hz.unwrap() - 5.0).abs() < 0.1);
     }
@@ -342,6 +347,6 @@ mod tests {
         let mut times = Times::default();
         s.push(&[9.81; 500], true);
         times.push(&(0..500).map(|k| k * 10_000_000).collect::<Vec<_>>());
-        assert_eq!(s.summary(&times, "").peak_hz, None);
+        assert_eq!(s.finish(&times, "", false).0.peak_hz, None);
     }
 }

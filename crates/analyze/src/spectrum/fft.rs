@@ -67,8 +67,8 @@ pub fn rfft_magnitude(x: &[f64]) -> Vec<f64> {
 
 /// `numpy.fft.rfftfreq`: the frequencies of [`rfft`]'s bins for `n` samples at the step `dt_s` (Hz).
 pub fn rfft_hz(n: usize, dt_s: f64) -> Vec<f64> {
-    let span_s = n as f64 * dt_s;
-    (0..n / 2 + 1).map(|k| k as f64 / span_s).collect()
+    let width_hz = 1.0 / (n as f64 * dt_s);
+    (0..n / 2 + 1).map(|k| k as f64 * width_hz).collect()
 }
 
 #[cfg(test)]
