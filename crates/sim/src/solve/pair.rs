@@ -67,7 +67,9 @@ impl Arithmetic for Fused {
     /// Four at a time, said by name: left to itself the compiler takes the numbers of a long sum one by one.
     #[inline(always)]
     fn axpy(a: f64, x: &Tile, y: &Tile) -> Tile {
-        use std::arch::x86_64::{_mm256_fmadd_pd, _mm256_loadu_pd, _mm256_set1_pd, _mm256_storeu_pd};
+        use std::arch::x86_64::{
+            _mm256_fmadd_pd, _mm256_loadu_pd, _mm256_set1_pd, _mm256_storeu_pd,
+        };
         let mut out = [0.0; TILE];
         let tiles = x.as_chunks::<4>().0.iter().zip(y.as_chunks::<4>().0);
         for ((x, y), out) in tiles.zip(out.as_chunks_mut::<4>().0) {
