@@ -5,8 +5,10 @@
 //! | [`onset`] | onset strength: how much new sound begins at each moment |
 //! | [`tempo`] | tempogram, and the beat's period over time |
 //! | [`track`] | the beats themselves, by dynamic programming |
-//! | [`lock`] | phase to the beat, the Adler test, p:q locking |
+//! | [`mod@adler`] | Adler's test: detuning, pull, capture range |
+//! | [`lock`] | the beat's phase, p:q locking |
 
+pub mod adler;
 pub mod lock;
 pub mod onset;
 #[cfg(test)]

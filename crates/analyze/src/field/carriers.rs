@@ -92,6 +92,8 @@ pub fn gives(name: &str) -> bool {
         "beat_synchrony",
         "beat_hz",
         "beat_lead_deg",
+        "detuning_rad_per_s",
+        "pull_rad_per_s",
         "captured",
     ]
     .contains(&name)

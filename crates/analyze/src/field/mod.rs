@@ -331,7 +331,9 @@ impl Field {
         if let Some(motion) = &self.motion {
             out = rath::metrics(motion, window);
         }
-        if let Some((t_s, phases)) = self.carriers.phases() {
+        if (self.filled.phases || self.judge.is_some())
+            && let Some((t_s, phases)) = self.carriers.phases()
+        {
             let mut inputs = Inputs::default();
             self.fill_phases(&mut inputs, t_s, phases);
             let mut together = metrics_of(&inputs, window, carriers::gives);

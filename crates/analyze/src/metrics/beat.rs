@@ -1,15 +1,19 @@
-//! How carriers and body stand to the beat: lead or lag, capture, p:q locking of the roll.
+//! How carriers and body stand to the beat: lead or lag, detuning, pull and capture, p:q locking of the roll.
 
 use super::contact::mean;
 use super::{Context, Value};
+use crate::beat::adler::Adler;
 use crate::beat::lock::RATIOS;
 use crate::inputs::interpolate;
 use crate::phase::{Circular, circular, hilbert, relative_phase, unwrap};
+use std::f64::consts::TAU;
 
 /// A relative phase of this resultant or more stays.
 const STAYS: f64 = 0.9;
 /// The analytic signal knows no phase so near its ends, s.
 const ENDS_S: f64 = 2.0;
+/// An own frequency that is known no better is not known, rad/s: own paces scatter by a third of it.
+const VAGUE_RAD_PER_S: f64 = 1.0;
 /// Any two rhythms keep step for a shorter time than this, s.
 const SHORTEST_S: f64 = 8.0;
 
@@ -30,9 +34,82 @@ pub fn beat_lead_deg(c: &Context) -> Value {
     }
 }
 
+pub fn detuning_rad_per_s(c: &Context) -> Value {
+    let found = match c.adler() {
+        Ok(found) => found,
+        Err(why) => return Value::missing(*why),
+    };
+    let (each, halves) = (&found.detuning_rad_per_s, &found.detuning_half_rad_per_s);
+    if halves.iter().any(|half| !(*half <= VAGUE_RAD_PER_S)) {
+        return Value::missing(
+            "carriers who are with the beat all the time do not show what they would do alone",
+        );
+    }
+    Value {
+        reason: Some(with_intervals(found)),
+        ..Value::number(mean(each)).per(each.clone())
+    }
+}
+
+/// Every Δω with half its 95 % interval.
+fn with_intervals(found: &Adler) -> String {
+    let each = found.detuning_rad_per_s.iter();
+    let each = each.zip(&found.detuning_half_rad_per_s);
+    let words: Vec<String> = each
+        .map(|(d, half)| format!("{d:.3} ± {half:.3}"))
+        .collect();
+    words.join(", ")
+}
+
+pub fn pull_rad_per_s(c: &Context) -> Value {
+    let found = match c.adler() {
+        Ok(found) => found,
+        Err(why) => return Value::missing(*why),
+    };
+    let [low, high] = found.pull_ci95_rad_per_s;
+    if high.is_infinite() {
+        return Value::missing(format!(
+            "at least {low:.2} rad/s (95 %): a stronger pull would show the same phases"
+        ));
+    }
+    Value {
+        reason: Some(format!(
+            "grows in τ = {:.1} s; phase noise {:.4} rad/√s",
+            found.build_up_s, found.noise_rad_per_sqrt_s
+        )),
+        ..Value::number(found.pull_rad_per_s).ci95(low, high)
+    }
+}
+
+/// Whether a relative phase runs through a whole turn.
+fn slips(phi: &[f64], psi: &[f64]) -> bool {
+    let relative: Vec<f64> = phi.iter().zip(psi).map(|(a, b)| a - b).collect();
+    let range = unwrap(&relative)
+        .into_iter()
+        .fold((f64::MAX, f64::MIN), |(a, b), x| (a.min(x), b.max(x)));
+    range.1 - range.0 >= TAU
+}
+
 pub fn captured(c: &Context) -> Value {
-    let found = carriers(c);
-    Value::bool(!found.is_empty() && found.iter().all(|p| p.resultant >= STAYS))
+    let table = c.beat();
+    let (beat, phases) = (&table.columns[0], &table.columns[1..]);
+    let stays = !phases.is_empty()
+        && carriers(c).iter().all(|p| p.resultant >= STAYS)
+        && !phases.iter().any(|phi| slips(phi, beat));
+    let tested = c.adler().as_ref().ok().and_then(|a| Some((a, a.inside()?)));
+    let Some((found, inside)) = tested else {
+        return Value::bool(stays);
+    };
+    let [low, high] = found.pull_ci95_rad_per_s;
+    Value {
+        reason: Some(format!(
+            "Δω = {} rad/s, {} the capture range of K = {:.2} ({low:.2} … {high:.2}) rad/s",
+            with_intervals(found),
+            if inside { "inside" } else { "not all inside" },
+            found.pull_rad_per_s,
+        )),
+        ..Value::bool(stays && inside)
+    }
 }
 
 pub fn roll_lock(c: &Context) -> Value {
@@ -88,7 +165,7 @@ pub fn roll_lock(c: &Context) -> Value {
 #[cfg(test)]
 mod tests {
     use crate::inputs::{Inputs, Window};
-    use crate::metrics::metrics;
+    use crate::metrics::{Metrics, metrics};
     use std::f64::consts::TAU;
 
     /// Two carriers 30° and 50° ahead of a beat of 2 Hz, a body that rolls at `roll_hz`.
@@ -138,5 +215,68 @@ mod tests {
         assert_eq!(m.get("captured").unwrap().as_bool(), Some(true));
         let slips = metrics(&walk(1.0, 0.05), Window::ALL);
         assert_eq!(slips.get("captured").unwrap().as_bool(), Some(false));
+    }
+
+    /// Two carriers of their own frequencies, pulled from 10 s on without noise: Adler's equation by small steps.
+    fn pulled(pull: f64, detuning: [f64; 2]) -> Inputs {
+        let (dt, omega) = (1.0 / 300.0, TAU * 2.0);
+        let mut inputs = walk(1.0, 0.0);
+        let mut phase = [0.3, 2.0];
+        inputs.phase_rad = vec![vec![], vec![]];
+        for k in 0..18_000 {
+            let t = f64::from(k) * dt;
+            for c in 0..2 {
+                if k % 10 == 0 {
+                    inputs.phase_rad[c].push(phase[c]);
+                }
+                let heard = if t < 10.0 { 0.0 } else { pull };
+                phase[c] += dt * (omega + detuning[c] + heard * (omega * t - phase[c]).sin());
+            }
+        }
+        inputs.beat_phase_rad[..300].fill(f64::NAN);
+        inputs
+    }
+
+    #[test]
+    fn adlers_test_uses_what_was_before_the_window() {
+        let late = Window::from(40.0);
+        let inside = metrics(&pulled(1.5, [0.5, -0.9]), late);
+        let number = |m: &Metrics, name: &str| m.number(name).unwrap();
+        let pull = number(&inside, "pull_rad_per_s");
+        assert!(
+            (pull - 1.5).abs() < 0.05,
+            "{:?}",
+            inside.get("pull_rad_per_s")
+        );
+        assert!((number(&inside, "detuning_rad_per_s") + 0.2).abs() < 0.002);
+        let detuning = inside.get("detuning_rad_per_s").unwrap();
+        assert!((detuning.per[0] - 0.5).abs() < 0.003);
+        assert_eq!(inside.get("captured").unwrap().as_bool(), Some(true));
+        // At the edge a carrier waits for most of each slow turn: together with the beat, but not captured.
+        let outside = pulled(0.5, [0.505, 0.1]);
+        let dwelling = Window {
+            start_s: 25.0,
+            end_s: 40.0,
+        };
+        assert!(
+            metrics(&outside, dwelling)
+                .number("beat_synchrony")
+                .unwrap()
+                > 0.9
+        );
+        for window in [late, dwelling] {
+            let m = metrics(&outside, window);
+            assert_eq!(m.get("captured").unwrap().as_bool(), Some(false));
+            assert!((number(&m, "pull_rad_per_s") - 0.5).abs() < 0.01);
+        }
+    }
+
+    #[test]
+    fn without_a_beginning_there_is_no_pull_but_a_reason() {
+        let m = metrics(&walk(1.0, 0.0), Window::ALL);
+        for name in ["pull_rad_per_s", "detuning_rad_per_s"] {
+            assert!(m.get(name).unwrap().reason.is_some(), "{name}");
+            assert_eq!(m.number(name), None, "{name}");
+        }
     }
 }

@@ -4,6 +4,7 @@ use std::borrow::Cow;
 use std::cell::OnceCell;
 
 use super::lines::Line;
+use crate::beat::adler::{Adler, adler};
 use crate::inputs::{Inputs, Window, mean_step_s};
 
 /// A column that a metric cannot do without.
@@ -101,6 +102,7 @@ pub struct Context<'a> {
     phases: OnceCell<Table<'a>>,
     height_line: OnceCell<Option<Line>>,
     onset: OnceCell<Option<f64>>,
+    adler: OnceCell<Result<Adler, &'static str>>,
 }
 
 impl<'a> Context<'a> {
@@ -115,6 +117,7 @@ impl<'a> Context<'a> {
             phases: OnceCell::new(),
             height_line: OnceCell::new(),
             onset: OnceCell::new(),
+            adler: OnceCell::new(),
         }
     }
 
@@ -187,6 +190,20 @@ impl<'a> Context<'a> {
         *self
             .onset
             .get_or_init(|| super::onset_s(&self.roll().t_s, &self.roll().x))
+    }
+
+    /// Adler's test, on all phases about the first beat, whatever the window.
+    pub fn adler(&self) -> &Result<Adler, &'static str> {
+        self.adler.get_or_init(|| {
+            let i = self.inputs;
+            let phases: Vec<&[f64]> = i.phase_rad.iter().map(|p| &p[..]).collect();
+            adler(
+                i.phase_times(),
+                &phases,
+                &i.beat_phase_rad,
+                i.phases_are_measured,
+            )
+        })
     }
 
     /// Why a column is missing, or `None` when it is there.

@@ -122,7 +122,7 @@ fn metrics_section(out: &mut String, a: &Analysis) {
                 let _ = write!(note, "  [{}{rest}]", per.join(", "));
             }
             line!(out, "  {label:<30} {shown:>10} {unit:<4} {name:<18} {note}");
-            if let (Datum::Word(_), Some(reason)) = (&value.datum, &value.reason) {
+            if let (Datum::Word(_) | Datum::Bool(_), Some(reason)) = (&value.datum, &value.reason) {
                 wrapped(out, "      ", reason);
             }
         }

@@ -1,0 +1,238 @@
+//! How likely phases are under Adler's equation, and what makes them most likely.
+
+use super::dual;
+use super::walk::Walk;
+use super::{LEAST, MOST};
+use nalgebra::{DMatrix, DVector};
+use std::f64::consts::{PI, TAU};
+
+/// Unknowns of one carrier, of which the first [`SHARED`] are those of all: ln K, ln τ, ln σ², ln ε², ln(1/a − 1), ω, Δ.
+pub const PULL: usize = 0;
+pub const BUILD_UP: usize = 1;
+pub const NOISE: usize = 2;
+pub const ERROR: usize = 3;
+pub const BEGUN: usize = 4;
+pub const OWN: usize = 5;
+pub const OFFSET: usize = 6;
+const N: usize = 7;
+pub const SHARED: usize = 5;
+
+/// Where unknown `k` of carrier `c` stands among all.
+pub fn place(k: usize, c: usize) -> usize {
+    if k < SHARED { k } else { k + 2 * c }
+}
+
+type Dual = dual::Dual<N>;
+
+/// Log-likelihood (priors within), its gradient, and Fisher's information.
+pub struct Score {
+    pub value: f64,
+    pub gradient: DVector<f64>,
+    pub information: DMatrix<f64>,
+}
+
+/// The distribution of a carrier's phase, rad and rad².
+#[derive(Clone, Copy)]
+struct State {
+    mean: Dual,
+    variance: Dual,
+}
+
+impl State {
+    fn after(self, rate: State, h: f64) -> State {
+        State {
+            mean: self.mean + rate.mean * h,
+            variance: self.variance + rate.variance * h,
+        }
+    }
+}
+
+/// What drives one carrier.
+struct Drive {
+    own: Dual,
+    offset: Dual,
+    noise: Dual,
+}
+
+impl Drive {
+    /// μ̇ and Ṗ under the pull K m and the beat's phase ψ.
+    #[inline(always)]
+    fn rate(&self, at: State, pull: Dual, psi: f64) -> State {
+        let ahead = self.offset - at.mean + psi;
+        let (sin, cos) = ahead.value.sin_cos();
+        let pull = pull * (at.variance * -0.5).exp();
+        State {
+            mean: self.own + pull * ahead.through(sin, cos),
+            variance: self.noise - pull * ahead.through(cos, -sin) * at.variance * 2.0,
+        }
+    }
+
+    /// One step of h seconds (Runge and Kutta), the pull at its beginning, middle and end.
+    #[inline(always)]
+    fn step(&self, at: State, pull: &[Dual; 3], psi: [f64; 2], h: f64) -> State {
+        let middle = 0.5 * (psi[0] + psi[1]);
+        let a = self.rate(at, pull[0], psi[0]);
+        let b = self.rate(at.after(a, 0.5 * h), pull[1], middle);
+        let c = self.rate(at.after(b, 0.5 * h), pull[1], middle);
+        let d = self.rate(at.after(c, h), pull[2], psi[1]);
+        at.after(a, h / 6.0)
+            .after(b, h / 3.0)
+            .after(c, h / 3.0)
+            .after(d, h / 6.0)
+    }
+}
+
+impl Walk {
+    /// Likelihood of the observations under the unknowns `x`.
+    pub fn score(&self, x: &DVector<f64>) -> Score {
+        let mut out = Score {
+            value: 0.0,
+            gradient: DVector::zeros(x.len()),
+            information: DMatrix::zeros(x.len(), x.len()),
+        };
+        let shared = |k: usize| Dual::unknown(x[k], k);
+        let pull = shared(PULL).exp();
+        let per_s = (shared(BUILD_UP) * -1.0).exp();
+        let noise = shared(NOISE).exp() + self.least_noise;
+        let error = shared(ERROR).exp() + self.least_error;
+        let to_come = match self.begins {
+            true => pull,
+            false => pull * shared(BEGUN).logistic(),
+        };
+        // K m at the beginning, middle and end of every step: the same for all carriers.
+        let grown = |t: f64| pull - to_come * (per_s * -t.max(0.0)).exp();
+        let grown: Vec<[Dual; 3]> = self
+            .t_s
+            .windows(2)
+            .map(|t| [t[0], 0.5 * (t[0] + t[1]), t[1]].map(grown))
+            .collect();
+        for (c, phase) in self.phase.iter().enumerate() {
+            let own = |k: usize| Dual::unknown(x[place(k, c)], k);
+            let drive = Drive {
+                own: own(OWN),
+                offset: own(OFFSET),
+                noise,
+            };
+            let Some(first) = phase.iter().position(|y| y.is_finite()) else {
+                continue;
+            };
+            let mut state = State {
+                mean: Dual::constant(phase[first]),
+                variance: error,
+            };
+            for k in first..phase.len() - 1 {
+                let h = self.t_s[k + 1] - self.t_s[k];
+                let psi = [self.beat[k], self.beat[k + 1]];
+                match psi.map(f64::is_finite) {
+                    [true, true] => {
+                        state = drive.step(state, &grown[k], psi, h);
+                        state.variance.value = state.variance.value.max(1e-12);
+                    }
+                    sounds => {
+                        state.mean = state.mean + drive.own * h;
+                        state.variance = state.variance + noise * h;
+                        // A pause began or ended somewhere within the step: how much the beat pulled is not known.
+                        if sounds != [false, false] && self.t_s[k + 1] > 0.0 {
+                            state.variance = state.variance + 1.0;
+                        }
+                    }
+                }
+                if phase[k + 1].is_finite() {
+                    state = out.observe(state, phase[k + 1], error, c);
+                }
+            }
+        }
+        out.information.fill_upper_triangle_with_lower_triangle();
+        self.add_priors(x, &mut out);
+        out
+    }
+
+    /// Middle and SD of the normal priors: τ 5 s within a factor 20, σ 0.05 rad/√s and ε 0.03 rad within 50, a carrier's own
+    /// frequency within 1.6 Hz of the beat; Δ anything. None on K.
+    fn add_priors(&self, x: &DVector<f64>, out: &mut Score) {
+        for k in BUILD_UP..x.len() {
+            let (middle, sd) = match k {
+                BUILD_UP => (1.6, 1.5),
+                NOISE => (-6.0, 4.0),
+                ERROR => (-7.0, 4.0),
+                BEGUN => (-1.0, 2.0),
+                _ if (k - SHARED).is_multiple_of(2) => (self.omega_rad_per_s, 5.0),
+                _ => (0.0, 10.0),
+            };
+            let off = x[k] - middle;
+            out.value -= 0.5 * (off / sd).powi(2);
+            out.gradient[k] -= off / (sd * sd);
+            out.information[(k, k)] += 1.0 / (sd * sd);
+        }
+    }
+
+    /// Climbs to the most likely unknowns (Fisher's scoring, damped as by Levenberg and Marquardt); K stays where it is if `held`.
+    pub fn climb(&self, mut x: DVector<f64>, held: bool) -> (DVector<f64>, Score) {
+        let mut here = self.score(&x);
+        // Along the profile of K the fall is wanted to a hundredth only.
+        let enough = if held { 0.02 } else { 1e-3 };
+        let mut damping = 1e-3;
+        for _ in 0..60 {
+            let mut normal = here.information.clone();
+            for k in 0..x.len() {
+                normal[(k, k)] *= 1.0 + damping;
+            }
+            normal[(PULL, PULL)] += if held { 1e18 } else { 1e-9 };
+            let Some(step) = normal.cholesky().map(|c| c.solve(&here.gradient)) else {
+                break;
+            };
+            // Nothing moves by more than a factor of two or 40° at once.
+            let step = step.scale(1.0f64.min(0.7 / step.amax()));
+            let promised = step.dot(&here.gradient);
+            let mut there = &x + step;
+            there[PULL] = there[PULL].clamp(LEAST.ln(), MOST.ln());
+            let new = self.score(&there);
+            if new.value > here.value {
+                (x, here) = (there, new);
+                damping *= 0.2;
+            } else {
+                damping *= 10.0;
+            }
+            if !(promised > enough) || damping > 1e6 {
+                break;
+            }
+        }
+        (x, here)
+    }
+
+    /// σ, rad/√s.
+    pub fn noise(&self, x: &DVector<f64>) -> f64 {
+        (x[NOISE].exp() + self.least_noise).sqrt()
+    }
+}
+
+impl Score {
+    /// Takes an observed phase of carrier `c` (rad) and gives the state after it.
+    fn observe(&mut self, state: State, seen: f64, error: Dual, c: usize) -> State {
+        let State { mean, variance } = state;
+        let miss = (seen - mean.value + PI).rem_euclid(TAU) - PI;
+        let spread = variance + error;
+        let inverse = spread.inverse();
+        let weight = inverse.value;
+        self.value -= 0.5 * (spread.value.ln() + miss * miss * weight);
+        let surprise = 0.5 * (miss * miss * weight - 1.0) * weight;
+        for i in 0..N {
+            let (a, b) = (
+                mean.slope[i] * weight,
+                0.5 * spread.slope[i] * weight * weight,
+            );
+            self.gradient[place(i, c)] += a * miss + spread.slope[i] * surprise;
+            for j in 0..=i {
+                self.information[(place(i, c), place(j, c))] +=
+                    a * mean.slope[j] + b * spread.slope[j];
+            }
+        }
+        let gain = variance * inverse;
+        let mut missed = mean * -1.0;
+        missed.value = miss;
+        State {
+            mean: mean + gain * missed,
+            variance: variance - gain * variance,
+        }
+    }
+}

@@ -1,0 +1,170 @@
+//! Adler's test: what carriers would do without the beat, how strongly it pulls them, and whether that captures them.
+//!
+//! ```text
+//! dφ_i = (ω_i + K m(t) sin(ψ + Δ_i − φ_i)) dt + σ dW_i       y_i = φ_i + e,  e normal with SD ε       Δω_i = ω_i − Ω
+//! m    = 1 − a e^{−(t − t₀)/τ} while a beat sounds, else 0   a = 1 where the beginning t₀ was heard
+//! ```
+//! φ_i gait phase, ψ the beat's, y_i the phase as observed (rad); t₀ the first beat, τ how long the pull grows (s); ω_i own frequency, Ω the
+//! mean beat [rad/s]; K the pull once grown, the same for all [rad/s]; Δ_i where a carrier without detuning would settle (rad; a step
+//! detector's offset is in it); σ phase noise [rad/√s]. For |Δω| ≤ K a carrier is captured; outside it slips.
+//!
+//! Between observations a carrier's phase is followed as a normal distribution of mean μ and variance P (Gaussian closure),
+//! ```text
+//! μ̇ = ω + K m e^{−P/2} sin(ψ + Δ − μ)       Ṗ = σ² − 2 K m e^{−P/2} cos(ψ + Δ − μ) P
+//! ```
+//! and put right at each as by Kalman. K, τ, σ, ε, a, ω_i, Δ_i maximise the likelihood of the innovations times wide priors, which only
+//! keep within reason what the phases do not tell. A regression of increments on phases would take noise that stands on both sides for
+//! a pull, or a pull for noise; this does not. What is walked before the first beat says ω_i; how carriers come to the beat, slip past it,
+//! or wander about it says K. Who has settled before anybody looked says |Δω| ≤ K and no more: the interval is open upwards then.
+//! What carriers do to each other is not in it.
+//! Source: R. Adler, Proc. IRE 34 (1946) 351; Pikovsky, Rosenblum & Kurths, Synchronization (2001), ch. 7 and 9;
+//! Särkkä, Bayesian Filtering and Smoothing (2013), ch. 9 and 12.
+
+mod dual;
+mod likelihood;
+#[cfg(test)]
+mod tests;
+mod walk;
+
+use likelihood::{OFFSET, OWN, PULL, place};
+use nalgebra::DVector;
+use std::f64::consts::{PI, TAU};
+use walk::Walk;
+
+/// What phases and a beat say of the pull.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Adler {
+    /// K, rad/s; of no meaning where its interval is open.
+    pub pull_rad_per_s: f64,
+    /// Ends of its 95 % interval, rad/s: the lower is 0 where no pull is seen, the upper infinite where any stronger one explains the
+    /// phases as well.
+    pub pull_ci95_rad_per_s: [f64; 2],
+    /// τ, s.
+    pub build_up_s: f64,
+    /// σ, rad/√s.
+    pub noise_rad_per_sqrt_s: f64,
+    /// Δω of each carrier, positive where alone it would be faster than the beat, rad/s.
+    pub detuning_rad_per_s: Vec<f64>,
+    /// Half the 95 % interval of each, rad/s; infinite where carriers were settled all the time.
+    pub detuning_half_rad_per_s: Vec<f64>,
+    /// Δ of each carrier, −π … π, rad.
+    pub offset_rad: Vec<f64>,
+}
+
+impl Adler {
+    /// Whether every |Δω| ≤ K; `None` where K is not known.
+    pub fn inside(&self) -> Option<bool> {
+        let within = |d: &f64| d.abs() <= self.pull_rad_per_s;
+        let known = self.pull_ci95_rad_per_s[1].is_finite();
+        known.then(|| self.detuning_rad_per_s.iter().all(within))
+    }
+}
+
+/// Pulls looked for, rad/s. A stronger one settles a carrier within a third of a step, faster than a step tells.
+const LEAST: f64 = 0.01;
+const MOST: f64 = 6.0;
+/// Fall of the log-likelihood at the ends of a 95 % interval: half of χ² with one degree of freedom.
+const FALL: f64 = 1.9207;
+/// Intervals of ln K narrower than this are those of a normal distribution (standard error).
+const NARROW: f64 = 0.1;
+/// What a step detector bends the phase by within the stretch before the first beat, SD by twins, rad.
+const BENT_RAD: f64 = 0.01;
+
+/// Adler's test on gait phases and a beat's phase (rad, wrapped or not; NaN where there is none) at ascending times (s).
+///
+/// `measured`: phases were found from steps, which a band has smoothed, and not recorded as such. From a minute before the first
+/// beat to one and a half after it, whatever comes later.
+///
+/// # Errors
+/// As a sentence: no beat, or too little walked about its beginning.
+pub fn adler(
+    t_s: &[f64],
+    phase_rad: &[&[f64]],
+    beat_rad: &[f64],
+    measured: bool,
+) -> Result<Adler, &'static str> {
+    let walk = Walk::new(t_s, phase_rad, beat_rad, measured)?;
+    let (x, best) = walk.climb(walk.start()?, false);
+    let cover = best.information.try_inverse().ok_or(walk::TOO_LITTLE)?;
+    let carriers = walk.phase.len();
+    let bent = match walk.before_s > 0.0 && measured {
+        true => BENT_RAD / walk.before_s,
+        false => 0.0,
+    };
+    let half = |variance: f64| 1.96 * variance.max(0.0).sqrt().hypot(bent);
+    let own: Vec<usize> = (0..carriers).map(|c| place(OWN, c)).collect();
+    let sd = cover[(PULL, PULL)].max(0.0).sqrt();
+    let mut ends = [false, true].map(|up| walk.end(&x, best.value, sd, up));
+    // Who is with the beat from the first sample to the last may have any own frequency that the pull makes up for, even none and none.
+    let settled = !walk.begins && walk.someone_stays() && (ends[0] == 0.0 || ends[1].is_infinite());
+    if settled {
+        ends[1] = f64::INFINITY;
+    }
+    let half = |variance: f64| {
+        if settled {
+            f64::INFINITY
+        } else {
+            half(variance)
+        }
+    };
+    let found = Adler {
+        pull_rad_per_s: x[PULL].exp(),
+        pull_ci95_rad_per_s: ends,
+        build_up_s: x[likelihood::BUILD_UP].exp(),
+        noise_rad_per_sqrt_s: walk.noise(&x),
+        detuning_rad_per_s: own.iter().map(|k| x[*k] - walk.omega_rad_per_s).collect(),
+        detuning_half_rad_per_s: own.iter().map(|k| half(cover[(*k, *k)])).collect(),
+        offset_rad: (0..carriers)
+            .map(|c| (x[place(OFFSET, c)] + PI).rem_euclid(TAU) - PI)
+            .collect(),
+    };
+    let finite = best.value.is_finite() && cover.iter().all(|c| c.is_finite());
+    finite.then_some(found).ok_or(walk::TOO_LITTLE)
+}
+
+impl Walk {
+    /// An end of the interval of K: where the likelihood, at its best over all else, has fallen by [`FALL`].
+    fn end(&self, best: &DVector<f64>, top: f64, sd: f64, up: bool) -> f64 {
+        let sign = if up { 1.0 } else { -1.0 };
+        if sd < NARROW {
+            return (best[PULL] + sign * 1.96 * sd).exp();
+        }
+        let fallen = |x: DVector<f64>| {
+            let (x, found) = self.climb(x, true);
+            (x, (top - found.value).max(0.0))
+        };
+        if !up {
+            let mut none = best.clone();
+            none[PULL] = LEAST.ln();
+            // Without a pull there are no offsets either, one for each carrier: as many degrees of freedom more.
+            if 2.0 * fallen(none).1 < chi_squared_95(1.0 + self.phase.len() as f64) {
+                return 0.0;
+            }
+        }
+        let stride = sign * sd.min(0.3);
+        let (mut x, mut before) = (best.clone(), 0.0);
+        loop {
+            x[PULL] += stride;
+            if x[PULL] > MOST.ln() {
+                return f64::INFINITY;
+            }
+            if x[PULL] < LEAST.ln() {
+                return 0.0;
+            }
+            let (next, fall) = fallen(x);
+            x = next;
+            if fall > FALL {
+                // √fall is straight in ln K where the likelihood is normal.
+                let share = (fall.sqrt() - FALL.sqrt()) / (fall.sqrt() - f64::sqrt(before));
+                return (x[PULL] - share * stride).exp();
+            }
+            before = fall;
+        }
+    }
+}
+
+/// 95 % point of χ² with `n` degrees of freedom, to 1 %. Source: Wilson & Hilferty, PNAS 17 (1931) 684.
+fn chi_squared_95(n: f64) -> f64 {
+    let v = 2.0 / (9.0 * n);
+    n * (1.0 - v + 1.645 * v.sqrt()).powi(3)
+}

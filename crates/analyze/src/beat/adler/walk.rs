@@ -1,0 +1,206 @@
+//! Phases and beat about the first beat, on the grid of Adler's equation.
+
+use super::likelihood::{BUILD_UP, ERROR, NOISE, OFFSET, OWN, PULL, SHARED, place};
+use crate::imu::track::period_s;
+use crate::phase::unwrap;
+use nalgebra::{DVector, Matrix3, Vector3};
+use std::f64::consts::TAU;
+
+/// Step of the equation, s: short for any pull that is looked for.
+const STEP_S: f64 = 0.2;
+/// Every such step a measured phase is looked at: those closer together share the detector's errors.
+const EVERY: usize = 2;
+/// What is looked at before and after the first beat, s.
+const BEFORE_S: f64 = 60.0;
+const AFTER_S: f64 = 90.0;
+/// A beat that lasts no longer is a tap or a trial, s.
+const SHORTEST_S: f64 = 4.0;
+/// As long before the first beat nothing sounds where the pull begins with it, s.
+const SILENT_S: f64 = 1.0;
+/// A measured phase is that of an analytic signal, wrong so near its ends, s.
+const ENDS_S: f64 = 2.0;
+/// Least σ [rad/√s] and ε (rad) believed: of any phases, and of measured ones, which a band has smoothed. Nobody walks more steadily than
+/// the archive's carriers, and a twin's detector errs by about as much.
+const LEAST: [f64; 2] = [5e-4, 5e-4];
+const LEAST_MEASURED: [f64; 2] = [0.01, 0.01];
+/// Fewer phases say nothing.
+const FEWEST: usize = 20;
+
+pub const TOO_LITTLE: &str = "too little is walked about the first beat";
+
+/// Phases and beat on the grid.
+pub struct Walk {
+    /// Since the first beat, s.
+    pub t_s: Vec<f64>,
+    /// ψ, unwrapped, NaN where no beat sounds, rad.
+    pub beat: Vec<f64>,
+    /// y of each carrier, NaN where it is not looked at, rad.
+    pub phase: Vec<Vec<f64>>,
+    /// Whether the beginning of the beat is in the recording.
+    pub begins: bool,
+    /// How long carriers are observed before it, s.
+    pub before_s: f64,
+    /// Ω, rad/s.
+    pub omega_rad_per_s: f64,
+    /// Least σ², rad²/s.
+    pub least_noise: f64,
+    /// Least ε², rad².
+    pub least_error: f64,
+}
+
+impl Walk {
+    /// Onto the grid; errors as [`super::adler`].
+    pub fn new(
+        t_s: &[f64],
+        phase_rad: &[&[f64]],
+        beat_rad: &[f64],
+        measured: bool,
+    ) -> Result<Self, &'static str> {
+        let n = t_s.len();
+        if beat_rad.len() != n || phase_rad.iter().any(|p| p.len() != n) {
+            return Err("no beat");
+        }
+        let onset = onset(t_s, beat_rad)?;
+        let from = t_s.partition_point(|t| *t < t_s[onset] - BEFORE_S);
+        let to = t_s.partition_point(|t| *t <= t_s[onset] + AFTER_S);
+        let step_s = period_s(&t_s[from..to]).ok_or(TOO_LITTLE)?;
+        let hop = (STEP_S / step_s).round().max(1.0) as usize;
+        let first = onset - (onset - from) / hop * hop;
+        let pick = |x: &[f64]| -> Vec<f64> { x.iter().step_by(hop).copied().collect() };
+        let t: Vec<f64> = pick(&t_s[first..to])
+            .iter()
+            .map(|t| t - t_s[onset])
+            .collect();
+        let mut beat = pick(&straightened(&beat_rad[first..to]));
+        beat[..(onset - first) / hop].fill(f64::NAN);
+        let mut phase: Vec<Vec<f64>> = phase_rad
+            .iter()
+            .map(|p| pick(&straightened(&p[first..to])))
+            .collect();
+        if measured {
+            phase.iter_mut().for_each(|phase| thin(&t, phase));
+        }
+        let (mut sounds_s, mut turned) = (0.0, 0.0);
+        for (t, b) in t.windows(2).zip(beat.windows(2)) {
+            if b[0].is_finite() && b[1].is_finite() {
+                sounds_s += t[1] - t[0];
+                turned += b[1] - b[0];
+            }
+        }
+        let latest = phase
+            .iter()
+            .map(|p| p.iter().position(|y| y.is_finite()).map_or(0.0, |k| t[k]))
+            .fold(f64::MIN, f64::max);
+        let [noise, error] = if measured { LEAST_MEASURED } else { LEAST };
+        Ok(Walk {
+            begins: t[0] <= -SILENT_S,
+            before_s: -latest.min(0.0),
+            omega_rad_per_s: turned / sounds_s,
+            least_noise: noise * noise,
+            least_error: error * error,
+            t_s: t,
+            beat,
+            phase,
+        })
+    }
+
+    /// Whether a carrier does not slip past the beat by a turn.
+    pub fn someone_stays(&self) -> bool {
+        self.phase.iter().any(|phase| {
+            let behind = phase.iter().zip(&self.beat).map(|(y, b)| y - b);
+            let (low, high) = behind
+                .filter(|d| d.is_finite())
+                .fold((f64::MAX, f64::MIN), |(a, b), d| (a.min(d), b.max(d)));
+            high - low < TAU
+        })
+    }
+
+    /// Where the climb begins: increments of each phase on the sines at their beginning, by least squares, for a quick and a slow build-up.
+    pub fn start(&self) -> Result<DVector<f64>, &'static str> {
+        let mut best: Option<(f64, DVector<f64>)> = None;
+        for build_up_s in [2.0, 10.0] {
+            let mut x = DVector::zeros(SHARED + 2 * self.phase.len());
+            let (mut squares, mut pull) = (0.0, 0.0);
+            for (c, phase) in self.phase.iter().enumerate() {
+                let seen: Vec<usize> = (0..phase.len()).filter(|k| phase[*k].is_finite()).collect();
+                let rows: Vec<(Vector3<f64>, f64, f64)> = seen
+                    .windows(2)
+                    .map(|k| {
+                        let (a, b) = (k[0], k[1]);
+                        let m = -(-self.t_s[a].max(0.0) / build_up_s).exp_m1();
+                        let (sin, cos) = match self.beat[a] - phase[a] {
+                            behind if behind.is_finite() => behind.sin_cos(),
+                            _ => (0.0, 0.0),
+                        };
+                        let row = Vector3::new(1.0, m * sin, m * cos);
+                        (row, phase[b] - phase[a], self.t_s[b] - self.t_s[a])
+                    })
+                    .collect();
+                if rows.len() < FEWEST {
+                    return Err(TOO_LITTLE);
+                }
+                let mut normal = Matrix3::identity() * 1e-3;
+                let mut right = Vector3::zeros();
+                for (row, turn, dt) in &rows {
+                    normal += row * row.transpose() * *dt;
+                    right += row * *turn;
+                }
+                let w = normal.try_inverse().ok_or(TOO_LITTLE)? * right;
+                let miss = |(row, turn, dt): &(Vector3<f64>, f64, f64)| {
+                    (turn - w.dot(row) * dt).powi(2) / dt
+                };
+                squares += rows.iter().map(miss).sum::<f64>();
+                pull += w[1].hypot(w[2]) / self.phase.len() as f64;
+                x[place(OWN, c)] = w[0];
+                x[place(OFFSET, c)] = w[2].atan2(w[1]);
+            }
+            x[PULL] = pull.clamp(0.2, 4.0).ln();
+            x[BUILD_UP] = f64::ln(build_up_s);
+            x[NOISE] = 2.0 * 0.05f64.ln();
+            x[ERROR] = 2.0 * 0.03f64.ln();
+            if best.as_ref().is_none_or(|b| squares < b.0) {
+                best = Some((squares, x));
+            }
+        }
+        best.map(|b| b.1)
+            .filter(|x| x.iter().all(|x| x.is_finite()))
+            .ok_or(TOO_LITTLE)
+    }
+}
+
+/// Where a beat begins that lasts.
+fn onset(t_s: &[f64], beat_rad: &[f64]) -> Result<usize, &'static str> {
+    let mut begun: Option<usize> = None;
+    for (k, psi) in beat_rad.iter().enumerate() {
+        match (begun, psi.is_finite()) {
+            (_, false) => begun = None,
+            (None, true) => begun = Some(k),
+            (Some(first), true) if t_s[k] - t_s[first] >= SHORTEST_S => return Ok(first),
+            _ => {}
+        }
+    }
+    Err("no beat that lasts for 4 s")
+}
+
+/// Leaves every [`EVERY`]th of a measured phase, and nothing near its ends.
+fn thin(t_s: &[f64], phase: &mut [f64]) {
+    let seen = |k: &usize| phase[*k].is_finite();
+    let (Some(first), Some(last)) = ((0..phase.len()).find(seen), (0..phase.len()).rfind(seen))
+    else {
+        return;
+    };
+    let inner = t_s[first] + ENDS_S..=t_s[last] - ENDS_S;
+    for (k, (y, t)) in phase.iter_mut().zip(t_s).enumerate() {
+        if !k.is_multiple_of(EVERY) || !inner.contains(t) {
+            *y = f64::NAN;
+        }
+    }
+}
+
+/// Unwrapped over what is finite.
+fn straightened(x: &[f64]) -> Vec<f64> {
+    let finite: Vec<f64> = x.iter().copied().filter(|x| x.is_finite()).collect();
+    let mut whole = unwrap(&finite).into_iter();
+    let each = |x: &f64| x.is_finite().then(|| whole.next()).flatten();
+    x.iter().map(each).map(|x| x.unwrap_or(f64::NAN)).collect()
+}
