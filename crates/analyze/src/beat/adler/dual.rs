@@ -10,10 +10,15 @@ pub struct Dual<const N: usize> {
 }
 
 impl<const N: usize> Dual<N> {
+    pub const ZERO: Self = Dual {
+        value: 0.0,
+        slope: [0.0; N],
+    };
+
     pub fn constant(value: f64) -> Self {
         Dual {
             value,
-            slope: [0.0; N],
+            ..Self::ZERO
         }
     }
 

@@ -1,7 +1,7 @@
 //! How likely phases are under Adler's equation, and what makes them most likely.
 
 use super::dual;
-use super::walk::Walk;
+use super::walk::{WINDOW, Walk};
 use super::{LEAST, MOST};
 use nalgebra::{DMatrix, DVector};
 use std::f64::consts::{PI, TAU};
@@ -47,6 +47,42 @@ impl State {
     }
 }
 
+/// A measured phase, as it builds up over a window. A step detector's band shows a slow course as it is, but of noise only the mean: expected
+/// is the expected phase in the middle, its variance and covariance with the phase are those of the mean (here still times its length, s).
+#[derive(Clone, Copy)]
+struct Window {
+    middle: Dual,
+    variance: Dual,
+    with_phase: Dual,
+}
+
+/// Weights of a cubic through the four ends of [`WINDOW`] steps, in the middle.
+const MIDDLE: [f64; WINDOW + 1] = [-0.0625, 0.5625, 0.5625, -0.0625];
+
+impl Window {
+    fn from(state: State) -> Window {
+        Window {
+            middle: state.mean * MIDDLE[0],
+            variance: Dual::ZERO,
+            with_phase: Dual::ZERO,
+        }
+    }
+
+    /// With its step number `j`, of h seconds, from one state to the next, over which ∂φ/∂φ is `kept`; by the trapezoid.
+    #[inline(always)]
+    fn over(self, j: usize, from: State, to: State, kept: Dual, h: f64) -> Window {
+        let shared = kept * from.variance;
+        let both = from.variance + shared * 2.0 + to.variance;
+        Window {
+            middle: self.middle + to.mean * MIDDLE[j + 1],
+            variance: self.variance
+                + (self.with_phase + kept * self.with_phase) * h
+                + both * (0.25 * h * h),
+            with_phase: kept * self.with_phase + (shared + to.variance) * (0.5 * h),
+        }
+    }
+}
+
 /// What drives one carrier.
 struct Drive {
     own: Dual,
@@ -55,30 +91,34 @@ struct Drive {
 }
 
 impl Drive {
-    /// μ̇ and Ṗ under the pull K m and the beat's phase ψ.
+    /// μ̇ and Ṗ under the pull K m and the beat's phase ψ, and −∂μ̇/∂μ.
     #[inline(always)]
-    fn rate(&self, at: State, pull: Dual, psi: f64) -> State {
+    fn rate(&self, at: State, pull: Dual, psi: f64) -> (State, Dual) {
         let ahead = self.offset - at.mean + psi;
         let (sin, cos) = ahead.value.sin_cos();
         let pull = pull * (at.variance * -0.5).exp();
-        State {
+        let back = pull * ahead.through(cos, -sin);
+        let rate = State {
             mean: self.own + pull * ahead.through(sin, cos),
-            variance: self.noise - pull * ahead.through(cos, -sin) * at.variance * 2.0,
-        }
+            variance: self.noise - back * at.variance * 2.0,
+        };
+        (rate, back)
     }
 
-    /// One step of h seconds (Runge and Kutta), the pull at its beginning, middle and end.
+    /// One step of h seconds (Runge and Kutta), the pull at its beginning, middle and end; and ∂φ/∂φ over it.
     #[inline(always)]
-    fn step(&self, at: State, pull: &[Dual; 3], psi: [f64; 2], h: f64) -> State {
+    fn step(&self, at: State, pull: &[Dual; 3], psi: [f64; 2], h: f64) -> (State, Dual) {
         let middle = 0.5 * (psi[0] + psi[1]);
-        let a = self.rate(at, pull[0], psi[0]);
-        let b = self.rate(at.after(a, 0.5 * h), pull[1], middle);
-        let c = self.rate(at.after(b, 0.5 * h), pull[1], middle);
-        let d = self.rate(at.after(c, h), pull[2], psi[1]);
-        at.after(a, h / 6.0)
+        let (a, _) = self.rate(at, pull[0], psi[0]);
+        let (b, back) = self.rate(at.after(a, 0.5 * h), pull[1], middle);
+        let (c, _) = self.rate(at.after(b, 0.5 * h), pull[1], middle);
+        let (d, _) = self.rate(at.after(c, h), pull[2], psi[1]);
+        let end = at
+            .after(a, h / 6.0)
             .after(b, h / 3.0)
             .after(c, h / 3.0)
-            .after(d, h / 6.0)
+            .after(d, h / 6.0);
+        (end, (back * -h).exp())
     }
 }
 
@@ -116,16 +156,20 @@ impl Walk {
             let Some(first) = phase.iter().position(|y| y.is_finite()) else {
                 continue;
             };
+            let behind_s = self.behind_s();
             let mut state = State {
-                mean: Dual::constant(phase[first]),
-                variance: error,
+                mean: drive.own * behind_s + phase[first],
+                variance: error + noise * behind_s,
             };
+            let mut window = Window::from(state);
             for k in first..phase.len() - 1 {
                 let h = self.t_s[k + 1] - self.t_s[k];
                 let psi = [self.beat[k], self.beat[k + 1]];
+                let from = state;
+                let mut kept = Dual::constant(1.0);
                 match psi.map(f64::is_finite) {
                     [true, true] => {
-                        state = drive.step(state, &grown[k], psi, h);
+                        (state, kept) = drive.step(state, &grown[k], psi, h);
                         state.variance.value = state.variance.value.max(1e-12);
                     }
                     sounds => {
@@ -137,9 +181,24 @@ impl Walk {
                         }
                     }
                 }
-                if phase[k + 1].is_finite() {
-                    state = out.observe(state, phase[k + 1], error, c);
+                let seen = phase[k + 1];
+                let mut expected = (state.mean, state.variance, state.variance);
+                if self.measured {
+                    window = window.over(k % WINDOW, from, state, kept, h);
+                    if !(k + 1).is_multiple_of(WINDOW) {
+                        continue;
+                    }
+                    let per_s = 1.0 / (self.t_s[k + 1] - self.t_s[k + 1 - WINDOW]);
+                    expected = (
+                        window.middle,
+                        window.variance * (per_s * per_s),
+                        window.with_phase * per_s,
+                    );
                 }
+                if seen.is_finite() {
+                    state = out.observe(state, expected, seen, error, c);
+                }
+                window = Window::from(state);
             }
         }
         out.information.fill_upper_triangle_with_lower_triangle();
@@ -207,9 +266,16 @@ impl Walk {
 }
 
 impl Score {
-    /// Takes an observed phase of carrier `c` (rad) and gives the state after it.
-    fn observe(&mut self, state: State, seen: f64, error: Dual, c: usize) -> State {
-        let State { mean, variance } = state;
+    /// Takes an observation of carrier `c` (rad) of what is `expected`: its mean, its variance but for the error, and its covariance with
+    /// the state. Gives the state after it.
+    fn observe(
+        &mut self,
+        state: State,
+        (mean, variance, with_phase): (Dual, Dual, Dual),
+        seen: f64,
+        error: Dual,
+        c: usize,
+    ) -> State {
         let miss = (seen - mean.value + PI).rem_euclid(TAU) - PI;
         let spread = variance + error;
         let inverse = spread.inverse();
@@ -227,12 +293,12 @@ impl Score {
                     a * mean.slope[j] + b * spread.slope[j];
             }
         }
-        let gain = variance * inverse;
+        let gain = with_phase * inverse;
         let mut missed = mean * -1.0;
         missed.value = miss;
         State {
-            mean: mean + gain * missed,
-            variance: variance - gain * variance,
+            mean: state.mean + gain * missed,
+            variance: state.variance - gain * with_phase,
         }
     }
 }

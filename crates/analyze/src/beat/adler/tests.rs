@@ -1,6 +1,7 @@
 //! Against Adler's equation itself, by small steps of Euler and Maruyama.
 
 use super::*;
+use crate::filter::{Band, butter, sosfiltfilt};
 
 /// Carriers about a beat of 2.15 Hz, for a minute.
 #[derive(Clone, Copy)]
@@ -10,7 +11,8 @@ struct Case {
     onset_s: f64,
     build_up_s: f64,
     noise: f64,
-    /// Error of the observed phases, rad; its correlation falls to 1/e within 0.1 s.
+    /// Error of the steps, rad, its correlation falling to 1/e within 0.1 s; where there is one, phases are seen below 1 Hz only, as in a
+    /// step detector's band.
     error: f64,
 }
 
@@ -69,7 +71,7 @@ fn found(case: &Case, seed: u64) -> Adler {
             });
             for c in 0..2 {
                 error[c] = fade * error[c] + (1.0 - fade * fade).sqrt() * random.normal();
-                seen[c].push((phase[c] + case.error * error[c]).rem_euclid(TAU));
+                seen[c].push(phase[c] + case.error * error[c] - omega * t);
             }
         }
         let m = -(-(t - case.onset_s).max(0.0) / case.build_up_s).exp_m1();
@@ -79,7 +81,17 @@ fn found(case: &Case, seed: u64) -> Adler {
             phase[c] += dt * (omega + case.detuning[c] + pull) + kick;
         }
     }
-    adler(&t_s, &[&seen[0], &seen[1]], &beat, case.error > 0.0).unwrap()
+    let measured = case.error > 0.0;
+    let band = butter(2, Band::Low(1.0), 1.0 / (f64::from(every) * dt)).unwrap();
+    for x in &mut seen {
+        if measured {
+            *x = sosfiltfilt(&band, x).unwrap();
+        }
+        for (x, t) in x.iter_mut().zip(&t_s) {
+            *x = (*x + omega * t).rem_euclid(TAU);
+        }
+    }
+    adler(&t_s, &[&seen[0], &seen[1]], &beat, measured).unwrap()
 }
 
 #[test]

@@ -8,8 +8,9 @@ use std::f64::consts::TAU;
 
 /// Step of the equation, s: short for any pull that is looked for.
 const STEP_S: f64 = 0.2;
-/// Every such step a measured phase is looked at: those closer together share the detector's errors.
-const EVERY: usize = 2;
+/// A measured phase is of so many steps: a mean over 0.6 s passes half of what modulates it at 1 Hz, and so does the band of a step detector,
+/// which reaches from 0.6 to 1.5 of a cadence about 2 Hz.
+pub const WINDOW: usize = 3;
 /// What is looked at before and after the first beat, s.
 const BEFORE_S: f64 = 60.0;
 const AFTER_S: f64 = 90.0;
@@ -34,8 +35,10 @@ pub struct Walk {
     pub t_s: Vec<f64>,
     /// ψ, unwrapped, NaN where no beat sounds, rad.
     pub beat: Vec<f64>,
-    /// y of each carrier, NaN where it is not looked at, rad.
+    /// y of each carrier, NaN where it is not looked at, rad; a measured one is that in the middle of the window that ends there.
     pub phase: Vec<Vec<f64>>,
+    /// Whether phases were measured.
+    pub measured: bool,
     /// Whether the beginning of the beat is in the recording.
     pub begins: bool,
     /// How long carriers are observed before it, s.
@@ -73,13 +76,14 @@ impl Walk {
             .collect();
         let mut beat = pick(&straightened(&beat_rad[first..to]));
         beat[..(onset - first) / hop].fill(f64::NAN);
-        let mut phase: Vec<Vec<f64>> = phase_rad
-            .iter()
-            .map(|p| pick(&straightened(&p[first..to])))
-            .collect();
-        if measured {
-            phase.iter_mut().for_each(|phase| thin(&t, phase));
-        }
+        let observed = |p: &&[f64]| -> Vec<f64> {
+            let whole = straightened(&p[first..to]);
+            match measured {
+                true => in_windows(&t_s[first..to], &whole, hop),
+                false => pick(&whole),
+            }
+        };
+        let phase: Vec<Vec<f64>> = phase_rad.iter().map(observed).collect();
         let (mut sounds_s, mut turned) = (0.0, 0.0);
         for (t, b) in t.windows(2).zip(beat.windows(2)) {
             if b[0].is_finite() && b[1].is_finite() {
@@ -98,10 +102,20 @@ impl Walk {
             omega_rad_per_s: turned / sounds_s,
             least_noise: noise * noise,
             least_error: error * error,
+            measured,
             t_s: t,
             beat,
             phase,
         })
+    }
+
+    /// How long ago an observed phase was, s.
+    pub fn behind_s(&self) -> f64 {
+        if self.measured {
+            0.5 * WINDOW as f64 * STEP_S
+        } else {
+            0.0
+        }
     }
 
     /// Whether a carrier does not slip past the beat by a turn.
@@ -117,6 +131,8 @@ impl Walk {
 
     /// Where the climb begins: increments of each phase on the sines at their beginning, by least squares, for a quick and a slow build-up.
     pub fn start(&self) -> Result<DVector<f64>, &'static str> {
+        // How far the beat goes from the middle of a window to its end.
+        let late = self.behind_s() * self.omega_rad_per_s;
         let mut best: Option<(f64, DVector<f64>)> = None;
         for build_up_s in [2.0, 10.0] {
             let mut x = DVector::zeros(SHARED + 2 * self.phase.len());
@@ -128,7 +144,7 @@ impl Walk {
                     .map(|k| {
                         let (a, b) = (k[0], k[1]);
                         let m = -(-self.t_s[a].max(0.0) / build_up_s).exp_m1();
-                        let (sin, cos) = match self.beat[a] - phase[a] {
+                        let (sin, cos) = match self.beat[a] - phase[a] - late {
                             behind if behind.is_finite() => behind.sin_cos(),
                             _ => (0.0, 0.0),
                         };
@@ -182,19 +198,24 @@ fn onset(t_s: &[f64], beat_rad: &[f64]) -> Result<usize, &'static str> {
     Err("no beat that lasts for 4 s")
 }
 
-/// Leaves every [`EVERY`]th of a measured phase, and nothing near its ends.
-fn thin(t_s: &[f64], phase: &mut [f64]) {
+/// A measured phase in the middle of each window, at the step on which the window ends; NaN between them and near the phase's ends.
+fn in_windows(t_s: &[f64], phase: &[f64], hop: usize) -> Vec<f64> {
+    let mut out = vec![f64::NAN; phase.len().div_ceil(hop)];
     let seen = |k: &usize| phase[*k].is_finite();
-    let (Some(first), Some(last)) = ((0..phase.len()).find(seen), (0..phase.len()).rfind(seen))
-    else {
-        return;
+    let ends = (0..phase.len())
+        .find(seen)
+        .zip((0..phase.len()).rfind(seen));
+    let Some((first, last)) = ends else {
+        return out;
     };
     let inner = t_s[first] + ENDS_S..=t_s[last] - ENDS_S;
-    for (k, (y, t)) in phase.iter_mut().zip(t_s).enumerate() {
-        if !k.is_multiple_of(EVERY) || !inner.contains(t) {
-            *y = f64::NAN;
+    for end in (WINDOW..out.len()).step_by(WINDOW) {
+        let middle = end * hop - WINDOW * hop / 2;
+        if inner.contains(&t_s[middle]) {
+            out[end] = phase[middle];
         }
     }
+    out
 }
 
 /// Unwrapped over what is finite.
