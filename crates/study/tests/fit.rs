@@ -69,6 +69,40 @@ fn twins_lie_within_their_intervals() {
     }
 }
 
+/// Phases thirty times as noisy: the settled stretch then counts, and its noise is no pull and takes none away.
+#[test]
+fn noise_does_not_bias_the_pull() {
+    let (mut sum, mut held) = (0.0, 0);
+    for seed in 2001..2041 {
+        let settings = [
+            "solver.tolerance=1e-6".to_owned(),
+            "solver.energy=false".into(),
+            "effects.noise.phase_rad_per_sqrt_s=0.3".into(),
+            format!("seed={seed}"),
+        ];
+        let scene = sim::scene::load("music", &settings).unwrap();
+        let (inputs, _, outcome) =
+            study::ensemble::observe(&scene, None, &mut |_: &sim::run::Sample| true);
+        outcome.unwrap();
+        let field = Field {
+            inputs,
+            onset_s: 5.0,
+            build_up_s: 11.0,
+            ..Field::default()
+        };
+        let found = fit(&field, analyze::Window::from(15.0));
+        let e = find(&found, "pull");
+        held += usize::from(e.interval[0] <= 2.7 && 2.7 <= e.interval[1]);
+        sum += e.value;
+    }
+    println!(
+        "mean pull {:.3} rad/s, {held} of 40 within their intervals",
+        sum / 40.0
+    );
+    assert!((sum / 40.0 - 2.7).abs() < 0.2, "{}", sum / 40.0);
+    assert!(held >= 36, "{held}");
+}
+
 /// What a field recording of `scene` holds: the sensors and the beats, nothing that only a simulator knows.
 fn field_log(scene: &sim::scene::Scene, path: &Path) {
     let options = WriterOptions::default();

@@ -9,7 +9,8 @@
 //! ```
 //! φ_i gait phases (rad), Ω = 2π·beat, ω_i own frequencies [rad/s], K pull of the music [rad/s]; t₀, τ its onset and build-up (s),
 //! taken from a scene. Increments of φ carry white noise, so least squares (Gauss and Newton) gives the interval of Ω, K, ω_i
-//! by itself; sines are the mean of both ends of an increment, an error of (1/12)(ω_i − Ω)²Δt² of K (10⁻⁴ at 30 Hz).
+//! by itself; sines are the mean of both ends of an increment, the end as expected from its beginning (a predictor: the observed one would
+//! hold the increment's own noise), an error of the order of (ω_i − Ω)²Δt² of K (10⁻⁴ at 30 Hz).
 //! k, c, a, b: linear least squares on derivatives of the not-a-knot spline, their intervals from a moving-block bootstrap (500
 //! draws, blocks of two roll periods), because neighbours are alike; so are the intervals of the gait from phases that steps tell, whose
 //! increments a band has smoothed (sums over blocks, Newey & West's way without weights). Contact adds what k and c change by when every other
