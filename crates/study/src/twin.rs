@@ -130,6 +130,7 @@ pub const ROWS: &[Row] = &[
         ..row("plv", "phase locking", 4, Bound::Free)
     },
     row("beat_hz", "beat, Hz", 5, Bound::Within(0.0, 0.002)),
+    row("pull_rad_per_s", "pull, rad/s", 3, Bound::Free),
     row("peak_hz", "heave peak, Hz", 4, Bound::Free),
     row("roll_peak_hz", "roll peak, Hz", 4, Bound::Free),
     row("onset_time_s", "onset, s", 2, Bound::Within(0.5, 0.0)),
