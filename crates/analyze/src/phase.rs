@@ -83,10 +83,19 @@ pub fn chance_level(n: usize) -> Chance {
     })
 }
 
+/// What is smaller makes no digit of a chance level that anybody reads.
+const NOTHING: f64 = 1e-10;
+
+/// The t from which J₀(t)^N is nothing: |J₀(t)| ≤ √(2/πt).
+fn reach(n: usize) -> f64 {
+    2.0 / PI * NOTHING.powf(-2.0 / n as f64)
+}
+
 /// (1/N) ∫₀^∞ (1 − J₀(t)^N) t⁻² dt by Simpson's rule; the tail beyond T is 1/T.
 fn mean_resultant(n: usize) -> f64 {
-    let (end, steps) = (400.0, 40_000);
-    let h = end / steps as f64;
+    let h = 0.01;
+    let steps = 2 * (reach(n).min(400.0) / (2.0 * h)).ceil() as usize;
+    let end = steps as f64 * h;
     let value = |k: usize| {
         if k == 0 {
             return n as f64 / 4.0;
@@ -126,7 +135,8 @@ impl ResultantCdf {
                 2.0 * libm::j0(a).powi(n as i32) / (n as f64 * zero * libm::j1(zero).powi(2)),
             )
         };
-        ResultantCdf::Series(n, (1..=4000.max(4 * n)).map(term).collect())
+        let terms = (1..=4000.max(4 * n)).map(term);
+        ResultantCdf::Series(n, terms.take_while(|(a, _)| *a < reach(n)).collect())
     }
 
     fn at(&self, r: f64) -> f64 {

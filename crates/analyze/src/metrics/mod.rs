@@ -307,7 +307,7 @@ pub const METRICS: &[Metric] = &[
         needs: &[Need::Phases, Need::Beat],
         compute: beat::pull_rad_per_s,
         origin: "Adler 1946",
-        definition: "K of Adler's equation φ̇_j = ω_j + K m(t) sin(ψ + Δ_j − φ_j) + noise, m(t) = 1 − exp(−(t − t₀)/τ) from the first beat t₀ on: as implied by how carriers come to the beat or slip past it, from the same phases as the detuning. No value where any stronger pull explains them too; the reason gives the bound.",
+        definition: "K of Adler's equation φ̇_j = ω_j + K m(t) sin(ψ + Δ_j − φ_j) + noise, m(t) = 1 − exp(−(t − t₀)/τ) from the first beat t₀ on: as implied by how carriers come to the beat or slip past it, from the same phases as the detuning. What carriers do to each other is in it. No value where any stronger pull explains them too; the reason gives the bound.",
     },
     Metric {
         name: "captured",
