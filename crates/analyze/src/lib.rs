@@ -23,6 +23,7 @@ pub mod metrics;
 pub mod peaks;
 pub mod phase;
 pub mod quaternion;
+mod random;
 pub mod report;
 pub mod roles;
 pub mod spectrum;

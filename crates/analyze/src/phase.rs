@@ -4,6 +4,7 @@ use std::collections::HashMap;
 use std::f64::consts::{PI, TAU};
 use std::sync::Mutex;
 
+use crate::random::Random;
 use realfft::RealFftPlanner;
 use realfft::num_complex::Complex64;
 
@@ -251,15 +252,14 @@ pub fn surrogate_synchrony(phases_rad: &[&[f64]], draws: usize, seed: u64) -> Ve
                 .collect()
         })
         .collect();
-    let mut state = seed;
+    let mut random = Random(seed);
     let mut sum = vec![Complex64::default(); samples];
     let mut out: Vec<f64> = (0..draws)
         .map(|_| {
             sum.copy_from_slice(&unit[0]);
             for carrier in &unit[1..] {
                 let least = samples / 10;
-                let shift =
-                    least + (split_mix(&mut state) % (samples - 2 * least).max(1) as u64) as usize;
+                let shift = least + (random.bits() % (samples - 2 * least).max(1) as u64) as usize;
                 let (head, tail) = carrier.split_at(shift);
                 for (s, z) in sum.iter_mut().zip(tail.iter().chain(head)) {
                     *s += z;
@@ -270,15 +270,6 @@ pub fn surrogate_synchrony(phases_rad: &[&[f64]], draws: usize, seed: u64) -> Ve
         .collect();
     out.sort_by(f64::total_cmp);
     out
-}
-
-/// SplitMix64 (Steele et al. 2014): enough for choosing shifts.
-fn split_mix(state: &mut u64) -> u64 {
-    *state = state.wrapping_add(0x9e37_79b9_7f4a_7c15);
-    let mut z = *state;
-    z = (z ^ (z >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
-    z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
-    z ^ (z >> 31)
 }
 
 /// `scipy.signal.hilbert(x)`: the analytic signal, whose real part is x. Empty for an empty signal.
@@ -370,19 +361,14 @@ mod tests {
 
     #[test]
     fn the_band_holds_95_percent_of_drawn_phases() {
-        let mut state = 7;
+        let mut random = Random(7);
         for n in [3usize, 4, 5, 8] {
             let chance = chance_level(n);
             let draws = 40_000;
             let (mut below, mut above, mut sum) = (0, 0, 0.0);
             for _ in 0..draws {
                 let z: Complex64 = (0..n)
-                    .map(|_| {
-                        Complex64::from_polar(
-                            1.0,
-                            TAU * (split_mix(&mut state) >> 11) as f64 / (1u64 << 53) as f64,
-                        )
-                    })
+                    .map(|_| Complex64::from_polar(1.0, TAU * random.uniform()))
                     .sum();
                 let r = z.norm() / n as f64;
                 sum += r;

@@ -21,6 +21,7 @@ use crate::filter::{Band, butter, sosfiltfilt};
 use crate::inputs::{Inputs, Window, interpolate};
 use crate::median::median;
 use crate::metrics::{Datum, Metrics, Value, metrics_of, rival_hz};
+use crate::random::Random;
 use nalgebra::{UnitQuaternion, Vector3};
 
 /// How the sensor's axes lie on the body (x forward along the pole, y left, z up).
@@ -381,6 +382,8 @@ pub(crate) const ENDS: f64 = 0.5;
 const DRAWS: usize = 40;
 /// Seed of the draws: the same recording gives the same interval.
 const SEED: u64 = 0x7261_7468;
+/// How long what wanders stays alike, s.
+const WANDER_S: f64 = 3.0;
 /// Metrics that an inertial sensor cannot give, and why.
 const BEYOND: &[(&str, &str)] = &[
     (
@@ -616,7 +619,7 @@ fn varied(motion: &Motion, window: Window, draw: u64) -> Inputs {
             budget.tilt_offset_rad * random.normal(),
             1.0 + budget.angle_scale * random.normal(),
         );
-        let wander = random.wander(t_s.len(), step_s, budget.tilt_wander_rad);
+        let wander = random.wander(t_s.len(), step_s, budget.tilt_wander_rad, WANDER_S);
         pick(x)
             .iter()
             .zip(wander)
@@ -626,7 +629,7 @@ fn varied(motion: &Motion, window: Window, draw: u64) -> Inputs {
     let roll_rad = angle(&inputs.roll_rad, &mut random);
     let pitch_rad = angle(&inputs.pitch_rad, &mut random);
     let scale = 1.0 + budget.height_scale * random.normal();
-    let wander = random.wander(t_s.len(), step_s, budget.height_wander_m);
+    let wander = random.wander(t_s.len(), step_s, budget.height_wander_m, WANDER_S);
     let height_m = pick(&inputs.height_m)
         .iter()
         .zip(wander)
@@ -648,39 +651,6 @@ fn varied(motion: &Motion, window: Window, draw: u64) -> Inputs {
         support_ratio,
         gravity_m_per_s2: inputs.gravity_m_per_s2,
         ..Inputs::default()
-    }
-}
-
-/// SplitMix64.
-struct Random(u64);
-
-impl Random {
-    fn uniform(&mut self) -> f64 {
-        self.0 = self.0.wrapping_add(0x9e37_79b9_7f4a_7c15);
-        let mut z = self.0;
-        z = (z ^ (z >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
-        z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
-        ((z ^ (z >> 31)) >> 11) as f64 / (1u64 << 53) as f64
-    }
-
-    /// Standard normal (Box and Muller).
-    fn normal(&mut self) -> f64 {
-        let (u, v) = (1.0 - self.uniform(), self.uniform());
-        (-2.0 * u.ln()).sqrt() * (std::f64::consts::TAU * v).cos()
-    }
-
-    /// Ornstein–Uhlenbeck path with standard deviation `sd` and correlation time 3 s.
-    fn wander(&mut self, n: usize, step_s: f64, sd: f64) -> Vec<f64> {
-        let keep = (-step_s / 3.0).exp();
-        let kick = sd * (1.0 - keep * keep).sqrt();
-        let mut x = sd * self.normal();
-        (0..n)
-            .map(|_| {
-                let now = x;
-                x = keep * x + kick * self.normal();
-                now
-            })
-            .collect()
     }
 }
 

@@ -253,7 +253,7 @@ pub const METRICS: &[Metric] = &[
         needs: &[Need::Phases],
         compute: together::synchrony_chance,
         origin: "Kluyver 1906; docs/metrics.md",
-        definition: "Mean r of N independent, uniform phases (2/π for two); `per` is the interval that holds 95 % of r at a moment. For measured phases: mean and 95 % interval of time-shifted surrogates.",
+        definition: "Mean r of N independent, uniform phases (2/π for two); `per` is the interval that holds 95 % of r at a moment. For measured phases: mean and 95 % interval of time-shifted surrogates, and the p-value of the synchrony among them.",
     },
     Metric {
         name: "plv",

@@ -18,7 +18,15 @@ pub fn synchrony_chance(c: &Context) -> Value {
         // Seeded by a constant: the same recording gives the same chance level every time.
         let means = phase::surrogate_synchrony(&phases.slices(), SURROGATES, 1);
         let at = |share: f64| means[((means.len() - 1) as f64 * share).round() as usize];
-        return Value::number(mean(&means)).per(vec![at(0.025), at(0.975)]);
+        let seen = mean(&phase::order_parameter(&phases.slices()));
+        let above = means.len() - means.partition_point(|m| *m < seen);
+        let p = (1 + above) as f64 / (1 + means.len()) as f64;
+        return Value {
+            reason: Some(format!(
+                "p = {p:.3}: the share of {SURROGATES} time-shifted copies that are as much in step as the carriers are"
+            )),
+            ..Value::number(mean(&means)).per(vec![at(0.025), at(0.975)])
+        };
     }
     let chance = phase::chance_level(phases.columns.len());
     Value::number(chance.mean).per(chance.band.to_vec())
@@ -46,4 +54,50 @@ pub fn beat_hz(c: &Context) -> Value {
         return Value::missing("the beat sounds at a single sample of the window");
     }
     Value::number((psi[psi.len() - 1] - psi[0]) / (std::f64::consts::TAU * span_s))
+}
+
+#[cfg(test)]
+mod tests {
+    use crate::inputs::{Inputs, Window};
+    use crate::metrics::metrics;
+    use crate::random::Random;
+    use std::f64::consts::TAU;
+
+    /// p of the synchrony of two carriers found from steps, whose tempo wanders alike or each by itself.
+    fn p_value(together: bool, seed: u64) -> f64 {
+        let mut random = Random(seed);
+        let step_s = 1.0 / 30.0;
+        let mut walk = || {
+            let mut phase = 0.0;
+            let tempo = random.wander(1800, step_s, 0.8, 3.0);
+            let each = tempo.into_iter().map(|off| {
+                phase += (TAU * 2.0 + off) * step_s;
+                phase
+            });
+            each.collect::<Vec<f64>>()
+        };
+        let first = walk();
+        let second = if together { first.clone() } else { walk() };
+        let inputs = Inputs {
+            phase_t_s: (0..1800).map(|k| f64::from(k) * step_s).collect(),
+            phase_rad: vec![first, second],
+            phases_are_measured: true,
+            ..Inputs::default()
+        };
+        let found = metrics(&inputs, Window::ALL);
+        let reason = found.get("synchrony_chance").unwrap().reason.clone();
+        let words = reason.unwrap();
+        let number = words.strip_prefix("p = ").unwrap().split(':').next();
+        number.unwrap().parse().unwrap()
+    }
+
+    #[test]
+    fn who_walks_together_is_seldom_so_much_in_step_by_chance() {
+        for seed in 1..=10 {
+            assert!(p_value(true, seed) < 0.01);
+        }
+        let by_chance = (1..=60).filter(|s| p_value(false, *s) < 0.1).count();
+        // Six of sixty are expected, more than twelve in one series of a hundred.
+        assert!(by_chance <= 12, "{by_chance}");
+    }
 }

@@ -1,26 +1,12 @@
 //! How likely phases are under Adler's equation, and what makes them most likely.
 
 use super::dual;
+use super::unknowns::{
+    BEGUN, BUILD_UP, ERROR, LEAST, MOST, N, NOISE, OFFSET, OWN, PULL, SHARED, place,
+};
 use super::walk::{WINDOW, Walk};
-use super::{LEAST, MOST};
 use nalgebra::{DMatrix, DVector};
 use std::f64::consts::{PI, TAU};
-
-/// Unknowns of one carrier, of which the first [`SHARED`] are those of all: ln K, ln τ, ln σ², ln ε², ln(1/a − 1), ω, Δ.
-pub const PULL: usize = 0;
-pub const BUILD_UP: usize = 1;
-pub const NOISE: usize = 2;
-pub const ERROR: usize = 3;
-pub const BEGUN: usize = 4;
-pub const OWN: usize = 5;
-pub const OFFSET: usize = 6;
-const N: usize = 7;
-pub const SHARED: usize = 5;
-
-/// Where unknown `k` of carrier `c` stands among all.
-pub fn place(k: usize, c: usize) -> usize {
-    if k < SHARED { k } else { k + 2 * c }
-}
 
 type Dual = dual::Dual<N>;
 

@@ -24,11 +24,12 @@ mod dual;
 mod likelihood;
 #[cfg(test)]
 mod tests;
+mod unknowns;
 mod walk;
 
-use likelihood::{OFFSET, OWN, PULL, place};
 use nalgebra::DVector;
 use std::f64::consts::{PI, TAU};
+use unknowns::{BUILD_UP, LEAST, MOST, OFFSET, OWN, PULL, place};
 use walk::Walk;
 
 /// What phases and a beat say of the pull.
@@ -60,9 +61,6 @@ impl Adler {
     }
 }
 
-/// Pulls looked for, rad/s. A stronger one settles a carrier within a third of a step, faster than a step tells.
-const LEAST: f64 = 0.01;
-const MOST: f64 = 6.0;
 /// Fall of the log-likelihood at the ends of a 95 % interval: half of χ² with one degree of freedom.
 const FALL: f64 = 1.9207;
 /// Intervals of ln K narrower than this are those of a normal distribution (standard error).
@@ -110,7 +108,7 @@ pub fn adler(
     let found = Adler {
         pull_rad_per_s: x[PULL].exp(),
         pull_ci95_rad_per_s: ends,
-        build_up_s: x[likelihood::BUILD_UP].exp(),
+        build_up_s: x[BUILD_UP].exp(),
         noise_rad_per_sqrt_s: walk.noise(&x),
         detuning_rad_per_s: own.iter().map(|k| x[*k] - walk.omega_rad_per_s).collect(),
         detuning_half_rad_per_s: own.iter().map(|k| half(cover[(*k, *k)])).collect(),

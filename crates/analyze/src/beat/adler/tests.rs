@@ -2,6 +2,7 @@
 
 use super::*;
 use crate::filter::{Band, butter, sosfiltfilt};
+use crate::random::Random;
 
 /// Carriers about a beat of 2.15 Hz, for a minute.
 #[derive(Clone, Copy)]
@@ -33,23 +34,6 @@ const SLIPPING: Case = Case {
 };
 
 const OFFSET_RAD: f64 = 0.4;
-
-struct Random(u64);
-
-impl Random {
-    /// SplitMix64, 0 … 1.
-    fn uniform(&mut self) -> f64 {
-        self.0 = self.0.wrapping_add(0x9e37_79b9_7f4a_7c15);
-        let mut z = self.0;
-        z = (z ^ (z >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
-        z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
-        ((z ^ (z >> 31)) >> 11) as f64 / (1u64 << 53) as f64
-    }
-
-    fn normal(&mut self) -> f64 {
-        (-2.0 * (1.0 - self.uniform()).ln()).sqrt() * (TAU * self.uniform()).cos()
-    }
-}
 
 fn found(case: &Case, seed: u64) -> Adler {
     let (mut random, dt, omega) = (Random(7919 * seed), 2e-3, TAU * 2.15);

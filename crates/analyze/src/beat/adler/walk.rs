@@ -1,6 +1,6 @@
 //! Phases and beat about the first beat, on the grid of Adler's equation.
 
-use super::likelihood::{BUILD_UP, ERROR, NOISE, OFFSET, OWN, PULL, SHARED, place};
+use super::unknowns::{BUILD_UP, ERROR, NOISE, OFFSET, OWN, PULL, SHARED, place};
 use crate::imu::track::period_s;
 use crate::phase::unwrap;
 use nalgebra::{DVector, Matrix3, Vector3};
