@@ -99,12 +99,15 @@ fn metrics_section(out: &mut String, a: &Analysis) {
     }
     if !known.is_empty() {
         line!(out, "\nMetrics");
+        let unit_of = |value: &Value| match value.unit {
+            "1" | "bool" | "-" => "",
+            unit => unit,
+        };
+        let units = known.iter().map(|(_, v)| unit_of(v).chars().count());
+        let width = units.max().unwrap_or(0);
         for (name, value) in known {
             let label = metrics::find(name).map_or(name, |m| m.label);
-            let unit = match value.unit {
-                "1" | "bool" | "-" => "",
-                unit => unit,
-            };
+            let unit = unit_of(value);
             let shown = match &value.datum {
                 Datum::Number(x) => figures(*x),
                 Datum::Bool(x) => (if *x { "yes" } else { "no" }).to_owned(),
@@ -121,7 +124,10 @@ fn metrics_section(out: &mut String, a: &Analysis) {
                 let rest = if value.per.len() > most { ", …" } else { "" };
                 let _ = write!(note, "  [{}{rest}]", per.join(", "));
             }
-            line!(out, "  {label:<30} {shown:>10} {unit:<4} {name:<18} {note}");
+            line!(
+                out,
+                "  {label:<30} {shown:>10} {unit:<width$} {name:<18} {note}"
+            );
             if let (Datum::Word(_) | Datum::Bool(_), Some(reason)) = (&value.datum, &value.reason) {
                 wrapped(out, "      ", reason);
             }

@@ -181,7 +181,8 @@ fn pull(w: &mut Workspace, beat_phase: f64, strength: &[f64x2], grown: f64) {
 #[inline(always)]
 fn grown(per_s: Option<f64>, heard_s: f64) -> f64 {
     match per_s {
-        Some(per_s) => -(-heard_s * per_s).exp_m1(),
+        // Beside 1 the digits that `exp_m1` would save are nothing.
+        Some(per_s) => 1.0 - (-heard_s * per_s).exp(),
         None => 1.0,
     }
 }

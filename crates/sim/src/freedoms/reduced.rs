@@ -136,6 +136,8 @@ pub(super) struct Rails {
     pub free: usize,
     /// The free ones of x, y, z, each with its place.
     translations: Vec<(usize, usize)>,
+    /// Whether that is the height alone, as mostly: what is known to stand still is then not computed.
+    height_alone: bool,
     names: Vec<&'static str>,
     scales: Vec<f64>,
 }
@@ -166,6 +168,7 @@ impl Rails {
             mass: body.mass_kg,
             inverse_mass: 1.0 / body.mass_kg,
             translations: (0..3).filter_map(|c| place[c].map(|p| (c, p))).collect(),
+            height_alone: free[..3] == [false, false, true],
             gravity: body.gravity_m_per_s2.into(),
             inertia: body.inertia_kg_m2,
             held: [x, y, height_m, roll, tilt, yaw],
@@ -243,6 +246,10 @@ impl<T: Turning> Reduced<T> {
     fn place_handles(&self, y: &[f64], w: &mut Workspace, part: impl Part) {
         let rails = &self.rails;
         let (mut position, mut velocity) = ([0, 1, 2].map(|c| rails.held[c]), [0.0; 3]);
+        if rails.height_alone {
+            let motion = [[position[0], position[1], y[0]], [0.0, 0.0, y[rails.free]]];
+            return self.turning.gaps(rails, y, motion, w, part);
+        }
         for &(c, p) in &rails.translations {
             (position[c], velocity[c]) = (y[p], y[rails.free + p]);
         }
@@ -326,9 +333,18 @@ impl<T: Turning> Freedoms for Reduced<T> {
     fn accelerate(&self, y: &[f64], w: &mut Workspace, dy: &mut [f64]) {
         let (rails, n) = (&self.rails, self.rails.free);
         let [force, torque] = pull(&w.pair);
-        dy[..n].copy_from_slice(&y[n..2 * n]);
-        for &(c, p) in &rails.translations {
-            dy[n + p] = force[c] * rails.inverse_mass + rails.gravity[c];
+        // Three translations and two angles at most. Even a copy of one number would be a call.
+        for k in 0..5 {
+            if k < n {
+                dy[k] = y[n + k];
+            }
+        }
+        if rails.height_alone {
+            dy[n] = force[2] * rails.inverse_mass + rails.gravity[2];
+        } else {
+            for &(c, p) in &rails.translations {
+                dy[n + p] = force[c] * rails.inverse_mass + rails.gravity[c];
+            }
         }
         self.turning.accelerate(rails, torque, y, w, dy);
     }

@@ -141,6 +141,8 @@ pub fn sum<F: Arithmetic>(row: Row, k: &Slopes) -> Tile {
 const MANY: u32 = 100;
 const SAFETY: f64 = 0.9;
 const SHRINK: f64 = 0.2;
+/// An error below this says no more of the next step than this one.
+const LEAST_ERROR: f64 = 1e-4;
 const GROW: f64 = 6.0;
 const SMALLEST_STEP_S: f64 = 1e-13;
 /// Below this a step's error estimate is rounding.
@@ -329,7 +331,7 @@ impl<'m, P: Pair, const EVENTS: bool> Run<'m, P, EVENTS> {
         // before it has not met.
         let mut after_switch = [f64::INFINITY; 3];
         let mut switched: Option<usize> = None;
-        let mut error_before: f64 = 1e-4;
+        let mut ln_error_before = LEAST_ERROR.ln();
         let mut rejected_before = false;
         while !self.course.finished() {
             let t0 = self.course.t_s;
@@ -388,7 +390,8 @@ impl<'m, P: Pair, const EVENTS: bool> Run<'m, P, EVENTS> {
             if let Some(resting) = switched.take() {
                 after_switch[resting] = h * (SAFETY * e.powf(-P::EXPONENT)).clamp(SHRINK, GROW);
             }
-            let factor = SAFETY * e.powf(-P::EXPONENT * 0.8) * error_before.powf(P::EXPONENT * 0.2);
+            let ln_error = e.ln();
+            let factor = SAFETY * (P::EXPONENT * (0.2 * ln_error_before - 0.8 * ln_error)).exp();
             let factor = factor.clamp(
                 SHRINK,
                 if rejected_before || moved == Moved::Event {
@@ -403,7 +406,7 @@ impl<'m, P: Pair, const EVENTS: bool> Run<'m, P, EVENTS> {
             } else {
                 h * factor
             };
-            error_before = e.max(1e-4);
+            ln_error_before = ln_error.max(LEAST_ERROR.ln());
             rejected_before = false;
             if moved != Moved::On && !self.course.finished() {
                 self.begin();
