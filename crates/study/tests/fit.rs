@@ -167,6 +167,7 @@ fn field_twins_lie_within_their_intervals() {
         study::pool::in_order::<_, std::convert::Infallible>(seeds, 0, &stop, work, |_, found| {
             for (name, truth) in [
                 ("beat", 2.1507),
+                ("pull", 2.7),
                 ("amplitude 1", 0.0642 * 1.25),
                 ("amplitude 2", 0.0642 * 1.25),
                 ("stiffness", 3000.0),

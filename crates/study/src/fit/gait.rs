@@ -2,12 +2,12 @@
 
 use super::squares::{Block, bootstrapped};
 use super::{BLOCK_S, Estimate, Field, Outcome, budgeted, estimate};
+use analyze::beat::adler::adler;
 use analyze::imu::rath::Budget;
-use analyze::inputs::{Window, interpolate, mean_step_s};
+use analyze::inputs::{Inputs, Window, interpolate, mean_step_s};
 use analyze::phase::unwrap;
 use nalgebra::{DMatrix, DVector};
 use std::f64::consts::TAU;
-use std::ops::Range;
 
 /// Beat, pull and the carriers' own frequencies.
 pub(super) fn gait(field: &Field) -> Result<Vec<Outcome>, String> {
@@ -17,45 +17,19 @@ pub(super) fn gait(field: &Field) -> Result<Vec<Outcome>, String> {
         return Err("no gait phases".into());
     }
     let from = t_s.partition_point(|t| *t < field.onset_s);
-    // Before the first beat that was heard and after the last, nobody knows its phase: what lies between is used.
-    let psi = &i.beat_phase_rad;
-    let heard = |k: &usize| psi[*k].is_finite();
-    let (from, to) = match (
-        (from..psi.len()).find(heard),
-        (from..psi.len()).rev().find(heard),
-    ) {
-        (Some(first), Some(last)) if i.phases_are_measured && psi.len() == t_s.len() => {
-            (first, last + 1)
-        }
-        _ => (from, t_s.len()),
-    };
-    if to < from + 100 {
+    if t_s.len() < from + 100 {
         return Err("too few phases after the onset of the music".into());
     }
-    let t_s = &t_s[from..to];
-    let phases: Vec<Vec<f64>> = i.phase_rad.iter().map(|p| unwrap(&p[from..to])).collect();
+    if i.phases_are_measured {
+        return gait_from_steps(i, from);
+    }
+    let t_s = &t_s[from..];
+    let phases: Vec<Vec<f64>> = i.phase_rad.iter().map(|p| unwrap(&p[from..])).collect();
     if phases.iter().flatten().any(|p| !p.is_finite()) {
         return Err("phases have gaps".into());
     }
     let (n, carriers) = (t_s.len(), phases.len());
     let middle = 0.5 * (t_s[0] + t_s[n - 1]);
-    // Where the beat was heard through and through, the search begins at its frequency, and what it wanders about it is put on the phases' side.
-    let heard = i
-        .beat_phase_rad
-        .get(from..to)
-        .filter(|psi| i.phases_are_measured && psi.len() == n && psi.iter().all(|p| p.is_finite()));
-    let told = heard.map(|psi| tempo(t_s, psi));
-    let against: Vec<Vec<f64>> = match (heard, told) {
-        (Some(psi), Some((omega, _))) => phases
-            .iter()
-            .map(|p| {
-                (0..n)
-                    .map(|k| p[k] - psi[k] + omega * (t_s[k] - middle))
-                    .collect()
-            })
-            .collect(),
-        _ => phases.clone(),
-    };
     let grown = |t: f64| match field.build_up_s {
         0.0 => 1.0,
         tau => 1.0 - (-(t - field.onset_s) / tau).exp(),
@@ -68,71 +42,66 @@ pub(super) fn gait(field: &Field) -> Result<Vec<Outcome>, String> {
         .map(|p| (p[n - 1] - p[third]) / span)
         .sum::<f64>()
         / carriers as f64;
-    let start = told.map_or(mean, |(omega, _)| omega);
-    let own_start = mean;
     // Unknowns: A = K cos ψ, B = K sin ψ (ψ at the middle), Ω, ω_1 …
     let size = 3 + carriers;
-    let normal =
-        |omega: f64, a: f64, b: f64, own: &[f64], who: Range<usize>, when: Range<usize>| {
-            let mut gram = DMatrix::<f64>::zeros(size, size);
-            let mut right = DVector::<f64>::zeros(size);
-            let (mut squares, mut kept) = (0.0, 0.0);
-            let mut row = DVector::<f64>::zeros(size);
-            for c in who {
-                let phase = &phases[c];
-                for k in when.clone() {
-                    let dt = t_s[k] - t_s[k - 1];
-                    let rate = (phase[k] - phase[k - 1]) / dt;
-                    let (mut s, mut co, mut turn, mut back) = (0.0, 0.0, 0.0, 0.0);
-                    // At the end of the increment the phase that is to be expected from its beginning. The one that was observed holds the
-                    // increment's own noise, which on both sides took half of a pull of 2.7 rad/s away at 0.3 rad/√s.
-                    let mut off = 0.0;
-                    for j in [k - 1, k] {
-                        let x = omega * (t_s[j] - middle) - against[c][j] + off;
-                        let (sin, cos) = x.sin_cos();
-                        let m = grown(t_s[j]);
-                        s += 0.5 * m * sin;
-                        co += 0.5 * m * cos;
-                        let held = 0.5 * m * (a * cos - b * sin);
-                        turn += held * (t_s[j] - middle);
-                        back += held;
-                        off = (rate - own[c] - m * (a * sin + b * cos)) * dt;
-                    }
-                    row.fill(0.0);
-                    (row[0], row[1], row[2], row[3 + c]) = (s, co, turn, 1.0);
-                    let miss = rate - own[c] - a * s - b * co;
-                    // Increments over dt have variance σ²/dt: weight dt, the same for an even clock.
-                    gram.ger(dt, &row, &row, 1.0);
-                    right.axpy(dt * miss, &row, 1.0);
-                    squares += dt * miss * miss;
-                    // Less what the pull takes back of the noise within dt.
-                    kept += (1.0 - back * dt).max(0.1);
+    let normal = |omega: f64, a: f64, b: f64, own: &[f64]| {
+        let mut gram = DMatrix::<f64>::zeros(size, size);
+        let mut right = DVector::<f64>::zeros(size);
+        let (mut squares, mut kept) = (0.0, 0.0);
+        let mut row = DVector::<f64>::zeros(size);
+        for (c, phase) in phases.iter().enumerate() {
+            for k in 1..n {
+                let dt = t_s[k] - t_s[k - 1];
+                let rate = (phase[k] - phase[k - 1]) / dt;
+                let (mut s, mut co, mut turn, mut back) = (0.0, 0.0, 0.0, 0.0);
+                // At the end of the increment the phase that is to be expected from its beginning. The one that was observed holds the
+                // increment's own noise, which on both sides took half of a pull of 2.7 rad/s away at 0.3 rad/√s.
+                let mut off = 0.0;
+                for j in [k - 1, k] {
+                    let x = omega * (t_s[j] - middle) - phase[j] + off;
+                    let (sin, cos) = x.sin_cos();
+                    let m = grown(t_s[j]);
+                    s += 0.5 * m * sin;
+                    co += 0.5 * m * cos;
+                    let held = 0.5 * m * (a * cos - b * sin);
+                    turn += held * (t_s[j] - middle);
+                    back += held;
+                    off = (rate - own[c] - m * (a * sin + b * cos)) * dt;
                 }
+                row.fill(0.0);
+                (row[0], row[1], row[2], row[3 + c]) = (s, co, turn, 1.0);
+                let miss = rate - own[c] - a * s - b * co;
+                // Increments over dt have variance σ²/dt: weight dt, the same for an even clock.
+                gram.ger(dt, &row, &row, 1.0);
+                right.axpy(dt * miss, &row, 1.0);
+                squares += dt * miss * miss;
+                // Less what the pull takes back of the noise within dt.
+                kept += (1.0 - back * dt).max(0.1);
             }
-            (gram, right, squares, kept)
-        };
+        }
+        (gram, right, squares, kept)
+    };
     // Where in its turn the beat is, and how strong: a coarse look before the descent.
-    let own0 = vec![own_start; carriers];
-    let mut best = (f64::INFINITY, start, 0.0, 0.0, own0.clone());
-    let reach = if told.is_some() { 0 } else { 20 };
-    for step in -reach..=reach {
-        let omega: f64 = start + f64::from(step) * 0.25 / span;
-        let (gram, right, ..) = normal(omega, 0.0, 0.0, &own0, 0..carriers, 1..n);
+    let own0 = vec![mean; carriers];
+    let mut best = (f64::INFINITY, mean, 0.0, 0.0, own0.clone());
+    for step in -20..=20 {
+        let omega: f64 = mean + f64::from(step) * 0.25 / span;
+        let (gram, right, ..) = normal(omega, 0.0, 0.0, &own0);
         // Without Ω the problem is linear.
         let keep: Vec<usize> = (0..size).filter(|k| *k != 2).collect();
         let small = gram.select_rows(&keep).select_columns(&keep);
         let Some(x) = small.lu().solve(&right.select_rows(&keep)) else {
             continue;
         };
-        let own: Vec<f64> = (0..carriers).map(|c| own_start + x[2 + c]).collect();
-        let (_, _, squares, _) = normal(omega, x[0], x[1], &own, 0..carriers, 1..n);
+        let own: Vec<f64> = (0..carriers).map(|c| mean + x[2 + c]).collect();
+        let (_, _, squares, _) = normal(omega, x[0], x[1], &own);
         if squares < best.0 {
             best = (squares, omega, x[0], x[1], own);
         }
     }
     let (mut squares, mut omega, mut a, mut b, mut own) = best;
     for _ in 0..50 {
-        let (gram, right, ..) = normal(omega, a, b, &own, 0..carriers, 1..n);
+        let (gram, right, ..) = normal(omega, a, b, &own);
         let step = gram
             .lu()
             .solve(&right)
@@ -150,7 +119,7 @@ pub(super) fn gait(field: &Field) -> Result<Vec<Outcome>, String> {
                 a + part * step[0],
                 b + part * step[1],
             );
-            let found = normal(new.0, new.1, new.2, &new_own, 0..carriers, 1..n).2;
+            let found = normal(new.0, new.1, new.2, &new_own).2;
             if found <= squares || part < 1e-3 {
                 (omega, a, b, own, squares) = (new.0, new.1, new.2, new_own, found);
                 break;
@@ -161,40 +130,19 @@ pub(super) fn gait(field: &Field) -> Result<Vec<Outcome>, String> {
             break;
         }
     }
-    let (gram, _, squares, kept) = normal(omega, a, b, &own, 0..carriers, 1..n);
+    let (gram, _, squares, kept) = normal(omega, a, b, &own);
     let variance = squares / ((n - 1) * carriers - size) as f64;
     let inverse = gram
         .try_inverse()
         .ok_or("beat and gait cannot be told apart")?;
-    let cover = if i.phases_are_measured {
-        let per_block = ((BLOCK_S * (n - 1) as f64 / (t_s[n - 1] - t_s[0])) as usize).max(1);
-        let mut spread = DMatrix::<f64>::zeros(size, size);
-        let mut blocks = 0;
-        for c in 0..carriers {
-            for first in (1..n).step_by(per_block) {
-                let block = first..(first + per_block).min(n);
-                let pull = normal(omega, a, b, &own, c..c + 1, block).1;
-                spread.ger(1.0, &pull, &pull, 1.0);
-                blocks += 1;
-            }
-        }
-        if blocks <= 2 * size {
-            return Err("too few phases after the onset of the music".into());
-        }
-        &inverse * spread * &inverse * (blocks as f64 / (blocks - size) as f64)
-    } else {
-        inverse * variance
-    };
+    let cover = inverse * variance;
     let half = |v: f64| 1.96 * v.max(0.0).sqrt();
     let pull = a.hypot(b);
     let (ca, cb) = (a / pull, b / pull);
     let pull_variance =
         ca * ca * cover[(0, 0)] + 2.0 * ca * cb * cover[(0, 1)] + cb * cb * cover[(1, 1)];
     let mut out = vec![
-        match told {
-            Some((omega, half)) => estimate("beat", "Hz", omega / TAU, half / TAU),
-            None => estimate("beat", "Hz", omega / TAU, half(cover[(2, 2)]) / TAU),
-        },
+        estimate("beat", "Hz", omega / TAU, half(cover[(2, 2)]) / TAU),
         estimate("pull", "rad/s", pull, half(pull_variance)),
     ];
     for (c, w) in own.iter().enumerate() {
@@ -206,13 +154,6 @@ pub(super) fn gait(field: &Field) -> Result<Vec<Outcome>, String> {
             half(cover[(k, k)]) / TAU,
         ));
     }
-    if i.phases_are_measured {
-        // In twins the pull and what goes with it lay in their intervals less often than an interval promises.
-        let why = "steps are found in a band about the cadence, which smooths what it shows in";
-        out.truncate(1);
-        out.extend(["pull", "gait", "phase noise"].map(|name| Err((name.into(), why.into()))));
-        return Ok(out);
-    }
     // The noise: its variance has itself a known spread.
     let all = ((n - 1) * carriers) as f64;
     let sigma = (variance * all / kept).sqrt();
@@ -223,6 +164,59 @@ pub(super) fn gait(field: &Field) -> Result<Vec<Outcome>, String> {
         sigma,
         1.96 * sigma / (2.0 * count).sqrt(),
     ));
+    Ok(out)
+}
+
+/// The same where steps tell the phases and a recorder or a topic the beats: Adler's test, which knows what a step detector does. What is walked
+/// before the music is in it.
+fn gait_from_steps(i: &Inputs, from: usize) -> Result<Vec<Outcome>, String> {
+    // Before the first beat that was heard, in pauses and after the last, nobody knows its phase.
+    let times = i.phase_times().iter().skip(from);
+    let beats = times.zip(i.beat_phase_rad.iter().skip(from));
+    let (t_s, psi): (Vec<f64>, Vec<f64>) = beats
+        .filter(|(_, psi)| psi.is_finite())
+        .map(|(t, psi)| (*t, *psi))
+        .unzip();
+    if t_s.len() < 100 {
+        return Err("too few beats after the onset of the music".into());
+    }
+    let (omega, half) = tempo(&t_s, &unwrap(&psi));
+    let mut out = vec![estimate("beat", "Hz", omega / TAU, half / TAU)];
+    let phases: Vec<&[f64]> = i.phase_rad.iter().map(|p| &p[..]).collect();
+    match adler(i.phase_times(), &phases, &i.beat_phase_rad, true) {
+        Ok(found) => {
+            let interval = found.pull_ci95_rad_per_s;
+            out.push(match interval[1].is_finite() {
+                true => Ok(Estimate {
+                    name: "pull".into(),
+                    unit: "rad/s",
+                    value: found.pull_rad_per_s,
+                    interval,
+                }),
+                false => Err((
+                    "pull".into(),
+                    format!(
+                        "at least {:.2} rad/s: a stronger one would show the same steps",
+                        interval[0]
+                    ),
+                )),
+            });
+            let halves = found.detuning_half_rad_per_s.iter();
+            for (c, (off, half)) in found.detuning_rad_per_s.iter().zip(halves).enumerate() {
+                let name = format!("gait {}", c + 1);
+                out.push(match half.is_finite() {
+                    true => estimate(name, "Hz", (omega + off) / TAU, half / TAU),
+                    false => Err((
+                        name,
+                        "who is with the beat all the time does not show it".into(),
+                    )),
+                });
+            }
+        }
+        Err(why) => out.extend(["pull", "gait"].map(|name| Err((name.into(), why.into())))),
+    }
+    let why = "steps err by as much as carriers wander";
+    out.push(Err(("phase noise".into(), why.into())));
     Ok(out)
 }
 

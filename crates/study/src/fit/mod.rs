@@ -12,8 +12,8 @@
 //! by itself; sines are the mean of both ends of an increment, the end as expected from its beginning (a predictor: the observed one would
 //! hold the increment's own noise), an error of the order of (ω_i − Ω)²Δt² of K (10⁻⁴ at 30 Hz).
 //! k, c, a, b: linear least squares on derivatives of the not-a-knot spline, their intervals from a moving-block bootstrap (500
-//! draws, blocks of two roll periods), because neighbours are alike; so are the intervals of the gait from phases that steps tell, whose
-//! increments a band has smoothed (sums over blocks, Newey & West's way without weights). Contact adds what k and c change by when every other
+//! draws, blocks of two roll periods), because neighbours are alike. Where steps tell the phases, pull and gait are those of Adler's test
+//! ([`analyze::beat::adler`]), which knows that a step detector smooths them and finds τ by itself. Contact adds what k and c change by when every other
 //! sample is left out: a bound, 15 times over, of what the sampling does. From sensors z_i is the shoulder's and the body's motion about
 //! their slow course, δ_i = z_i − (body's height + (R p_i)_z), N_tot the body's specific force times its mass; a handle carries where
 //! k δ_i + c δ̇_i + e/N, its share of the load, is above a seventh of the weight over N. Source: Seber & Wild, Nonlinear Regression (1989);

@@ -121,9 +121,14 @@ impl Walk {
         let per_s = (shared(BUILD_UP) * -1.0).exp();
         let noise = shared(NOISE).exp() + self.least_noise;
         let error = shared(ERROR).exp() + self.least_error;
-        let to_come = match self.begins {
-            true => pull,
-            false => pull * shared(BEGUN).logistic(),
+        let to_come = match (self.begins, self.measured) {
+            (true, false) => pull,
+            (true, true) => {
+                let period_s = TAU / self.omega_rad_per_s;
+                let early_s = shared(BEGUN) * (period_s / 12.0f64.sqrt()) + 0.5 * period_s;
+                pull * (per_s * early_s * -1.0).exp()
+            }
+            (false, _) => pull * shared(BEGUN).logistic(),
         };
         // K m at the beginning, middle and end of every step: the same for all carriers.
         let grown = |t: f64| pull - to_come * (per_s * -t.max(0.0)).exp();
@@ -200,6 +205,7 @@ impl Walk {
                 BUILD_UP => (1.6, 1.5),
                 NOISE => (-6.0, 4.0),
                 ERROR => (-7.0, 4.0),
+                BEGUN if self.begins => (0.0, 1.0),
                 BEGUN => (-1.0, 2.0),
                 _ if (k - SHARED).is_multiple_of(2) => (self.omega_rad_per_s, 5.0),
                 _ => (0.0, 10.0),

@@ -2,7 +2,7 @@
 //!
 //! ```text
 //! dφ_i = (ω_i + K m(t) sin(ψ + Δ_i − φ_i)) dt + σ dW_i       y_i = φ_i + e,  e normal with SD ε       Δω_i = ω_i − Ω
-//! m    = 1 − a e^{−(t − t₀)/τ} while a beat sounds, else 0   a = 1 where the beginning t₀ was heard
+//! m    = 1 − a e^{−(t − t₀)/τ} while a beat sounds, else 0   a = e^{−s/τ}, s = 0 … a beat, where the beginning t₀ was heard; s = 0 if recorded
 //! ```
 //! φ_i gait phase, ψ the beat's, y_i the phase as observed (rad); t₀ the first beat, τ how long the pull grows (s); ω_i own frequency, Ω the
 //! mean beat [rad/s]; K the pull once grown, the same for all [rad/s]; Δ_i where a carrier without detuning would settle (rad; a step

@@ -43,16 +43,17 @@ fn found(case: &Case, seed: u64) -> Adler {
     let mut phase = [0.0; 2].map(|_| TAU * random.uniform());
     let mut error = [0.0; 2].map(|_| random.normal());
     let (mut t_s, mut beat, mut seen) = (vec![], vec![], [vec![], vec![]]);
+    // Who hears beats, and no phase, hears the first up to a beat after the onset.
+    let heard_s = match case.error > 0.0 {
+        true => (case.onset_s * omega / TAU).ceil() * TAU / omega,
+        false => case.onset_s,
+    };
     // From long before the record, so that a beat that sounds all the time has done its work.
     for k in -30_000..30_000 {
         let t = f64::from(k) * dt;
         if k >= 0 && k % every == 0 {
             t_s.push(t);
-            beat.push(if t >= case.onset_s {
-                omega * t
-            } else {
-                f64::NAN
-            });
+            beat.push(if t >= heard_s { omega * t } else { f64::NAN });
             for c in 0..2 {
                 error[c] = fade * error[c] + (1.0 - fade * fade).sqrt() * random.normal();
                 seen[c].push(phase[c] + case.error * error[c] - omega * t);
