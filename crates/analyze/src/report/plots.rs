@@ -350,8 +350,9 @@ fn psd(id: &'static str, title: &str, name: &str, s: &SpectrumSummary) -> Panel 
         "frequency, Hz",
         &format!("density, {}", unit(&s.unit)),
     );
+    let plural = if s.segments == 1 { "" } else { "s" };
     p.note = format!(
-        "Welch, {} segments of {:.1} s, bins {:.3} Hz apart, 95 % of the noise within ×{:.2} … ×{:.2}.",
+        "Welch, {} segment{plural} of {:.1} s, bins {:.3} Hz apart, 95 % of the noise within ×{:.2} … ×{:.2}.",
         s.segments, s.segment_s, s.resolution_hz, s.confidence_95[0], s.confidence_95[1]
     );
     let shown = s
