@@ -512,8 +512,8 @@ impl<'a> Pass<'a> {
         f_hz: Option<f64>,
         spectra: &mut Vec<(String, SpectrumSummary)>,
     ) -> Vec<(String, Summary)> {
-        let known: HashSet<String> = spectra.iter().map(|(path, _)| path.clone()).collect();
-        let told = |e: &Entry| !self.request.signals.is_empty() && !known.contains(&e.path);
+        let known: HashSet<&str> = spectra.iter().map(|(path, _)| path.as_str()).collect();
+        let told = |e: &Entry| !self.request.signals.is_empty() && !known.contains(&*e.path);
         // Each signal by itself, so on all processors.
         let found: Vec<(Summary, Option<SpectrumSummary>)> = self
             .entries

@@ -136,8 +136,8 @@ impl ResultantCdf {
                 2.0 * libm::j0(a).powi(n as i32) / (n as f64 * zero * libm::j1(zero).powi(2)),
             )
         };
-        let terms = (1..=4000.max(4 * n)).map(term);
-        ResultantCdf::Series(n, terms.take_while(|(a, _)| *a < reach(n)).collect())
+        let (terms, end) = ((1..=4000.max(4 * n)).map(term), reach(n));
+        ResultantCdf::Series(n, terms.take_while(|(a, _)| *a < end).collect())
     }
 
     fn at(&self, r: f64) -> f64 {

@@ -103,6 +103,31 @@ fn noise_does_not_bias_the_pull() {
     assert!(held >= 36, "{held}");
 }
 
+/// The drum pauses for five beats, nobody knows how many: the tempo is that of the beats that were heard one after the other.
+#[test]
+fn a_pause_of_the_drum_does_not_slow_the_beat() {
+    let t_s: Vec<f64> = (0..6000).map(|k| f64::from(k) * 0.01).collect();
+    let beats = (20..100).filter(|k| !(50..55).contains(k));
+    let beat_s: Vec<f64> = beats.map(|k| 0.5 * f64::from(k)).collect();
+    let phase = |ahead: f64| {
+        t_s.iter()
+            .map(|t| std::f64::consts::TAU * 2.0 * t + ahead)
+            .collect()
+    };
+    let field = Field {
+        inputs: analyze::Inputs {
+            beat_phase_rad: analyze::beat::lock::beat_phase(&beat_s, &t_s),
+            phase_rad: vec![phase(0.3), phase(0.8)],
+            phases_are_measured: true,
+            t_s,
+            ..analyze::Inputs::default()
+        },
+        ..Field::default()
+    };
+    let found = fit(&field, analyze::Window::ALL);
+    assert!((find(&found, "beat").value - 2.0).abs() < 1e-9);
+}
+
 /// What a field recording of `scene` holds: the sensors and the beats, nothing that only a simulator knows.
 fn field_log(scene: &sim::scene::Scene, path: &Path) {
     let options = WriterOptions::default();

@@ -4,7 +4,7 @@ use std::borrow::Cow;
 use std::cell::OnceCell;
 
 use super::lines::Line;
-use crate::beat::adler::{Adler, adler};
+use crate::beat::adler::Adler;
 use crate::inputs::{Inputs, Window, mean_step_s};
 
 /// A column that a metric cannot do without.
@@ -194,16 +194,7 @@ impl<'a> Context<'a> {
 
     /// Adler's test, on all phases about the first beat, whatever the window.
     pub fn adler(&self) -> &Result<Adler, &'static str> {
-        self.adler.get_or_init(|| {
-            let i = self.inputs;
-            let phases: Vec<&[f64]> = i.phase_rad.iter().map(|p| &p[..]).collect();
-            adler(
-                i.phase_times(),
-                &phases,
-                &i.beat_phase_rad,
-                i.phases_are_measured,
-            )
-        })
+        self.adler.get_or_init(|| Adler::of(self.inputs))
     }
 
     /// Why a column is missing, or `None` when it is there.

@@ -2,7 +2,7 @@
 
 use super::squares::{Block, bootstrapped};
 use super::{BLOCK_S, Estimate, Field, Outcome, budgeted, estimate};
-use analyze::beat::adler::adler;
+use analyze::beat::adler::Adler;
 use analyze::imu::rath::Budget;
 use analyze::inputs::{Inputs, Window, interpolate, mean_step_s};
 use analyze::phase::unwrap;
@@ -170,20 +170,22 @@ pub(super) fn gait(field: &Field) -> Result<Vec<Outcome>, String> {
 /// The same where steps tell the phases and a recorder or a topic the beats: Adler's test, which knows what a step detector does. What is walked
 /// before the music is in it.
 fn gait_from_steps(i: &Inputs, from: usize) -> Result<Vec<Outcome>, String> {
-    // Before the first beat that was heard, in pauses and after the last, nobody knows its phase.
-    let times = i.phase_times().iter().skip(from);
-    let beats = times.zip(i.beat_phase_rad.iter().skip(from));
-    let (t_s, psi): (Vec<f64>, Vec<f64>) = beats
-        .filter(|(_, psi)| psi.is_finite())
-        .map(|(t, psi)| (*t, *psi))
-        .unzip();
-    if t_s.len() < 100 {
-        return Err("too few beats after the onset of the music".into());
-    }
+    // Before the first beat that was heard, in pauses and after the last, nobody knows its phase, nor how many beats a pause holds: the tempo is
+    // that of the longest stretch without one.
+    let times = i.phase_times().iter().skip(from).copied();
+    let beats: Vec<(f64, f64)> = times
+        .zip(i.beat_phase_rad.iter().skip(from).copied())
+        .collect();
+    let heard = beats
+        .chunk_by(|a, b| a.1.is_finite() == b.1.is_finite())
+        .filter(|stretch| stretch[0].1.is_finite())
+        .max_by_key(|stretch| stretch.len())
+        .filter(|stretch| stretch.len() >= 100)
+        .ok_or("too few beats after the onset of the music")?;
+    let (t_s, psi): (Vec<f64>, Vec<f64>) = heard.iter().copied().unzip();
     let (omega, half) = tempo(&t_s, &unwrap(&psi));
     let mut out = vec![estimate("beat", "Hz", omega / TAU, half / TAU)];
-    let phases: Vec<&[f64]> = i.phase_rad.iter().map(|p| &p[..]).collect();
-    match adler(i.phase_times(), &phases, &i.beat_phase_rad, true) {
+    match Adler::of(i) {
         Ok(found) => {
             let interval = found.pull_ci95_rad_per_s;
             out.push(match interval[1].is_finite() {
@@ -205,7 +207,7 @@ fn gait_from_steps(i: &Inputs, from: usize) -> Result<Vec<Outcome>, String> {
             for (c, (off, half)) in found.detuning_rad_per_s.iter().zip(halves).enumerate() {
                 let name = format!("gait {}", c + 1);
                 out.push(match half.is_finite() {
-                    true => estimate(name, "Hz", (omega + off) / TAU, half / TAU),
+                    true => estimate(name, "Hz", (found.beat_rad_per_s + off) / TAU, half / TAU),
                     false => Err((
                         name,
                         "who is with the beat all the time does not show it".into(),

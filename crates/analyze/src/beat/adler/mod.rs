@@ -27,6 +27,8 @@ mod tests;
 mod unknowns;
 mod walk;
 
+use crate::inputs::Inputs;
+use crate::spectrum::chi_square_quantile;
 use nalgebra::DVector;
 use std::f64::consts::{PI, TAU};
 use unknowns::{BUILD_UP, LEAST, MOST, OFFSET, OWN, PULL, place};
@@ -50,9 +52,26 @@ pub struct Adler {
     pub detuning_half_rad_per_s: Vec<f64>,
     /// Δ of each carrier, −π … π, rad.
     pub offset_rad: Vec<f64>,
+    /// Ω, from which the detunings are counted, rad/s.
+    pub beat_rad_per_s: f64,
 }
 
 impl Adler {
+    /// [`adler`] on a recording's columns.
+    ///
+    /// # Errors
+    /// As there.
+    pub fn of(inputs: &Inputs) -> Result<Self, &'static str> {
+        let phases: Vec<&[f64]> = inputs.phase_rad.iter().map(|p| &p[..]).collect();
+        let beat = &inputs.beat_phase_rad;
+        adler(
+            inputs.phase_times(),
+            &phases,
+            beat,
+            inputs.phases_are_measured,
+        )
+    }
+
     /// Whether every |Δω| ≤ K; `None` where K is not known.
     pub fn inside(&self) -> Option<bool> {
         let within = |d: &f64| d.abs() <= self.pull_rad_per_s;
@@ -89,7 +108,6 @@ pub fn adler(
         true => BENT_RAD / walk.before_s,
         false => 0.0,
     };
-    let half = |variance: f64| 1.96 * variance.max(0.0).sqrt().hypot(bent);
     let own: Vec<usize> = (0..carriers).map(|c| place(OWN, c)).collect();
     let sd = cover[(PULL, PULL)].max(0.0).sqrt();
     let mut ends = [false, true].map(|up| walk.end(&x, best.value, sd, up));
@@ -102,7 +120,7 @@ pub fn adler(
         if settled {
             f64::INFINITY
         } else {
-            half(variance)
+            1.96 * variance.max(0.0).sqrt().hypot(bent)
         }
     };
     let found = Adler {
@@ -115,6 +133,7 @@ pub fn adler(
         offset_rad: (0..carriers)
             .map(|c| (x[place(OFFSET, c)] + PI).rem_euclid(TAU) - PI)
             .collect(),
+        beat_rad_per_s: walk.omega_rad_per_s,
     };
     let finite = best.value.is_finite() && cover.iter().all(|c| c.is_finite());
     finite.then_some(found).ok_or(walk::TOO_LITTLE)
@@ -135,7 +154,7 @@ impl Walk {
             let mut none = best.clone();
             none[PULL] = LEAST.ln();
             // Without a pull there are no offsets either, one for each carrier: as many degrees of freedom more.
-            if 2.0 * fallen(none).1 < chi_squared_95(1.0 + self.phase.len() as f64) {
+            if 2.0 * fallen(none).1 < chi_square_quantile(0.95, 1.0 + self.phase.len() as f64) {
                 return 0.0;
             }
         }
@@ -159,10 +178,4 @@ impl Walk {
             before = fall;
         }
     }
-}
-
-/// 95 % point of χ² with `n` degrees of freedom, to 1 %. Source: Wilson & Hilferty, PNAS 17 (1931) 684.
-fn chi_squared_95(n: f64) -> f64 {
-    let v = 2.0 / (9.0 * n);
-    n * (1.0 - v + 1.645 * v.sqrt()).powi(3)
 }
