@@ -7,7 +7,7 @@ mod reduced;
 pub use reduced::{Pinned, choose};
 
 use crate::body::Body;
-use crate::lanes::{f64x2, pack, sum};
+use crate::lanes::{Moments, Number, f64x2, pack, sum};
 use crate::model::{All, Block, Pair, Part, Workspace};
 use crate::scene::Start;
 use nalgebra::{Matrix3, Quaternion, UnitQuaternion, Vector3};
@@ -67,6 +67,10 @@ pub trait Freedoms: Send + Sync {
     fn orient(&self, _y: &[f64], _w: &mut Workspace) {}
     /// Writes the derivatives of the body's states from the forces in the workspace.
     fn accelerate(&self, y: &[f64], w: &mut Workspace, dy: &mut [f64]);
+    /// All six freedoms, which can be evaluated at eight moments at once.
+    fn as_six(&self) -> Option<&Six> {
+        None
+    }
     /// The pose at a state.
     fn pose(&self, y: &[f64]) -> Pose;
     /// From a state and its rates: acceleration of the centre of mass in the world [m/s²], angular acceleration in the body [rad/s²].
@@ -125,20 +129,17 @@ impl Tensor {
     }
 
     #[inline(always)]
-    fn times(&self, v: [f64; 3]) -> [f64; 3] {
-        let own = [
-            self.moments[0] * v[0],
-            self.moments[1] * v[1],
-            self.moments[2] * v[2],
-        ];
+    fn times<T: Number>(&self, v: [T; 3]) -> [T; 3] {
+        let [x, y, z] = self.moments;
+        let own = [v[0] * x, v[1] * y, v[2] * z];
         if self.diagonal {
             return own;
         }
         let [yz, xz, xy] = self.products;
         [
-            own[0] + xy * v[1] + xz * v[2],
-            own[1] + xy * v[0] + yz * v[2],
-            own[2] + xz * v[0] + yz * v[1],
+            own[0] + v[1] * xy + v[2] * xz,
+            own[1] + v[0] * xy + v[2] * yz,
+            own[2] + v[0] * xz + v[1] * yz,
         ]
     }
 }
@@ -158,8 +159,13 @@ impl Six {
     }
 
     #[inline(always)]
-    fn place_handles(&self, y: &[f64], w: &mut Workspace, part: impl Part) {
-        let y: &[f64; 13] = y.first_chunk().expect("thirteen states");
+    pub(crate) fn place_handles<N: Moments>(
+        &self,
+        y: &[N::Each],
+        w: &mut Workspace<N>,
+        part: impl Part,
+    ) {
+        let y: &[N::Each; 13] = y.first_chunk().expect("thirteen states");
         let r = rotation(&y[3..7]);
         let spin = [y[10], y[11], y[12]];
         w.spin = spin;
@@ -170,22 +176,63 @@ impl Six {
             &self.handle,
             part,
             [position, velocity],
-            turning(r, spin),
+            turning::<N>(r, spin),
         );
     }
+}
+
+/// The same at any number of moments.
+impl Six {
+    /// As [`Freedoms::accelerate`].
+    #[inline(always)]
+    pub(crate) fn rates<N: Moments>(&self, y: &[N::Each], w: &Workspace<N>, dy: &mut [N::Each]) {
+        let y: &[N::Each; 13] = y.first_chunk().expect("thirteen states");
+        let dy: &mut [N::Each; 13] = dy.first_chunk_mut().expect("thirteen states");
+        let ([force, t], r) = (pull(&w.pair), &w.rotation);
+        let columns = [0, 1, 2].map(|a| [r[0][a], r[1][a], r[2][a]]);
+        let mut in_body = by_rows(columns, t);
+        for (torque, further) in in_body.iter_mut().zip(w.body_torque) {
+            *torque += further;
+        }
+        let [wx, wy, wz] = w.spin;
+        let momentum = self.inertia.times([wx, wy, wz]);
+        let angular = self.inverse_inertia.times([
+            in_body[0] - (wy * momentum[2] - wz * momentum[1]),
+            in_body[1] - (wz * momentum[0] - wx * momentum[2]),
+            in_body[2] - (wx * momentum[1] - wy * momentum[0]),
+        ]);
+        let [qx, qy, qz, qw] = turn([y[3], y[4], y[5], y[6]], w.spin);
+        dy[..7].copy_from_slice(&[y[7], y[8], y[9], qx, qy, qz, qw]);
+        for a in 0..3 {
+            dy[7 + a] = force[a] * self.inverse_mass + self.gravity[a];
+            dy[10 + a] = angular[a];
+        }
+    }
+}
+
+/// q̇ = ½ q ∘ (ω, 0)
+#[inline(always)]
+pub(crate) fn turn<T: Number>(q: [T; 4], [wx, wy, wz]: [T; 3]) -> [T; 4] {
+    let [qx, qy, qz, qw] = [q[0] * 0.5, q[1] * 0.5, q[2] * 0.5, q[3] * 0.5];
+    [
+        qw * wx + qy * wz - qz * wy,
+        qw * wy + qz * wx - qx * wz,
+        qw * wz + qx * wy - qy * wx,
+        -(qx * wx + qy * wy + qz * wz),
+    ]
 }
 
 /// Places the handles, two by two: arm and its rate from `arm_of`, gap and its rate against a centre of mass at
 /// `motion` = position (m) and velocity (m/s).
 #[inline(always)]
-fn place_handles<H>(
-    pairs: &mut [Pair],
+fn place_handles<N: Moments, H>(
+    pairs: &mut [Pair<N>],
     handles: &[H],
     part: impl Part,
-    motion: [[f64; 3]; 2],
-    arm_of: impl Fn(&H) -> [[f64x2; 3]; 2],
+    motion: [[N::Each; 3]; 2],
+    arm_of: impl Fn(&H) -> [[N::Pair; 3]; 2],
 ) {
-    let [position, velocity] = motion.map(|v| v.map(f64x2::splat));
+    let [position, velocity] = [both::<N>(motion[0]), both::<N>(motion[1])];
     for (p, h) in part.of_mut(pairs).iter_mut().zip(part.of(handles)) {
         let [arm, arm_rate] = arm_of(h);
         for a in 0..3 {
@@ -198,11 +245,15 @@ fn place_handles<H>(
 
 /// Arms in the world and their rates ω × arm, for a body of this rotation and this spin (body axes, rad/s).
 #[inline(always)]
-fn turning(r: [[f64; 3]; 3], spin: [f64; 3]) -> impl Fn(&[f64x2; 3]) -> [[f64x2; 3]; 2] {
-    let world = r.map(|row| f64x2::splat(row[0] * spin[0] + row[1] * spin[1] + row[2] * spin[2]));
-    let rows = r.map(|row| row.map(f64x2::splat));
+fn turning<N: Moments>(
+    r: [[N::Each; 3]; 3],
+    spin: [N::Each; 3],
+) -> impl Fn(&[f64x2; 3]) -> [[N::Pair; 3]; 2] {
+    let world = both::<N>(by_rows(r, spin));
+    let rows = [both::<N>(r[0]), both::<N>(r[1]), both::<N>(r[2])];
     move |h| {
-        let arm = rows.map(|row| row[0] * h[0] + row[1] * h[1] + row[2] * h[2]);
+        let h = [N::always(h[0]), N::always(h[1]), N::always(h[2])];
+        let arm = by_rows(rows, h);
         let arm_rate = [
             world[1] * arm[2] - world[2] * arm[1],
             world[2] * arm[0] - world[0] * arm[2],
@@ -212,10 +263,36 @@ fn turning(r: [[f64; 3]; 3], spin: [f64; 3]) -> impl Fn(&[f64x2; 3]) -> [[f64x2;
     }
 }
 
+/// a · b
+#[inline(always)]
+fn dot<T: Number>(a: [T; 3], b: [T; 3]) -> T {
+    a[2].madd(b[2], a[1].madd(b[1], a[0] * b[0]))
+}
+
+// Functions rather than closures, which would not be inlined into code compiled for wide registers.
+
+/// What both carriers of a pair share.
+#[inline(always)]
+fn both<N: Moments>(v: [N::Each; 3]) -> [N::Pair; 3] {
+    [N::both(v[0]), N::both(v[1]), N::both(v[2])]
+}
+
+/// Over the carriers of a pair.
+#[inline(always)]
+fn sums<N: Moments>(v: [N::Pair; 3]) -> [N::Each; 3] {
+    [N::sum(v[0]), N::sum(v[1]), N::sum(v[2])]
+}
+
+/// A matrix, by its rows, times a vector.
+#[inline(always)]
+fn by_rows<T: Number>(rows: [[T; 3]; 3], v: [T; 3]) -> [T; 3] {
+    [dot(rows[0], v), dot(rows[1], v), dot(rows[2], v)]
+}
+
 /// Sums of the handle forces (N) and of their torques about the centre of mass (N·m), in the world.
 #[inline(always)]
-fn pull(pairs: &[Pair]) -> [[f64; 3]; 2] {
-    let zero = f64x2::ZERO;
+fn pull<N: Moments>(pairs: &[Pair<N>]) -> [[N::Each; 3]; 2] {
+    let zero = N::Pair::splat(0.0);
     let (mut force, mut torque) = ([zero; 3], [zero; 3]);
     for p in pairs {
         let ([fx, fy], fz, [ax, ay, az]) = (p.tangential, p.normal, p.arm);
@@ -226,7 +303,7 @@ fn pull(pairs: &[Pair]) -> [[f64; 3]; 2] {
         torque[1] += az * fx - ax * fz;
         torque[2] += ax * fy - ay * fx;
     }
-    [force.map(sum), torque.map(sum)]
+    [sums::<N>(force), sums::<N>(torque)]
 }
 
 /// M v
@@ -237,16 +314,17 @@ fn times(m: &Matrix3<f64>, v: [f64; 3]) -> [f64; 3] {
 
 /// Rows of the rotation matrix of q/|q|.
 #[inline(always)]
-fn rotation(q: &[f64]) -> [[f64; 3]; 3] {
+fn rotation<T: Number>(q: &[T]) -> [[T; 3]; 3] {
     let (x, y, z, w) = (q[0], q[1], q[2], q[3]);
-    let s = 2.0 / (x * x + y * y + z * z + w * w);
+    let (one, two) = (T::splat(1.0), T::splat(2.0));
+    let s = two / (x * x + y * y + z * z + w * w);
     let (sx, sy, sz) = (s * x, s * y, s * z);
     let (xx, xy, xz, yy, yz, zz) = (sx * x, sx * y, sx * z, sy * y, sy * z, sz * z);
     let (wx, wy, wz) = (sx * w, sy * w, sz * w);
     [
-        [1.0 - (yy + zz), xy - wz, xz + wy],
-        [xy + wz, 1.0 - (xx + zz), yz - wx],
-        [xz - wy, yz + wx, 1.0 - (xx + yy)],
+        [one - (yy + zz), xy - wz, xz + wy],
+        [xy + wz, one - (xx + zz), yz - wx],
+        [xz - wy, yz + wx, one - (xx + yy)],
     ]
 }
 
@@ -323,30 +401,11 @@ impl Freedoms for Six {
     }
 
     fn accelerate(&self, y: &[f64], w: &mut Workspace, dy: &mut [f64]) {
-        let y: &[f64; 13] = y.first_chunk().expect("thirteen states");
-        let dy: &mut [f64; 13] = dy.first_chunk_mut().expect("thirteen states");
-        let ([force, t], r) = (pull(&w.pair), &w.rotation);
-        let in_body =
-            [0, 1, 2].map(|a| r[0][a] * t[0] + r[1][a] * t[1] + r[2][a] * t[2] + w.body_torque[a]);
-        let [wx, wy, wz] = w.spin;
-        let momentum = self.inertia.times([wx, wy, wz]);
-        let angular = self.inverse_inertia.times([
-            in_body[0] - (wy * momentum[2] - wz * momentum[1]),
-            in_body[1] - (wz * momentum[0] - wx * momentum[2]),
-            in_body[2] - (wx * momentum[1] - wy * momentum[0]),
-        ]);
-        let (qx, qy, qz, qw) = (0.5 * y[3], 0.5 * y[4], 0.5 * y[5], 0.5 * y[6]);
-        dy[0] = y[7];
-        dy[1] = y[8];
-        dy[2] = y[9];
-        dy[3] = qw * wx + qy * wz - qz * wy;
-        dy[4] = qw * wy + qz * wx - qx * wz;
-        dy[5] = qw * wz + qx * wy - qy * wx;
-        dy[6] = -(qx * wx + qy * wy + qz * wz);
-        for a in 0..3 {
-            dy[7 + a] = force[a] * self.inverse_mass + self.gravity[a];
-            dy[10 + a] = angular[a];
-        }
+        self.rates(y, w, dy);
+    }
+
+    fn as_six(&self) -> Option<&Six> {
+        Some(self)
     }
 
     fn pose(&self, y: &[f64]) -> Pose {

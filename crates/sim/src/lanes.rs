@@ -3,6 +3,11 @@
 //! Carrier i sits in lane i mod 2 of pair i / 2. With an odd number of carriers the last lane is padding: its
 //! parameters are zero, so that it exerts nothing.
 
+mod eight;
+mod number;
+
+pub use eight::*;
+pub use number::{Eight, Moments, Now, Number, Two};
 use wide::bytemuck::cast;
 pub use wide::f64x2;
 use wide::i64x2;
@@ -58,6 +63,9 @@ pub fn sum(v: f64x2) -> f64 {
 /// Beyond this, rad, the reduction below would lose digits and libm takes over.
 const FAR_RAD: f64 = 4.0e6;
 
+/// What makes the last digit of a sum a whole number: 1.5·2⁵².
+const ROUND: f64 = 6_755_399_441_055_744.0;
+
 /// Sine and cosine of both lanes, to 1 ulp of 1 or better (the test holds it to 2⁻⁵²).
 ///
 /// ```text
@@ -72,7 +80,6 @@ pub fn sin_cos(x: f64x2) -> (f64x2, f64x2) {
     if !x.abs().simd_le(splat(FAR_RAD)).all() {
         return far(x);
     }
-    const ROUND: f64 = 6_755_399_441_055_744.0; // 1.5·2⁵²
     let shifted = x * splat(std::f64::consts::FRAC_2_PI) + splat(ROUND);
     let quadrant: i64x2 = cast(shifted);
     let n = shifted - splat(ROUND);

@@ -10,10 +10,15 @@
 //! Between events the right-hand side is smooth: whether a handle is in contact, which noise cell it is and whether the
 //! music has begun are fixed for a *segment* and change only between two of them.
 
+mod eight;
 mod term;
 mod workspace;
 
-pub use term::{Account, Local, OnBlock, Power, Stage, Switch, Term};
+pub use eight::Registers;
+pub use term::{
+    Account, AsWhole, Book, Local, OnBlock, OnEight, Power, PowerOnEight, Stage, Switch, Term,
+    Whole,
+};
 pub use workspace::{All, Block, Pair, Part, Workspace};
 
 use crate::beat::Beat;
@@ -94,6 +99,8 @@ pub struct Model {
     contact_stiffness: Vec<f64>,
     contact_exponent: f64,
     contact_damping: Vec<f64x2>,
+    /// Damping and stiffness of every carrier's hold, both ways.
+    sideways: [Vec<f64x2>; 2],
     watches_contact: bool,
     /// Whether there are so many carriers that they are treated block by block.
     in_blocks: bool,
@@ -144,6 +151,7 @@ impl Model {
             contact_stiffness: Vec::new(),
             contact_exponent: 1.0,
             contact_damping: Vec::new(),
+            sideways: Default::default(),
             extra: Vec::new(),
             watches_contact: false,
             in_blocks: false,
@@ -260,6 +268,11 @@ impl Model {
         self.contact_damping = damping;
     }
 
+    /// N·s/m and N/m of every carrier's hold on the handle, sideways.
+    pub(crate) fn set_sideways_springs(&mut self, damping: Vec<f64x2>, stiffness: Vec<f64x2>) {
+        self.sideways = [damping, stiffness];
+    }
+
     /// The clock that ticks at `rate_hz`; sensors of one rate share it.
     pub(crate) fn sensor_clock(&mut self, rate_hz: f64) -> usize {
         let clock = Clock { rate_hz };
@@ -330,6 +343,19 @@ impl Model {
                 .min(LOOSEST / damping_per_s)
                 .max(scale);
         }
+    }
+
+    /// Damping (N·s/m) and stiffness (N/m) of the springs at a carrier's handle along one of the world's axes; zero where there are none.
+    pub(crate) fn springs(&self, carrier: usize, axis: usize) -> [f64; 2] {
+        let of = |springs: &[f64x2]| {
+            let pair = springs.get(carrier / lanes::LANES);
+            pair.map_or(0.0, |x| x.as_array()[carrier % lanes::LANES])
+        };
+        if axis < 2 {
+            return [of(&self.sideways[0]), of(&self.sideways[1])];
+        }
+        let stiffness = self.contact_stiffness.get(carrier).copied();
+        [of(&self.contact_damping), stiffness.unwrap_or(0.0)]
     }
 
     /// Natural gait frequencies, rad/s.

@@ -14,8 +14,8 @@
 //! the sign. With p = 1 it is smooth through the zero. Source: Hunt & Crossley, J. Appl. Mech. 42 (1975), 440–445.
 //! Source: paper, eq. (unilateral); Brogliato, Nonsmooth Mechanics (1999), ch. 2.
 
-use crate::lanes::{f64x2, pack};
-use crate::model::{Account, Local, Model, Pair, Part, Power, Stage, Workspace};
+use crate::lanes::{Moments, Now, Number, f64x2, pack};
+use crate::model::{Book, Local, Model, Pair, Part, Power, Stage, Workspace};
 use crate::scene::{Checker, PerCarrier, Problem, Scene, problem};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -152,54 +152,55 @@ struct HuntCrossley {
 impl HuntCrossley {
     /// k |δ|^p with the sign of δ.
     #[inline(always)]
-    fn spring(&self, p: usize, gap: f64x2) -> f64x2 {
+    fn spring<N: Moments>(&self, p: usize, gap: N::Pair) -> N::Pair {
         let bent = if self.exponent == 1.0 {
             gap
         } else {
-            f64x2::new(
-                gap.to_array()
-                    .map(|d| d.abs().powf(self.exponent).copysign(d)),
-            )
+            gap.signed_power(self.exponent)
         };
-        self.stiffness[p] * bent
+        N::always(self.stiffness[p]) * bent
     }
 }
 
 impl Local for HuntCrossley {
-    fn act(&self, _t_s: f64, w: &mut Workspace, part: impl Part) {
+    #[inline(always)]
+    fn act<N: Moments>(&self, _t_s: N::Each, w: &mut Workspace<N>, part: impl Part) {
         for p in part.range(w.pair.len()) {
-            let spring = self.spring(p, w.pair[p].gap[2]);
-            let factor = self.per_rate[p] * w.pair[p].gap_rate[2] + 1.0;
-            let apart = spring.simd_lt(f64x2::ZERO);
-            let free = spring * apart.select(factor.fast_max(f64x2::splat(0.01)), factor);
+            let spring = self.spring::<N>(p, w.pair[p].gap[2]);
+            let factor = N::always(self.per_rate[p]) * w.pair[p].gap_rate[2] + 1.0;
+            let free = spring * (-spring).if_positive(factor.larger(N::Pair::splat(0.01)), factor);
             w.pair[p].unclamped = free;
-            w.pair[p].normal = (free * w.pair[p].contact_gain).fast_max(w.pair[p].contact_floor);
+            w.pair[p].normal = (free * w.pair[p].contact_gain).larger(w.pair[p].contact_floor);
         }
     }
 }
 
-impl Account for HuntCrossley {
-    fn power(&self, _w: &Workspace, pairs: &[Pair], first: usize) -> Power {
-        let (mut work, mut absorbed) = (f64x2::ZERO, f64x2::ZERO);
+impl Book for HuntCrossley {
+    #[inline(always)]
+    fn power<N: Moments>(
+        &self,
+        _w: &Workspace<N>,
+        pairs: &[Pair<N>],
+        first: usize,
+    ) -> Power<N::Each> {
+        let (mut work, mut absorbed) = (N::Pair::splat(0.0), N::Pair::splat(0.0));
         for (k, p) in pairs.iter().enumerate() {
-            let spring = in_contact(p) & self.spring(first + k, p.gap[2]);
+            let spring = in_contact(p, self.spring::<N>(first + k, p.gap[2]));
             work += p.normal * p.base_rate[2];
             absorbed += (p.normal - spring) * p.gap_rate[2];
         }
         Power {
-            work_w: crate::lanes::sum(work),
-            dissipated_w: crate::lanes::sum(absorbed),
+            work_w: N::sum(work),
+            dissipated_w: N::sum(absorbed),
         }
     }
 
     fn stored_j(&self, w: &Workspace) -> f64 {
         let mut stored = f64x2::ZERO;
         for p in 0..w.pair.len() {
-            let in_contact = in_contact(&w.pair[p]);
-            stored += in_contact
-                & (self.spring(p, w.pair[p].gap[2])
-                    * w.pair[p].gap[2]
-                    * (1.0 / (self.exponent + 1.0)));
+            let gap = w.pair[p].gap[2];
+            let energy = self.spring::<Now>(p, gap) * gap * (1.0 / (self.exponent + 1.0));
+            stored += in_contact(&w.pair[p], energy);
         }
         crate::lanes::sum(stored)
     }
@@ -210,40 +211,51 @@ impl Account for HuntCrossley {
 struct SpringDampers(Vec<(f64x2, f64x2)>);
 
 impl Local for SpringDampers {
-    fn act(&self, _t_s: f64, w: &mut Workspace, part: impl Part) {
+    #[inline(always)]
+    fn act<N: Moments>(&self, _t_s: N::Each, w: &mut Workspace<N>, part: impl Part) {
         for (p, &(stiffness, damping)) in part.of_mut(&mut w.pair).iter_mut().zip(part.of(&self.0))
         {
-            let free = stiffness * p.gap[2] + damping * p.gap_rate[2];
+            let spring = N::always(stiffness) * p.gap[2];
+            let free = N::always(damping).madd(p.gap_rate[2], spring);
             p.unclamped = free;
-            p.normal = (free * p.contact_gain).fast_max(p.contact_floor);
+            p.normal = (free * p.contact_gain).larger(p.contact_floor);
         }
     }
 }
 
-/// Whether N acts: always in a bilateral contact, else where it pushes.
-fn in_contact(p: &Pair) -> f64x2 {
-    p.normal.simd_gt(f64x2::ZERO) | p.contact_floor.simd_lt(f64x2::ZERO)
+/// `x` where N acts, which is always in a bilateral contact, else where it pushes; 0 elsewhere.
+#[inline(always)]
+fn in_contact<N: Moments>(p: &Pair<N>, x: N::Pair) -> N::Pair {
+    // The floor is 0 or −∞.
+    let acts = p.normal.larger(-p.contact_floor);
+    acts.if_positive(x, N::Pair::splat(0.0))
 }
 
-impl Account for SpringDampers {
-    fn power(&self, _w: &Workspace, pairs: &[Pair], first: usize) -> Power {
-        let (mut work, mut absorbed) = (f64x2::ZERO, f64x2::ZERO);
+impl Book for SpringDampers {
+    #[inline(always)]
+    fn power<N: Moments>(
+        &self,
+        _w: &Workspace<N>,
+        pairs: &[Pair<N>],
+        first: usize,
+    ) -> Power<N::Each> {
+        let (mut work, mut absorbed) = (N::Pair::splat(0.0), N::Pair::splat(0.0));
         for (p, &(stiffness, _)) in pairs.iter().zip(&self.0[first..]) {
             // N δ̇ goes into the spring and the damper; the spring's part returns through `stored_j`.
-            let spring = in_contact(p) & (stiffness * p.gap[2]);
+            let spring = in_contact(p, N::always(stiffness) * p.gap[2]);
             work += p.normal * p.base_rate[2];
             absorbed += (p.normal - spring) * p.gap_rate[2];
         }
         Power {
-            work_w: crate::lanes::sum(work),
-            dissipated_w: crate::lanes::sum(absorbed),
+            work_w: N::sum(work),
+            dissipated_w: N::sum(absorbed),
         }
     }
 
     fn stored_j(&self, w: &Workspace) -> f64 {
         let mut stored = f64x2::ZERO;
         for (p, &(stiffness, _)) in w.pair.iter().zip(&self.0) {
-            stored += in_contact(p) & (stiffness * p.gap[2] * p.gap[2] * 0.5);
+            stored += in_contact(p, stiffness * p.gap[2] * p.gap[2] * 0.5);
         }
         crate::lanes::sum(stored)
     }

@@ -9,8 +9,8 @@
 //! K_c strength [rad/s]; φ phases (rad). The mean-field form is the same sum in O(N); a graph costs O(edges). For N = 2, δ = φ₂ − φ₁ locks where
 //! |Δω| < K_c, at sin δ* = Δω/K_c. Source: paper, eq. (kuramoto); Kuramoto (1975), Strogatz (2000).
 
-use crate::lanes::{LANES, f64x2, sum};
-use crate::model::{Model, Stage, Term, Workspace};
+use crate::lanes::{LANES, Moments, Number};
+use crate::model::{AsWhole, Model, Stage, Whole, Workspace};
 use crate::scene::{Checker, Problem, Scene, problem};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -112,17 +112,17 @@ impl Coupling {
         match self.graph.pairs(&scene.carriers.handles_m) {
             None => model.add(
                 Stage::Phases,
-                MeanField {
+                AsWhole(MeanField {
                     gain: self.strength_rad_per_s / n as f64,
                     padding: (n % LANES) as f64,
-                },
+                }),
             ),
             Some(edges) => {
                 let mut gain = vec![1.0; n];
                 edges.iter().flatten().for_each(|&i| gain[i] += 1.0);
                 gain.iter_mut()
                     .for_each(|g| *g = self.strength_rad_per_s / *g);
-                model.add(Stage::Phases, Network { edges, gain });
+                model.add(Stage::Phases, AsWhole(Network { edges, gain }));
             }
         }
     }
@@ -135,18 +135,19 @@ struct Network {
     gain: Vec<f64>,
 }
 
-impl Term for Network {
-    fn apply(&self, _t_s: f64, w: &mut Workspace) {
+impl Whole for Network {
+    #[inline(always)]
+    fn act<N: Moments>(&self, _t_s: N::Each, w: &mut Workspace<N>) {
         for &[a, b] in &self.edges {
             // sin(φ_b − φ_a) from the sines and cosines that are there already.
             let pull =
                 w.of(b, |p| p.sin) * w.of(a, |p| p.cos) - w.of(b, |p| p.cos) * w.of(a, |p| p.sin);
             let (to_a, to_b) = (
-                w.of(a, |p| p.rate) + self.gain[a] * pull,
-                w.of(b, |p| p.rate) - self.gain[b] * pull,
+                w.of(a, |p| p.rate) + pull * self.gain[a],
+                w.of(b, |p| p.rate) - pull * self.gain[b],
             );
-            *w.of_mut(a, |p| &mut p.rate) = to_a;
-            *w.of_mut(b, |p| &mut p.rate) = to_b;
+            w.set(a, |p| &mut p.rate, to_a);
+            w.set(b, |p| &mut p.rate, to_b);
         }
     }
 }
@@ -158,14 +159,16 @@ struct MeanField {
     padding: f64,
 }
 
-impl Term for MeanField {
-    fn apply(&self, _t_s: f64, w: &mut Workspace) {
-        let (mut s, mut c) = (f64x2::ZERO, f64x2::ZERO);
+impl Whole for MeanField {
+    #[inline(always)]
+    fn act<N: Moments>(&self, _t_s: N::Each, w: &mut Workspace<N>) {
+        let (mut s, mut c) = (N::Pair::splat(0.0), N::Pair::splat(0.0));
         for p in &w.pair {
             s += p.sin;
             c += p.cos;
         }
-        let (s, c) = (sum(s) * self.gain, (sum(c) - self.padding) * self.gain);
+        let s = N::both(N::sum(s) * self.gain);
+        let c = N::both((N::sum(c) + -self.padding) * self.gain);
         for p in &mut w.pair {
             p.rate += p.cos * s - p.sin * c;
         }

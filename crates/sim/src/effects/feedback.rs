@@ -11,7 +11,8 @@
 //! Source: Nessler et al. (2016), phase resetting in gait; Kuramoto, *Chemical Oscillations* (1984), ch. 3, for the form.
 //! The paper's scenes have none: there the phases never feel the load.
 
-use crate::model::{Model, Stage, Term, Workspace};
+use crate::lanes::Moments;
+use crate::model::{AsWhole, Model, Stage, Whole, Workspace};
 use crate::scene::{Checker, Problem, Scene};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -62,8 +63,8 @@ impl Feedback {
             // Without weight there is no fair share: nothing is felt.
             per_n: if share_n > 0.0 { 1.0 / share_n } else { 0.0 },
         };
-        model.add(Stage::Phases, Respond(law.clone()));
-        model.add(Stage::Body, Feel(law));
+        model.add(Stage::Phases, AsWhole(Respond(law.clone())));
+        model.add(Stage::Body, AsWhole(Feel(law)));
     }
 }
 
@@ -81,14 +82,15 @@ struct Law {
 #[derive(Debug)]
 struct Respond(Law);
 
-impl Term for Respond {
-    fn apply(&self, _t_s: f64, w: &mut Workspace) {
+impl Whole for Respond {
+    #[inline(always)]
+    fn act<N: Moments>(&self, _t_s: N::Each, w: &mut Workspace<N>) {
         let law = &self.0;
         for i in 0..law.carriers {
-            let toward = law.phase.0 * w.of(i, |p| p.cos) - law.phase.1 * w.of(i, |p| p.sin);
-            let excess = w.extra[law.first + i] - 1.0;
-            let rate = w.of(i, |p| p.rate) + law.strength * excess * toward;
-            *w.of_mut(i, |p| &mut p.rate) = rate;
+            let toward = w.of(i, |p| p.cos) * law.phase.0 - w.of(i, |p| p.sin) * law.phase.1;
+            let excess = w.extra[law.first + i] + -1.0;
+            let rate = w.of(i, |p| p.rate) + excess * toward * law.strength;
+            w.set(i, |p| &mut p.rate, rate);
         }
     }
 }
@@ -96,8 +98,9 @@ impl Term for Respond {
 #[derive(Debug)]
 struct Feel(Law);
 
-impl Term for Feel {
-    fn apply(&self, _t_s: f64, w: &mut Workspace) {
+impl Whole for Feel {
+    #[inline(always)]
+    fn act<N: Moments>(&self, _t_s: N::Each, w: &mut Workspace<N>) {
         let law = &self.0;
         for i in 0..law.carriers {
             let felt = w.extra[law.first + i];

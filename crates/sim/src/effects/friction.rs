@@ -20,8 +20,8 @@
 //!
 //! Source: paper, section 3.3 ("regularized friction"); Stewart & Trinkle (1996) for what is regularised.
 
-use crate::lanes::{LANES, f64x2, sum};
-use crate::model::{Account, Local, Model, Pair, Part, Power, Stage, Workspace};
+use crate::lanes::{LANES, Moments, Number};
+use crate::model::{Book, Local, Model, Pair, Part, Power, Stage, Workspace};
 use crate::scene::{Checker, Problem, Scene, problem};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -138,14 +138,18 @@ struct Coulomb {
 impl Coulomb {
     /// μN·e/√(1 + |e|²), written so that μN = 0 needs no case of its own.
     #[inline(always)]
-    fn limited(&self, normal: f64x2, hold: [f64x2; 2], rate: [f64x2; 2]) -> [f64x2; 2] {
-        let most = (normal * self.mu).fast_max(f64x2::ZERO);
-        let wanted = [0, 1].map(|a| hold[a] + most * (rate[a] * self.per_velocity));
-        let tiny = f64x2::splat(f64::MIN_POSITIVE);
+    fn limited<T: Number>(&self, normal: T, hold: [T; 2], rate: [T; 2]) -> [T; 2] {
+        let most = (normal * self.mu).larger(T::splat(0.0));
+        let wanted = [
+            hold[0] + most * (rate[0] * self.per_velocity),
+            hold[1] + most * (rate[1] * self.per_velocity),
+        ];
+        let tiny = T::splat(f64::MIN_POSITIVE);
         let length = (most * most + wanted[0] * wanted[0] + wanted[1] * wanted[1])
-            .fast_max(tiny)
+            .larger(tiny)
             .sqrt();
-        wanted.map(|e| e * (most / length))
+        let kept = most / length;
+        [wanted[0] * kept, wanted[1] * kept]
     }
 }
 
@@ -160,19 +164,20 @@ struct Bristles {
 }
 
 impl Local for Bristles {
-    fn act(&self, _t_s: f64, w: &mut Workspace, part: impl Part) {
+    #[inline(always)]
+    fn act<N: Moments>(&self, _t_s: N::Each, w: &mut Workspace<N>, part: impl Part) {
         let Range { start, end } = part.range(w.pair.len());
         for i in LANES * start..self.carriers.min(LANES * end) {
             let slide = [0, 1].map(|a| w.of(i, |p| p.gap_rate[a]));
-            let speed = slide[0].hypot(slide[1]);
-            let load = w.of(i, |p| p.normal).max(0.0);
+            let speed = (slide[0] * slide[0] + slide[1] * slide[1]).sqrt();
+            let load = w.of(i, |p| p.normal).larger(N::Each::splat(0.0));
             for axis in 0..2 {
                 let at = self.first + 2 * i + axis;
                 let bent = w.extra[at];
-                let rate = slide[axis] - self.per_length * speed * bent;
+                let rate = slide[axis] - speed * self.per_length * bent;
                 w.extra_rate[at] = rate;
-                *w.of_mut(i, |p| &mut p.tangential[axis]) =
-                    load * (self.stiffness * bent + self.damping * rate);
+                let force = load * (bent * self.stiffness + rate * self.damping);
+                w.set(i, |p| &mut p.tangential[axis], force);
             }
         }
     }
@@ -182,7 +187,8 @@ impl Local for Bristles {
 struct Limit(Coulomb);
 
 impl Local for Limit {
-    fn act(&self, _t_s: f64, w: &mut Workspace, part: impl Part) {
+    #[inline(always)]
+    fn act<N: Moments>(&self, _t_s: N::Each, w: &mut Workspace<N>, part: impl Part) {
         for p in part.of_mut(&mut w.pair) {
             p.tangential = self
                 .0
@@ -195,18 +201,27 @@ impl Local for Limit {
 struct Alone(Coulomb);
 
 impl Local for Alone {
-    fn act(&self, _t_s: f64, w: &mut Workspace, part: impl Part) {
+    #[inline(always)]
+    fn act<N: Moments>(&self, _t_s: N::Each, w: &mut Workspace<N>, part: impl Part) {
         for p in part.of_mut(&mut w.pair) {
-            p.tangential =
-                self.0
-                    .limited(p.normal, [f64x2::ZERO; 2], [p.gap_rate[0], p.gap_rate[1]]);
+            p.tangential = self.0.limited(
+                p.normal,
+                [N::Pair::splat(0.0); 2],
+                [p.gap_rate[0], p.gap_rate[1]],
+            );
         }
     }
 }
 
-impl Account for Coulomb {
-    fn power(&self, _w: &Workspace, pairs: &[Pair], _first: usize) -> Power {
-        let (mut work, mut absorbed) = (f64x2::ZERO, f64x2::ZERO);
+impl Book for Coulomb {
+    #[inline(always)]
+    fn power<N: Moments>(
+        &self,
+        _w: &Workspace<N>,
+        pairs: &[Pair<N>],
+        _first: usize,
+    ) -> Power<N::Each> {
+        let (mut work, mut absorbed) = (N::Pair::splat(0.0), N::Pair::splat(0.0));
         for p in pairs {
             for axis in 0..2 {
                 work += p.tangential[axis] * p.base_rate[axis];
@@ -214,8 +229,8 @@ impl Account for Coulomb {
             }
         }
         Power {
-            work_w: sum(work),
-            dissipated_w: sum(absorbed),
+            work_w: N::sum(work),
+            dissipated_w: N::sum(absorbed),
         }
     }
 }
@@ -223,6 +238,7 @@ impl Account for Coulomb {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::lanes::f64x2;
 
     #[test]
     fn the_limits_are_coulomb_and_the_hold() {

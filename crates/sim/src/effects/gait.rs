@@ -7,7 +7,7 @@
 //! phase (rad). Prescribed motion: the load does not push the shoulder back, whatever the force.
 //! Source: paper, eq. (base).
 
-use crate::lanes::{f64x2, pack};
+use crate::lanes::{Moments, f64x2, pack};
 use crate::model::{Local, Model, Pair, Part, Stage, Workspace};
 use crate::scene::{Checker, PerCarrier, Problem, Scene, problem};
 use schemars::JsonSchema;
@@ -131,7 +131,12 @@ struct Wave {
 impl Wave {
     /// `turn` gives sin kφ and cos kφ.
     #[inline(always)]
-    fn add(&self, w: &mut Workspace, part: &impl Part, turn: impl Fn(&Pair) -> (f64x2, f64x2)) {
+    fn add<N: Moments>(
+        &self,
+        w: &mut Workspace<N>,
+        part: &impl Part,
+        turn: impl Fn(&Pair<N>) -> (N::Pair, N::Pair),
+    ) {
         let (axis, order) = (self.axis % 3, f64::from(self.order));
         for (p, &(sine, cosine)) in part
             .of_mut(&mut w.pair)
@@ -139,6 +144,7 @@ impl Wave {
             .zip(part.of(&self.parts))
         {
             let (sin, cos) = turn(p);
+            let (sine, cosine) = (N::always(sine), N::always(cosine));
             p.base[axis] += sine * sin + cosine * cos;
             p.base_rate[axis] += p.rate * order * (sine * cos - cosine * sin);
         }
@@ -149,7 +155,8 @@ impl Wave {
 struct First(Vec<Wave>);
 
 impl Local for First {
-    fn act(&self, _t_s: f64, w: &mut Workspace, part: impl Part) {
+    #[inline(always)]
+    fn act<N: Moments>(&self, _t_s: N::Each, w: &mut Workspace<N>, part: impl Part) {
         for wave in &self.0 {
             wave.add(w, &part, |p| (p.sin, p.cos));
         }
@@ -160,7 +167,8 @@ impl Local for First {
 struct Higher(Vec<Wave>);
 
 impl Local for Higher {
-    fn act(&self, _t_s: f64, w: &mut Workspace, part: impl Part) {
+    #[inline(always)]
+    fn act<N: Moments>(&self, _t_s: N::Each, w: &mut Workspace<N>, part: impl Part) {
         for wave in &self.0 {
             // sin and cos of kφ by repeated addition of φ: k − 1 complex products, error of the order of kε.
             wave.add(w, &part, |p| {

@@ -7,8 +7,8 @@
 //! capped and acts on a slack handle too (a grip); with the effect `friction` it cannot exceed μN.
 //! Source: paper, section 3.3 ("tangential forces can be added"); palanquin-bench, law of T.
 
-use crate::lanes::{f64x2, pack};
-use crate::model::{Account, Local, Model, Pair, Part, Power, Stage, Workspace};
+use crate::lanes::{Moments, Number, f64x2, pack};
+use crate::model::{Book, Local, Model, Pair, Part, Power, Stage, Workspace};
 use crate::scene::{Checker, PerCarrier, Problem, Scene};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -50,6 +50,7 @@ impl Hold {
         let n = scene.carriers.count();
         let stiffness = pack((0..n).map(|i| self.stiffness_n_per_m.get(i)));
         let damping = pack((0..n).map(|i| self.damping_n_s_per_m.get(i)));
+        model.set_sideways_springs(damping.clone(), stiffness.clone());
         let law = SpringDampers(stiffness.into_iter().zip(damping).collect());
         model.add(Stage::Handles, law.clone());
         model.add_account("hold", law);
@@ -60,28 +61,37 @@ impl Hold {
 struct SpringDampers(Vec<(f64x2, f64x2)>);
 
 impl Local for SpringDampers {
-    fn act(&self, _t_s: f64, w: &mut Workspace, part: impl Part) {
+    #[inline(always)]
+    fn act<N: Moments>(&self, _t_s: N::Each, w: &mut Workspace<N>, part: impl Part) {
         for (p, &(k, c)) in part.of_mut(&mut w.pair).iter_mut().zip(part.of(&self.0)) {
-            p.tangential[0] = k * p.gap[0] + c * p.gap_rate[0];
-            p.tangential[1] = k * p.gap[1] + c * p.gap_rate[1];
+            let (k, c) = (N::always(k), N::always(c));
+            for axis in 0..2 {
+                p.tangential[axis] = c.madd(p.gap_rate[axis], k * p.gap[axis]);
+            }
         }
     }
 }
 
-impl Account for SpringDampers {
+impl Book for SpringDampers {
     /// Books the whole tangential force, a friction limit on it included: what the cap takes counts as dissipated.
-    fn power(&self, _w: &Workspace, pairs: &[Pair], first: usize) -> Power {
-        let (mut work, mut absorbed) = (f64x2::ZERO, f64x2::ZERO);
+    #[inline(always)]
+    fn power<N: Moments>(
+        &self,
+        _w: &Workspace<N>,
+        pairs: &[Pair<N>],
+        first: usize,
+    ) -> Power<N::Each> {
+        let (mut work, mut absorbed) = (N::Pair::splat(0.0), N::Pair::splat(0.0));
         for (p, &(stiffness, _)) in pairs.iter().zip(&self.0[first..]) {
             for axis in 0..2 {
-                let spring = stiffness * p.gap[axis];
+                let spring = N::always(stiffness) * p.gap[axis];
                 work += p.tangential[axis] * p.base_rate[axis];
                 absorbed += (p.tangential[axis] - spring) * p.gap_rate[axis];
             }
         }
         Power {
-            work_w: crate::lanes::sum(work),
-            dissipated_w: crate::lanes::sum(absorbed),
+            work_w: N::sum(work),
+            dissipated_w: N::sum(absorbed),
         }
     }
 

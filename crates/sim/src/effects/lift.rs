@@ -6,6 +6,7 @@
 //! g gain (1); t₀ onset (s); τ build-up (s), where 0 means g from t₀ on (then the shoulders jump at t₀ > 0, so a build-up
 //! is asked for there). Source: the archive's music logs, whose summed force is large before the phases lock.
 
+use crate::lanes::{Moments, Number};
 use crate::model::{Local, Model, Pair, Part, Stage, Switch, Workspace};
 use crate::scene::{Checker, Problem, Scene, problem};
 use schemars::JsonSchema;
@@ -74,7 +75,8 @@ impl Lift {
 }
 
 #[inline(always)]
-fn amplify(pairs: &mut [Pair], gain: f64, gain_rate: f64) {
+fn amplify<N: Moments>(pairs: &mut [Pair<N>], gain: N::Each, gain_rate: N::Each) {
+    let (gain, gain_rate) = (N::both(gain), N::both(gain_rate));
     for p in pairs {
         let lifted = p.base[2] - p.rest[2];
         p.base[2] = p.rest[2] + lifted * gain;
@@ -86,8 +88,10 @@ fn amplify(pairs: &mut [Pair], gain: f64, gain_rate: f64) {
 struct Constant(f64);
 
 impl Local for Constant {
-    fn act(&self, _t_s: f64, w: &mut Workspace, part: impl Part) {
-        amplify(part.of_mut(&mut w.pair), self.0, 0.0);
+    #[inline(always)]
+    fn act<N: Moments>(&self, _t_s: N::Each, w: &mut Workspace<N>, part: impl Part) {
+        let number = N::Each::splat;
+        amplify(part.of_mut(&mut w.pair), number(self.0), number(0.0));
     }
 }
 
@@ -99,19 +103,15 @@ struct Growing {
 }
 
 impl Local for Growing {
-    fn act(&self, t_s: f64, w: &mut Workspace, part: impl Part) {
+    #[inline(always)]
+    fn act<N: Moments>(&self, t_s: N::Each, w: &mut Workspace<N>, part: impl Part) {
         // Stages of a step that ends at the onset see t ≤ t₀; a step never straddles it.
-        let decay = (-(t_s - self.onset_s).max(0.0) * self.per_s).exp();
-        let growing = if t_s >= self.onset_s {
-            self.excess * decay * self.per_s
-        } else {
-            0.0
-        };
-        amplify(
-            part.of_mut(&mut w.pair),
-            1.0 + self.excess * (1.0 - decay),
-            growing,
-        );
+        let zero = N::Each::splat(0.0);
+        let heard_s = t_s + -self.onset_s;
+        let decay = (heard_s.larger(zero) * -self.per_s).exp();
+        let growing = (-heard_s).if_positive(zero, decay * (self.excess * self.per_s));
+        let gain = decay * -self.excess + (1.0 + self.excess);
+        amplify(part.of_mut(&mut w.pair), gain, growing);
     }
 }
 

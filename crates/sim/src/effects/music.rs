@@ -10,8 +10,8 @@
 //! and at changes of tempo the phase rates jump or bend: events. Source: paper, eqs. (music), (adler); Adler (1946).
 
 use crate::beat::{Beat, Pause, TempoChange};
-use crate::lanes::{f64x2, pack, sin_cos};
-use crate::model::{Model, Stage, Switch, Term, Workspace};
+use crate::lanes::{Moments, Number, f64x2, pack};
+use crate::model::{AsWhole, Model, Stage, Switch, Whole, Workspace};
 use crate::scene::{Checker, PerCarrier, Problem, Scene, problem};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -140,26 +140,26 @@ impl Music {
             let (rate, phase) = (beat.pieces[0].rate, beat.pieces[0].phase);
             model.add(
                 Stage::Phases,
-                Steady {
+                AsWhole(Steady {
                     onset_s: self.onset_s,
                     rate,
                     phase,
                     strength,
                     per_s,
-                },
+                }),
             );
         } else {
             model.add(
                 Stage::Phases,
-                Varied {
+                AsWhole(Varied {
                     beat: beat.clone(),
                     strength,
                     per_s,
-                },
+                }),
             );
         }
         if !moments.is_empty() {
-            model.add_switch(Moments(moments));
+            model.add_switch(Times(moments));
         }
         model.set_beat(beat);
     }
@@ -169,21 +169,21 @@ impl Music {
 const FASTEST_HZ: f64 = 1000.0;
 
 #[inline(always)]
-fn pull(w: &mut Workspace, beat_phase: f64, strength: &[f64x2], grown: f64) {
+fn pull<N: Moments>(w: &mut Workspace<N>, beat_phase: N::Each, strength: &[f64x2], grown: N::Each) {
     // sin(ψ − φ) from the sines and cosines that are there already.
-    let (sin, cos) = sin_cos(f64x2::splat(beat_phase));
-    let (sin, cos) = (sin * grown, cos * grown);
+    let (sin, cos) = beat_phase.sin_cos();
+    let (sin, cos) = (N::both(sin * grown), N::both(cos * grown));
     for (p, strength) in w.pair.iter_mut().zip(strength) {
-        p.rate += *strength * (p.cos * sin - p.sin * cos);
+        p.rate += N::always(*strength) * (p.cos * sin - p.sin * cos);
     }
 }
 
 #[inline(always)]
-fn grown(per_s: Option<f64>, heard_s: f64) -> f64 {
+fn grown<T: Number>(per_s: Option<f64>, heard_s: T) -> T {
     match per_s {
         // Beside 1 the digits that `exp_m1` would save are nothing.
-        Some(per_s) => 1.0 - (-heard_s * per_s).exp(),
-        None => 1.0,
+        Some(per_s) => -(heard_s * -per_s).exp() + 1.0,
+        None => T::splat(1.0),
     }
 }
 
@@ -197,15 +197,16 @@ struct Steady {
     per_s: Option<f64>,
 }
 
-impl Term for Steady {
-    fn apply(&self, t_s: f64, w: &mut Workspace) {
+impl Whole for Steady {
+    #[inline(always)]
+    fn act<N: Moments>(&self, t_s: N::Each, w: &mut Workspace<N>) {
         // `segment_s` decides, not t: the last stage of the step that ends at the onset still hears nothing.
         if w.segment_s >= self.onset_s {
             pull(
                 w,
-                self.phase + self.rate * t_s,
+                t_s * self.rate + self.phase,
                 &self.strength,
-                grown(self.per_s, t_s - self.onset_s),
+                grown(self.per_s, t_s + -self.onset_s),
             );
         }
     }
@@ -218,17 +219,18 @@ struct Varied {
     per_s: Option<f64>,
 }
 
-impl Term for Varied {
-    fn apply(&self, t_s: f64, w: &mut Workspace) {
+impl Whole for Varied {
+    #[inline(always)]
+    fn act<N: Moments>(&self, t_s: N::Each, w: &mut Workspace<N>) {
         if self.beat.sounds(w.segment_s) {
             let piece = self.beat.piece(w.segment_s);
-            let s = t_s - piece.begin_s;
-            let phase = piece.phase + s * (piece.rate + 0.5 * piece.bend * s);
+            let s = t_s + -piece.begin_s;
+            let phase = s * (s * (0.5 * piece.bend) + piece.rate) + piece.phase;
             pull(
                 w,
                 phase,
                 &self.strength,
-                grown(self.per_s, t_s - self.beat.onset_s),
+                grown(self.per_s, t_s + -self.beat.onset_s),
             );
         }
     }
@@ -236,9 +238,9 @@ impl Term for Varied {
 
 /// Moments known beforehand, in order.
 #[derive(Debug)]
-struct Moments(Vec<f64>);
+struct Times(Vec<f64>);
 
-impl Switch for Moments {
+impl Switch for Times {
     fn next_s(&self, after_s: f64) -> f64 {
         self.0
             .get(self.0.partition_point(|t| *t <= after_s))

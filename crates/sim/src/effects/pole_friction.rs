@@ -9,8 +9,8 @@
 //! Source: the archive's logs (damping 1.0 … 1.2 1/s for small swings, 0.39 1/s for large ones); the law is the
 //! regularised Coulomb law of [`super::friction`], about an axis.
 
-use crate::lanes::{f64x2, sum};
-use crate::model::{Account, Model, Pair, Power, Stage, Term, Workspace};
+use crate::lanes::{Moments, Number};
+use crate::model::{AsWhole, Book, Model, Pair, Power, Stage, Whole, Workspace};
 use crate::scene::{Checker, Problem, Scene};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -50,7 +50,7 @@ impl PoleFriction {
             bilateral,
             rate2: self.regularising_rate_rad_per_s.powi(2),
         };
-        model.add(Stage::Body, law.clone());
+        model.add(Stage::Body, AsWhole(law.clone()));
         model.add_account("pole_friction", law);
     }
 }
@@ -64,30 +64,37 @@ struct Rub {
 
 impl Rub {
     #[inline(always)]
-    fn torque_n_m(&self, w: &Workspace, pairs: &[Pair]) -> f64 {
-        let (mut load, least) = (f64x2::ZERO, f64x2::splat(w.least_load_n));
+    fn torque_n_m<N: Moments>(&self, w: &Workspace<N>, pairs: &[Pair<N>]) -> N::Each {
+        let (mut load, least) = (N::Pair::splat(0.0), N::Pair::splat(w.least_load_n));
         for p in pairs {
             load += if self.bilateral {
                 p.normal.abs()
             } else {
-                p.normal.fast_max(least)
+                p.normal.larger(least)
             };
         }
         let rate = w.spin[0];
-        -self.arm_m * sum(load) * rate / (rate * rate + self.rate2).sqrt()
+        N::sum(load) * -self.arm_m * rate / (rate * rate + self.rate2).sqrt()
     }
 }
 
-impl Term for Rub {
-    fn apply(&self, _t_s: f64, w: &mut Workspace) {
+impl Whole for Rub {
+    #[inline(always)]
+    fn act<N: Moments>(&self, _t_s: N::Each, w: &mut Workspace<N>) {
         w.body_torque[0] += self.torque_n_m(w, &w.pair);
     }
 }
 
-impl Account for Rub {
-    fn power(&self, w: &Workspace, pairs: &[Pair], _first: usize) -> Power {
+impl Book for Rub {
+    #[inline(always)]
+    fn power<N: Moments>(
+        &self,
+        w: &Workspace<N>,
+        pairs: &[Pair<N>],
+        _first: usize,
+    ) -> Power<N::Each> {
         Power {
-            work_w: 0.0,
+            work_w: N::Each::splat(0.0),
             dissipated_w: -self.torque_n_m(w, pairs) * w.spin[0],
         }
     }

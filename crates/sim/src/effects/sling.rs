@@ -12,8 +12,8 @@
 //! left, the same ratio at every amplitude, and is free in flight: a force in proportion to the load does that (with
 //! h = 0.1 m, M = 60 kg and a = 0.04795 it asks for L = 0.70 m and I_xx = 2.68 kg·m²), a spring of its own does not.
 
-use crate::lanes::{f64x2, sum};
-use crate::model::{Account, Local, Model, Pair, Part, Power, Stage, Workspace};
+use crate::lanes::{Moments, Number};
+use crate::model::{Book, Local, Model, Pair, Part, Power, Stage, Workspace};
 use crate::scene::{Checker, Problem, Scene};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -73,15 +73,19 @@ struct Strap {
 
 impl Strap {
     #[inline(always)]
-    fn force(&self, p: &Pair, least_n: f64) -> [f64x2; 2] {
-        let least = f64x2::splat(self.least_n.max(least_n));
-        let load = p.normal.fast_max(least) * self.per_length;
-        [0, 1].map(|axis| load * (p.gap[axis] + p.gap_rate[axis] * self.damping_s))
+    fn force<N: Moments>(&self, p: &Pair<N>, least_n: f64) -> [N::Pair; 2] {
+        let least = N::Pair::splat(self.least_n.max(least_n));
+        let load = p.normal.larger(least) * self.per_length;
+        [
+            load * (p.gap[0] + p.gap_rate[0] * self.damping_s),
+            load * (p.gap[1] + p.gap_rate[1] * self.damping_s),
+        ]
     }
 }
 
 impl Local for Strap {
-    fn act(&self, _t_s: f64, w: &mut Workspace, part: impl Part) {
+    #[inline(always)]
+    fn act<N: Moments>(&self, _t_s: N::Each, w: &mut Workspace<N>, part: impl Part) {
         let least_n = w.least_load_n;
         for p in part.of_mut(&mut w.pair) {
             p.tangential = self.force(p, least_n);
@@ -94,7 +98,8 @@ impl Local for Strap {
 struct Beside(Strap);
 
 impl Local for Beside {
-    fn act(&self, _t_s: f64, w: &mut Workspace, part: impl Part) {
+    #[inline(always)]
+    fn act<N: Moments>(&self, _t_s: N::Each, w: &mut Workspace<N>, part: impl Part) {
         let least_n = w.least_load_n;
         for p in part.of_mut(&mut w.pair) {
             let [x, y] = self.0.force(p, least_n);
@@ -104,9 +109,15 @@ impl Local for Beside {
     }
 }
 
-impl Account for Strap {
-    fn power(&self, w: &Workspace, pairs: &[Pair], _first: usize) -> Power {
-        let (mut work, mut absorbed) = (f64x2::ZERO, f64x2::ZERO);
+impl Book for Strap {
+    #[inline(always)]
+    fn power<N: Moments>(
+        &self,
+        w: &Workspace<N>,
+        pairs: &[Pair<N>],
+        _first: usize,
+    ) -> Power<N::Each> {
+        let (mut work, mut absorbed) = (N::Pair::splat(0.0), N::Pair::splat(0.0));
         for p in pairs {
             for (axis, force) in self.force(p, w.least_load_n).into_iter().enumerate() {
                 work += force * p.base_rate[axis];
@@ -114,8 +125,8 @@ impl Account for Strap {
             }
         }
         Power {
-            work_w: sum(work),
-            dissipated_w: sum(absorbed),
+            work_w: N::sum(work),
+            dissipated_w: N::sum(absorbed),
         }
     }
 }

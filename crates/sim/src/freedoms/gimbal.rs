@@ -8,6 +8,7 @@
 
 use super::reduced::{Rails, Turning, cross, dot, sin_cos};
 use super::{place_handles, times, turning};
+use crate::lanes::Now;
 use crate::lanes::f64x2;
 use crate::model::{Part, Workspace};
 
@@ -100,7 +101,7 @@ impl Turning for Gimbal {
             &self.handles,
             part,
             motion,
-            turning(w.rotation, w.spin),
+            turning::<Now>(w.rotation, w.spin),
         );
     }
 

@@ -1,6 +1,9 @@
 //! What an effect adds to the right-hand side: terms, moments at which it may jump, pages in the energy ledger.
 
 use super::workspace::{All, Block, Pair, Part, Workspace};
+#[cfg(target_arch = "x86_64")]
+use crate::lanes::{Avx2, Avx512};
+use crate::lanes::{Eight, Moments, Plain8};
 
 /// A part of the right-hand side.
 pub trait Term: Send + Sync {
@@ -10,13 +13,28 @@ pub trait Term: Send + Sync {
     fn on_block(&self) -> Option<&dyn OnBlock> {
         None
     }
+    /// The same at eight moments side by side, if it is written for that.
+    fn on_eight(&self) -> Option<&dyn OnEight> {
+        None
+    }
 }
 
-/// A term that treats every pair by itself: where there are thousands, all such terms are applied block by block.
+/// A term written for any number of moments that treats every pair by itself: where there are thousands of pairs, all such terms are
+/// applied block by block.
 pub trait Local: Send + Sync {
     /// As [`Term::apply`], on some of the pairs.
-    fn act(&self, t_s: f64, w: &mut Workspace, part: impl Part);
+    fn act<N: Moments>(&self, t_s: N::Each, w: &mut Workspace<N>, part: impl Part);
 }
+
+/// A term written for any number of moments that looks at all pairs at once.
+pub trait Whole: Send + Sync {
+    /// As [`Term::apply`].
+    fn act<N: Moments>(&self, t_s: N::Each, w: &mut Workspace<N>);
+}
+
+/// Makes a [`Term`] of what is [`Whole`].
+#[derive(Debug)]
+pub struct AsWhole<T>(pub T);
 
 /// [`Local::act`] on a block.
 pub trait OnBlock {
@@ -37,7 +55,64 @@ impl<T: Local> Term for T {
     fn on_block(&self) -> Option<&dyn OnBlock> {
         Some(self)
     }
+    fn on_eight(&self) -> Option<&dyn OnEight> {
+        Some(self)
+    }
 }
+
+impl<T: Whole> Term for AsWhole<T> {
+    fn apply(&self, t_s: f64, w: &mut Workspace) {
+        self.0.act(t_s, w);
+    }
+    fn on_eight(&self) -> Option<&dyn OnEight> {
+        Some(self)
+    }
+}
+
+/// [`Term::apply`] at eight moments, for each kind of registers.
+///
+/// A trait object's functions do not inherit the processor features of their caller: each asks for its own.
+#[allow(missing_docs)]
+pub trait OnEight {
+    fn plain(&self, t_s: Plain8, w: &mut Workspace<Eight<Plain8>>);
+    /// # Safety
+    /// The processor has AVX2 and FMA.
+    #[cfg(target_arch = "x86_64")]
+    #[allow(unsafe_code)]
+    unsafe fn avx2(&self, t_s: Avx2, w: &mut Workspace<Eight<Avx2>>);
+    /// # Safety
+    /// The processor has AVX-512 F and DQ.
+    #[cfg(target_arch = "x86_64")]
+    #[allow(unsafe_code)]
+    unsafe fn avx512(&self, t_s: Avx512, w: &mut Workspace<Eight<Avx512>>);
+}
+
+macro_rules! on_eight {
+    ($bound:ident, $type:ty, |$self:ident, $t:ident, $w:ident| $act:expr) => {
+        impl<T: $bound> OnEight for $type {
+            fn plain(&self, $t: Plain8, $w: &mut Workspace<Eight<Plain8>>) {
+                let $self = self;
+                $act
+            }
+            #[cfg(target_arch = "x86_64")]
+            #[target_feature(enable = "avx2,fma")]
+            #[allow(unsafe_code)]
+            unsafe fn avx2(&self, $t: Avx2, $w: &mut Workspace<Eight<Avx2>>) {
+                let $self = self;
+                $act
+            }
+            #[cfg(target_arch = "x86_64")]
+            #[target_feature(enable = "avx512f,avx512dq")]
+            #[allow(unsafe_code)]
+            unsafe fn avx512(&self, $t: Avx512, $w: &mut Workspace<Eight<Avx512>>) {
+                let $self = self;
+                $act
+            }
+        }
+    };
+}
+on_eight!(Local, T, |term, t, w| term.act(t, w, All));
+on_eight!(Whole, AsWhole<T>, |term, t, w| term.0.act(t, w));
 
 /// Where a term belongs in an evaluation.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -66,11 +141,11 @@ pub trait Switch: Send + Sync {
 
 /// What an effect does with energy.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct Power {
+pub struct Power<T = f64> {
     /// Fed in by the carriers, W.
-    pub work_w: f64,
+    pub work_w: T,
     /// Taken out for good, W.
-    pub dissipated_w: f64,
+    pub dissipated_w: T,
 }
 
 /// An effect's page in the energy ledger.
@@ -80,5 +155,70 @@ pub trait Account: Send + Sync {
     /// Energy stored in the effect's springs, J.
     fn stored_j(&self, _w: &Workspace) -> f64 {
         0.0
+    }
+    /// The power at eight moments side by side, if it is written for that.
+    fn on_eight(&self) -> Option<&dyn PowerOnEight> {
+        None
+    }
+}
+
+/// An account written for any number of moments.
+pub trait Book: Send + Sync {
+    /// As [`Account::power`].
+    fn power<N: Moments>(
+        &self,
+        w: &Workspace<N>,
+        pairs: &[Pair<N>],
+        first: usize,
+    ) -> Power<N::Each>;
+    /// As [`Account::stored_j`].
+    fn stored_j(&self, _w: &Workspace) -> f64 {
+        0.0
+    }
+}
+
+impl<T: Book> Account for T {
+    fn power(&self, w: &Workspace, pairs: &[Pair], first: usize) -> Power {
+        Book::power(self, w, pairs, first)
+    }
+    fn stored_j(&self, w: &Workspace) -> f64 {
+        Book::stored_j(self, w)
+    }
+    fn on_eight(&self) -> Option<&dyn PowerOnEight> {
+        Some(self)
+    }
+}
+
+/// [`Account::power`] of all pairs at eight moments, as [`OnEight`].
+#[allow(missing_docs)]
+pub trait PowerOnEight {
+    fn plain(&self, w: &Workspace<Eight<Plain8>>) -> Power<Plain8>;
+    /// # Safety
+    /// The processor has AVX2 and FMA.
+    #[cfg(target_arch = "x86_64")]
+    #[allow(unsafe_code)]
+    unsafe fn avx2(&self, w: &Workspace<Eight<Avx2>>) -> Power<Avx2>;
+    /// # Safety
+    /// The processor has AVX-512 F and DQ.
+    #[cfg(target_arch = "x86_64")]
+    #[allow(unsafe_code)]
+    unsafe fn avx512(&self, w: &Workspace<Eight<Avx512>>) -> Power<Avx512>;
+}
+
+impl<T: Book> PowerOnEight for T {
+    fn plain(&self, w: &Workspace<Eight<Plain8>>) -> Power<Plain8> {
+        Book::power(self, w, &w.pair, 0)
+    }
+    #[cfg(target_arch = "x86_64")]
+    #[target_feature(enable = "avx2,fma")]
+    #[allow(unsafe_code)]
+    unsafe fn avx2(&self, w: &Workspace<Eight<Avx2>>) -> Power<Avx2> {
+        Book::power(self, w, &w.pair, 0)
+    }
+    #[cfg(target_arch = "x86_64")]
+    #[target_feature(enable = "avx512f,avx512dq")]
+    #[allow(unsafe_code)]
+    unsafe fn avx512(&self, w: &Workspace<Eight<Avx512>>) -> Power<Avx512> {
+        Book::power(self, w, &w.pair, 0)
     }
 }

@@ -1,6 +1,6 @@
 //! The numbers of one evaluation, and which of them a term treats.
 
-use crate::lanes::{LANES, f64x2};
+use crate::lanes::{LANES, Moments, Now, Number, f64x2};
 use std::ops::Range;
 
 /// The numbers of two carriers in one evaluation, and in the present segment. Padding exerts nothing.
@@ -9,84 +9,132 @@ use std::ops::Range;
 /// all of them.
 #[derive(Clone, Copy, Debug)]
 #[repr(C, align(64))]
-pub struct Pair {
+pub struct Pair<N: Moments = Now> {
     /// Natural frequency and the segment's noise, rad/s.
-    pub constant_rate: f64x2,
+    pub constant_rate: N::Pair,
     /// sin φ
-    pub sin: f64x2,
+    pub sin: N::Pair,
     /// cos φ
-    pub cos: f64x2,
+    pub cos: N::Pair,
     /// φ̇, rad/s
-    pub rate: f64x2,
+    pub rate: N::Pair,
     /// Shoulders b, m.
-    pub base: [f64x2; 3],
+    pub base: [N::Pair; 3],
     /// What multiplies N*: 1 where it acts, 0 on a slack handle.
-    pub contact_gain: f64x2,
+    pub contact_gain: N::Pair,
     /// ḃ, m/s
-    pub base_rate: [f64x2; 3],
+    pub base_rate: [N::Pair; 3],
     /// The least that N can be: 0 (slack, or undecided), −∞ (in contact for the whole segment).
-    pub contact_floor: f64x2,
+    pub contact_floor: N::Pair,
     /// Shoulder minus handle, m.
-    pub gap: [f64x2; 3],
+    pub gap: [N::Pair; 3],
     /// N* before the clamp, N.
-    pub unclamped: f64x2,
+    pub unclamped: N::Pair,
     /// Rate of the gap, m/s.
-    pub gap_rate: [f64x2; 3],
+    pub gap_rate: [N::Pair; 3],
     /// N, N
-    pub normal: f64x2,
+    pub normal: N::Pair,
     /// Handles relative to the centre of mass, in the world, m.
-    pub arm: [f64x2; 3],
+    pub arm: [N::Pair; 3],
     /// T in x and y, N
-    pub tangential: [f64x2; 2],
+    pub tangential: [N::Pair; 2],
     /// Resting shoulders, m.
-    pub rest: [f64x2; 3],
+    pub rest: [N::Pair; 3],
 }
 
-impl Pair {
+impl<N: Moments> Pair<N> {
     /// Puts the shoulders at rest.
     #[inline(always)]
     pub(super) fn stand(&mut self) {
         for axis in 0..3 {
             self.base[axis] = self.rest[axis];
-            self.base_rate[axis] = f64x2::ZERO;
+            self.base_rate[axis] = N::Pair::splat(0.0);
         }
     }
 }
 
 /// The numbers of one evaluation and of the present segment.
 #[derive(Clone, Debug)]
-pub struct Workspace {
+pub struct Workspace<N: Moments = Now> {
     /// When the present segment began, s.
     pub segment_s: f64,
     /// The carriers, two by two: carrier i is lane i mod 2 of pair i / 2.
-    pub pair: Vec<Pair>,
+    pub pair: Vec<Pair<N>>,
     /// Rows of the rotation body → world; where the freedoms do not need it, set only if something bends.
-    pub rotation: [[f64; 3]; 3],
+    pub rotation: [[N::Each; 3]; 3],
     /// Angular velocity in the body, rad/s.
-    pub spin: [f64; 3],
+    pub spin: [N::Each; 3],
     /// What a law in proportion to the load of a unilateral contact takes for the least load, N: 0, or −∞ where a method freezes contacts
     /// within a step and wants the law to go on as it was behind a lift-off that is still to be located. A kink there would be taken for
     /// an error.
     pub least_load_n: f64,
     /// Torque on the body beside that of the handle forces, body axes, N·m.
-    pub body_torque: [f64; 3],
+    pub body_torque: [N::Each; 3],
     /// States of the effects' own.
-    pub extra: Vec<f64>,
+    pub extra: Vec<N::Each>,
     /// Their rates.
-    pub extra_rate: Vec<f64>,
+    pub extra_rate: Vec<N::Each>,
+}
+
+impl<N: Moments> Workspace<N> {
+    /// A number of carrier `i`.
+    #[inline(always)]
+    pub fn of(&self, i: usize, pick: impl Fn(&Pair<N>) -> N::Pair) -> N::Each {
+        N::of(pick(&self.pair[i / LANES]), i % LANES)
+    }
+
+    /// Changes a number of carrier `i`.
+    #[inline(always)]
+    pub fn set(&mut self, i: usize, pick: impl Fn(&mut Pair<N>) -> &mut N::Pair, to: N::Each) {
+        N::set(pick(&mut self.pair[i / LANES]), i % LANES, to);
+    }
 }
 
 impl Workspace {
-    /// A number of carrier `i`.
-    #[inline(always)]
-    pub fn of(&self, i: usize, pick: impl Fn(&Pair) -> f64x2) -> f64 {
-        pick(&self.pair[i / LANES]).as_array()[i % LANES]
-    }
-
     /// A number of carrier `i`, to be changed.
     #[inline(always)]
     pub fn of_mut(&mut self, i: usize, pick: impl Fn(&mut Pair) -> &mut f64x2) -> &mut f64 {
         &mut pick(&mut self.pair[i / LANES]).as_mut_array()[i % LANES]
+    }
+
+    /// What changes from one segment to the next, for an evaluation at other moments.
+    pub fn refresh<M: Moments>(&self, to: &mut Workspace<M>) {
+        to.segment_s = self.segment_s;
+        for (to, p) in to.pair.iter_mut().zip(&self.pair) {
+            to.constant_rate = M::always(p.constant_rate);
+            to.contact_gain = M::always(p.contact_gain);
+            to.contact_floor = M::always(p.contact_floor);
+        }
+    }
+
+    /// The same segment for an evaluation at other moments: what `M` does not compute itself is what it is here.
+    pub fn spread<M: Moments>(&self, to: &mut Workspace<M>) {
+        let zero = M::Each::splat(0.0);
+        (to.segment_s, to.least_load_n) = (self.segment_s, self.least_load_n);
+        to.extra.resize(self.extra.len(), zero);
+        to.extra_rate.resize(self.extra.len(), zero);
+        to.pair.clear();
+        to.pair.extend(self.pair.iter().map(|p| {
+            let zero = M::Pair::splat(0.0);
+            let rest = p.rest.map(M::always);
+            Pair {
+                constant_rate: M::always(p.constant_rate),
+                sin: zero,
+                cos: zero,
+                rate: zero,
+                base: rest,
+                contact_gain: M::always(p.contact_gain),
+                base_rate: [zero; 3],
+                contact_floor: M::always(p.contact_floor),
+                gap: [zero; 3],
+                unclamped: zero,
+                gap_rate: [zero; 3],
+                normal: zero,
+                arm: [zero; 3],
+                tangential: [zero; 2],
+                rest,
+            }
+        }));
     }
 }
 
