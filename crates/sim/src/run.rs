@@ -88,7 +88,7 @@ pub fn method_of(scene: &Scene) -> &'static Method {
 pub fn method_name(scene: &Scene) -> String {
     let (named, begun) = (
         method_of(scene),
-        resolve(method_of(scene), &settings(scene)),
+        resolve(method_of(scene), &Model::new(scene), &settings(scene)),
     );
     if named.name == begun.name {
         named.name.into()

@@ -2,7 +2,7 @@
 //!
 //! Adaptive methods are held to equal steps by a grid of phase noise of strength zero: a step may not cross a grid point, and the
 //! tolerance is so loose that nothing else shortens it. An implicit method iterates only as far as its tolerance asks: it chooses its
-//! steps by two tolerances, and the error is held against the mean step.
+//! steps by two tolerances, and the error is held against the mean step. `radau15` is held to equal steps by a test of its own, beside it.
 
 use sim::effects::noise::Noise;
 use sim::model::Model;
@@ -111,7 +111,10 @@ fn every_method_shows_its_order() {
             most_evaluations: 1 << 40,
         };
         let (truth, _) = last(&Model::new(&scene), method("dop853").unwrap(), &settings);
-        for method in METHODS.iter().filter(|m| m.name != "auto") {
+        for method in METHODS
+            .iter()
+            .filter(|m| !["auto", "radau15"].contains(&m.name))
+        {
             // Small enough for the first term of the error to rule, large enough for errors far above rounding.
             let step_s = match method.order {
                 1 => 1.0 / 2000.0,

@@ -31,16 +31,22 @@ fn worst(a: &[f64], b: &[f64]) -> f64 {
     apart.fold(0.0, f64::max)
 }
 
-#[test]
-fn stiff_contacts_are_solved_implicitly_and_right() {
-    let text = builtin("music").expect("a built-in scene");
-    let stiff = [
+/// `music` with contacts that damp in microseconds.
+fn stiff(freedom: &str) -> Scene {
+    let settings = [
         "duration_s=10",
+        freedom,
         "effects.contact.stiffness_n_per_m=3e6",
         "effects.contact.damping_n_s_per_m=4e5",
     ]
     .map(str::to_owned);
-    let scene = parse("music", text, &stiff).unwrap();
+    parse("music", builtin("music").unwrap(), &settings).unwrap()
+}
+
+#[test]
+fn stiff_contacts_are_solved_implicitly_and_right() {
+    // With fewer freedoms there are no stages side by side.
+    let scene = stiff(r#"freedom=["height","roll","tilt"]"#);
     let (auto, stats) = course(&scene, "auto", 1e-5);
     assert!(
         stats.implicit > 100 && stats.implicit > stats.steps * 9 / 10,
@@ -51,6 +57,17 @@ fn stiff_contacts_are_solved_implicitly_and_right() {
     let apart = worst(&auto, &explicit);
     assert!(apart < 1e-5, "{apart:e}");
     assert!(stats.evaluations * 3 < explicit_stats.evaluations);
+}
+
+#[test]
+fn sweeps_solve_stiff_contacts_as_they_are() {
+    let scene = stiff(r#"freedom=["x","y","height","roll","tilt","yaw"]"#);
+    let (auto, stats) = course(&scene, "auto", 1e-5);
+    let (explicit, explicit_stats) = course(&scene, "dop853", 1e-7);
+    assert_eq!(stats.events, explicit_stats.events);
+    assert!(stats.steps * 10 < explicit_stats.steps, "{stats:?}");
+    let apart = worst(&auto, &explicit);
+    assert!(apart < 1e-5, "{apart:e}");
 }
 
 #[test]

@@ -1,11 +1,13 @@
-//! The default: an explicit pair chosen by the tolerance, and Radau IIA where the explicit steps are limited by stability.
+//! The default: stages side by side where the model is one for that, else an explicit pair chosen by the tolerance, and Radau IIA of order 5
+//! where the explicit steps are limited by stability.
 //!
 //! The test for stiffness is that of [`super::pair`]. The implicit method is kept only where it is cheaper: once it has spent more
 //! evaluations per second of motion than the explicit one before it, the explicit one goes on, and is not watched any more.
 
 use super::course::Course;
 use super::pair::{self, End};
-use super::{METHODS, Observer, Settings, Stats, Stopped, dop853, dopri5, radau5, resolve};
+use super::{METHODS, Observer, Settings, Stats, Stopped, WORTH_ORDER_8, resolve};
+use super::{dop853, dopri5, radau5, radau15};
 use crate::model::Model;
 
 /// Above this many states the matrices of the implicit method cost more than any stiffness.
@@ -17,16 +19,24 @@ pub fn run(
     settings: &Settings,
     observer: &mut dyn Observer,
 ) -> (Stats, Result<(), Stopped>) {
-    let order_8 = resolve(&METHODS[0], settings).name == "dop853";
-    let name = if order_8 { "dop853" } else { "dopri5" };
+    let name = resolve(&METHODS[0], model, settings).name;
     let mut course = Course::new(model, name, settings, true);
     let mut watch = model.layout().size() <= MOST_STATES;
     if let Err(stopped) = course.begin_log(observer) {
         return (course.stats, Err(stopped));
     }
+    if name == "radau15" {
+        let outcome;
+        (course, outcome) = radau15::go(course, settings, observer);
+        match outcome {
+            Ok(true) => return (course.stats, Ok(())),
+            Ok(false) => {}
+            Err(stopped) => return (course.stats, Err(stopped)),
+        }
+    }
     loop {
         let outcome;
-        (course, outcome) = if order_8 {
+        (course, outcome) = if settings.tolerance < WORTH_ORDER_8 {
             pair::go::<dop853::Dop853, true>(course, settings, watch, observer)
         } else {
             pair::go::<dopri5::Dopri5, true>(course, settings, watch, observer)

@@ -252,6 +252,11 @@ impl<'m> Course<'m> {
         self.model.rates(&self.y, dy, &mut self.w);
     }
 
+    /// What makes a margin of N*, by pairs: factor and summand.
+    pub fn watch(&self) -> &[(f64x2, f64x2)] {
+        &self.watch
+    }
+
     /// How far the contacts are from an event at the last evaluation: negative when one has happened, N.
     #[inline]
     pub fn margin_n(&self) -> f64 {

@@ -7,6 +7,7 @@ mod dopri5;
 mod events;
 mod fixed;
 mod pair;
+mod radau15;
 mod radau5;
 mod rk4;
 mod rkmk4;
@@ -149,10 +150,11 @@ pub struct Method {
 /// as much for an error fourteen times larger, at 1e-8 1.4 times as much.
 const WORTH_ORDER_8: f64 = 3e-5;
 
-/// The method that `method` stands for: itself, or what `auto` picks for these settings.
-pub fn resolve(method: &'static Method, settings: &Settings) -> &'static Method {
+/// The method that `method` stands for: itself, or what `auto` begins with for this model and these settings.
+pub fn resolve(method: &'static Method, model: &Model, settings: &Settings) -> &'static Method {
     let named = |name: &str| METHODS.iter().find(|m| m.name == name).unwrap_or(method);
     match method.name {
+        "auto" if radau15::suits(model) => named("radau15"),
         "auto" if settings.tolerance < WORTH_ORDER_8 => named("dop853"),
         "auto" => named("dopri5"),
         _ => method,
@@ -163,7 +165,7 @@ pub fn resolve(method: &'static Method, settings: &Settings) -> &'static Method 
 pub const METHODS: &[Method] = &[
     Method {
         name: "auto",
-        about: "the cheapest for the tolerance: dop853 below 3e-5, else dopri5; radau5 where that is limited by stability",
+        about: "the cheapest: radau15 for few carriers, else dop853 below 3e-5 and dopri5 above; radau5 where that is limited by stability",
         order: 8,
         adaptive: true,
         locates: true,
@@ -216,6 +218,14 @@ pub const METHODS: &[Method] = &[
         adaptive: true,
         locates: false,
         run: radau5::run::<false>,
+    },
+    Method {
+        name: "radau15",
+        about: "Radau IIA 15, eight stages side by side, adaptive, contact events located: for few carriers",
+        order: 15,
+        adaptive: true,
+        locates: true,
+        run: radau15::run,
     },
     Method {
         name: "rkmk4",

@@ -1,0 +1,559 @@
+//! Radau IIA of order 15: eight stages side by side, solved by sweeps.
+//!
+//! ```text
+//! Y_i = y₀ + h Σ_j a_ij f(t₀ + c_j h, Y_j),  i, j = 1…8        y₁ = Y₈
+//! ```
+//! A small system on a wide processor: the right-hand side at all eight stages costs hardly more than at one, and the stages follow from it
+//! by one product with (a_ij). Sweeps converge like Picard's iteration, a factor of ten to a hundred each; where a contact damps or drives a
+//! motion faster than the step is long, the sweep solves that mode alone exactly ([`modes`]), and positions follow from new velocities,
+//! so convergence depends on what is left: geometry and coupling. Noise and contacts break a run into pieces of tens of
+//! milliseconds, most of which are one such step, where an explicit method needs four of twelve evaluations.
+//!
+//! The stages are a polynomial of degree 8, which holds samples and events; where it does not, the step is taken anew to the moment that
+//! is asked for, from what is known of it. Within a step contacts are frozen, as in [`super::pair`].
+//!
+//! For models that can be evaluated so ([`Model::on_eight`]). Source: Hairer & Wanner, Solving Ordinary Differential Equations II, 2nd ed.
+//! (1996), IV.5 and IV.8; the idea of one long step of order 15 by iteration: Everhart, in Dynamics of Comets (1985), 185; Rein &
+//! Spiegel, MNRAS 446 (2015), 1424.
+
+mod modes;
+mod stages;
+mod tableau;
+
+use super::course::{Course, SAME_MOMENT_S};
+use super::events::{self, Looks};
+use super::{Observer, Settings, Stats, Stopped, dop853, pair};
+use crate::energy::unit_j;
+#[cfg(target_arch = "x86_64")]
+use crate::lanes::{Avx2, Avx512};
+use crate::lanes::{MOMENTS, Plain8};
+use crate::model::{Model, Registers};
+use modes::{Mode, Row, in_body, modes};
+use stages::{Demand, Guess, Solved, Stages};
+use tableau::C;
+
+const NAME: &str = "radau15";
+/// What a step may err, in units of the tolerance asked for; as [`pair::Pair::SHARE`].
+const SHARE: f64 = 0.002;
+/// What the iteration may leave, in units of what a step may err.
+const ITERATION: f64 = 0.3;
+/// Below this a step's error estimate is rounding.
+const FINEST: f64 = 1e-14;
+const EXPONENT: f64 = 1.0 / 12.0;
+const SAFETY: f64 = 0.9;
+const SHRINK: f64 = 0.2;
+const GROW: f64 = 4.0;
+const SMALLEST_STEP_S: f64 = 1e-13;
+/// Where a step may end at an event, its polynomial may err by so many times what a step may err.
+const TRUST: f64 = 3.0;
+/// So exactly an event is located, as a part of the step, where a shorter step will locate it again.
+const ROUGHLY: f64 = 1e-4;
+/// So much of its unit an energy of the ledger counts in the error.
+const LEDGER: f64 = 0.1;
+/// The modes are computed anew when the vertical has moved by so much in the body.
+const TURNED: f64 = 0.03;
+/// So many steps in a row that the iteration limits, and another method is better.
+const MANY: u32 = 50;
+
+/// Integrates a model.
+pub fn run(
+    model: &Model,
+    settings: &Settings,
+    observer: &mut dyn Observer,
+) -> (Stats, Result<(), Stopped>) {
+    let mut course = Course::new(model, NAME, settings, true);
+    if let Err(stopped) = course.begin_log(observer) {
+        return (course.stats, Err(stopped));
+    }
+    let (mut course, outcome) = go(course, settings, observer);
+    let outcome = match outcome {
+        Ok(true) => Ok(()),
+        // What the sweeps cannot do is done without them.
+        Ok(false) => {
+            let (on, outcome) = pair::go::<dop853::Dop853, true>(course, settings, false, observer);
+            course = on;
+            outcome.map(|_| ())
+        }
+        Err(stopped) => Err(stopped),
+    };
+    (course.stats, outcome)
+}
+
+/// Whether it is the cheapest for a model: one that can be evaluated at eight moments at once, with contacts whose damping makes explicit
+/// steps short.
+pub fn suits(model: &Model) -> bool {
+    model.on_eight() && (0..model.carriers()).any(|i| model.springs(i, 2) != [0.0; 2])
+}
+
+/// Goes on from where a course stands: to its end (`true`), or until it turns out that the sweeps limit the steps, or that the model is not
+/// one for eight moments at once (`false`).
+pub fn go<'m>(
+    course: Course<'m>,
+    settings: &Settings,
+    observer: &mut dyn Observer,
+) -> (Course<'m>, Result<bool, Stopped>) {
+    if !course.model.on_eight() {
+        return (course, Ok(false));
+    }
+    #[cfg(target_arch = "x86_64")]
+    {
+        if is_x86_feature_detected!("avx512f") && is_x86_feature_detected!("avx512dq") {
+            return Run::<Avx512>::new(course, settings).integrate(observer);
+        }
+        if is_x86_feature_detected!("avx2") && is_x86_feature_detected!("fma") {
+            return Run::<Avx2>::new(course, settings).integrate(observer);
+        }
+    }
+    Run::<Plain8>::new(course, settings).integrate(observer)
+}
+
+/// Solves a step with the code for a kind of registers.
+trait Solve: Registers {
+    fn solve(
+        stages: &mut Stages<Self>,
+        model: &Model,
+        start: (f64, &[f64]),
+        h: f64,
+        guess: &Guess<'_>,
+        modes: &[Mode],
+        demand: Demand,
+    ) -> Solved;
+}
+
+macro_rules! solve {
+    ($type:ident, $function:ident $(, $features:literal)?) => {
+        $(#[cfg(target_arch = "x86_64")] #[target_feature(enable = $features)])?
+        fn $function(
+            stages: &mut Stages<$type>,
+            model: &Model,
+            start: (f64, &[f64]),
+            h: f64,
+            guess: &Guess<'_>,
+            modes: &[Mode],
+            demand: Demand,
+        ) -> Solved {
+            stages.solve_here(model, start, h, guess, modes, demand)
+        }
+        $(#[cfg(target_arch = "x86_64")] #[doc = $features])?
+        impl Solve for $type {
+            fn solve(
+                stages: &mut Stages<Self>,
+                model: &Model,
+                start: (f64, &[f64]),
+                h: f64,
+                guess: &Guess<'_>,
+                modes: &[Mode],
+                demand: Demand,
+            ) -> Solved {
+                // SAFETY: stages of this type are made only behind a check of the processor's features, in `go`.
+                #[allow(unsafe_code, unused_unsafe)]
+                unsafe {
+                    $function(stages, model, start, h, guess, modes, demand)
+                }
+            }
+        }
+    };
+}
+solve!(Plain8, solve_plain);
+solve!(Avx2, solve_avx2, "avx2,fma");
+solve!(Avx512, solve_avx512, "avx512f,avx512dq");
+
+struct Run<'m, E: Registers> {
+    course: Course<'m>,
+    demand: Demand,
+    asked: f64,
+    /// As [`TRUST`], for samples: errors of what is only looked at do not add up.
+    trust: f64,
+    stages: Stages<E>,
+    /// Slope at the start of the step, and how fast it changes as far as is known.
+    slope: Vec<f64>,
+    bend: Vec<f64>,
+    at: Vec<f64>,
+    units: Vec<f64>,
+    /// Those of sideways springs first, so many.
+    modes: Vec<Mode>,
+    sideways: usize,
+    sideways_up: [f64; 3],
+    rows: Vec<Row>,
+    /// The vertical in the body when they were computed, and whether contacts have changed since.
+    modes_up: [f64; 3],
+    modes_hold: bool,
+    ledger_unit_j: f64,
+    looks: Looks,
+    margin_n: f64,
+    h_next: f64,
+    /// How many handles rest after the jump that the next step begins with, and what a first step could be then.
+    jumped: Option<usize>,
+    after_jump: [f64; 3],
+    /// Steps in a row that convergence has limited.
+    limited: u32,
+}
+
+impl<'m, E: Solve> Run<'m, E> {
+    fn new(mut course: Course<'m>, settings: &Settings) -> Self {
+        let model = course.model;
+        let size = model.layout().size();
+        course.y.truncate(size);
+        course.w.least_load_n = f64::NEG_INFINITY;
+        let tolerance = (settings.tolerance * SHARE).max(FINEST);
+        Self {
+            demand: Demand {
+                tolerance,
+                iteration: (tolerance * ITERATION).max(FINEST),
+            },
+            asked: settings.tolerance,
+            trust: (0.1 * settings.tolerance / tolerance).max(TRUST),
+            stages: Stages::new(model),
+            slope: vec![0.0; size],
+            bend: vec![0.0; size],
+            at: vec![0.0; size],
+            units: vec![0.0; model.layout().body],
+            modes: Vec::new(),
+            sideways: 0,
+            sideways_up: [f64::INFINITY; 3],
+            rows: Vec::new(),
+            modes_up: [0.0; 3],
+            modes_hold: false,
+            ledger_unit_j: unit_j(&model.scene),
+            looks: Looks::new(),
+            margin_n: 0.0,
+            h_next: 0.0,
+            jumped: None,
+            after_jump: [f64::INFINITY; 3],
+            limited: 0,
+            course,
+        }
+    }
+
+    fn integrate(mut self, observer: &mut dyn Observer) -> (Course<'m>, Result<bool, Stopped>) {
+        self.course.w.spread(&mut self.stages.w);
+        self.begin();
+        self.h_next = 0.01;
+        while !self.course.finished() {
+            if let Err(stopped) = self.advance(observer) {
+                return (self.course, Err(stopped));
+            }
+            if self.limited > MANY {
+                return (self.course, Ok(false));
+            }
+        }
+        (self.course, Ok(true))
+    }
+
+    /// The state or its law has changed at once.
+    fn begin(&mut self) {
+        self.course.w.refresh(&mut self.stages.w);
+        self.stages.look_at(self.course.watch());
+    }
+
+    /// Slope, units and modes at the start of a step.
+    fn look_around(&mut self) {
+        let course = &mut self.course;
+        course.slope(&mut self.slope);
+        self.margin_n = course.margin_n();
+        let (model, y) = (course.model, &course.y);
+        model.units(y, &course.w, &mut self.units);
+        let watched = model.layout().ledger_range().start;
+        for (d, scale) in self.stages.scale.iter_mut().enumerate() {
+            *scale = if d < self.units.len() {
+                1.0 / (self.units[d] + y[d].abs())
+            } else if d < watched {
+                1.0
+            } else {
+                LEDGER / (self.ledger_unit_j + LEDGER * y[d].abs())
+            };
+        }
+        // Sideways springs hold whatever the contacts, and little depends on how the body has turned.
+        let up = in_body(y, 2);
+        let moved = |since: &[f64; 3]| {
+            let each = up.iter().zip(since).map(|(a, b)| (a - b).abs());
+            each.fold(0.0, f64::max)
+        };
+        let sideways = moved(&self.sideways_up) > 10.0 * TURNED;
+        if sideways {
+            self.modes.clear();
+            modes(model, y, &course.w, 0..2, &mut self.rows, &mut self.modes);
+            (self.sideways_up, self.sideways) = (up, self.modes.len());
+        }
+        if sideways || !self.modes_hold || moved(&self.modes_up) > TURNED {
+            self.modes.truncate(self.sideways);
+            modes(model, y, &course.w, 2..3, &mut self.rows, &mut self.modes);
+            (self.modes_up, self.modes_hold) = (up, true);
+        }
+    }
+
+    /// Solves a step of size h, which counts.
+    fn solve(&mut self, h: f64, part: Option<f64>) -> Solved {
+        let guess = match part {
+            Some(part) => Guess::Part(part),
+            None => Guess::Slope(&self.slope, &self.bend),
+        };
+        let (model, start) = (self.course.model, (self.course.t_s, &self.course.y[..]));
+        let solved = E::solve(
+            &mut self.stages,
+            model,
+            start,
+            h,
+            &guess,
+            &self.modes,
+            self.demand,
+        );
+        self.course.stats.evaluations += u64::from(solved.sweeps) * MOMENTS as u64;
+        solved
+    }
+
+    /// One step, cut short where somebody wants to see a state that its polynomial does not hold.
+    fn advance(&mut self, observer: &mut dyn Observer) -> Result<(), Stopped> {
+        self.look_around();
+        let t0 = self.course.t_s;
+        let left = self.course.stop_s() - t0;
+        // A jump excites what the step before it has not met: what a first step could be was learnt the last time as many handles rested.
+        let wanted = match self.jumped {
+            Some(resting) => self.h_next.min(self.after_jump[resting]),
+            None => self.h_next,
+        };
+        let mut h = self.fitted(wanted, left);
+        let mut solved = self.solve(h, None);
+        let mut rejected = false;
+        while !(solved.converged && solved.error <= 1.0) {
+            self.course.stats.rejected += 1;
+            self.course.check_work()?;
+            rejected = true;
+            let factor = if solved.converged {
+                (SAFETY * solved.error.powf(-EXPONENT)).clamp(SHRINK, 0.9)
+            } else {
+                0.5
+            };
+            let shorter = self.fitted(h * factor, left).min(0.95 * h);
+            if shorter < SMALLEST_STEP_S && shorter < left {
+                return Err(Stopped::StepTooSmall {
+                    method: NAME,
+                    t_s: t0,
+                    step_s: shorter,
+                    tolerance: self.asked,
+                });
+            }
+            let part = solved.converged.then_some(shorter / h);
+            self.limited += u32::from(!solved.converged);
+            h = shorter;
+            solved = self.solve(h, part);
+        }
+        if solved.sweeps < 12 {
+            self.limited = 0;
+        }
+        let tried = h;
+        let factor = (SAFETY * solved.error.max(1e-14).powf(-EXPONENT))
+            .clamp(SHRINK, if rejected { 1.0 } else { GROW });
+        let proposal = tried * factor;
+        if let Some(resting) = self.jumped.take() {
+            self.after_jump[resting] = if tried < wanted && !rejected {
+                proposal.max(wanted)
+            } else {
+                proposal
+            };
+        }
+        // A step that was cut to meet a moment says nothing against a longer one.
+        self.h_next = if tried < wanted && !rejected {
+            proposal.max(wanted)
+        } else {
+            proposal
+        };
+        let event = loop {
+            // Where the polynomial does not hold an event, its place only tells how long the step should be.
+            let roughly = solved.between > TRUST;
+            let event = self.event(t0, h, roughly);
+            let until = event.map_or(h, |theta| theta * h);
+            let due = self.course.sample_due(t0 + until - 2.0 * SAME_MOMENT_S);
+            let cut = match (due, event) {
+                (Some(t), _) if solved.between > self.trust => t - t0,
+                (_, Some(theta)) if roughly && theta < 0.99 => 1.001 * theta * h + ROUGHLY * h,
+                (_, Some(_)) if roughly => break self.event(t0, h, false),
+                _ => break event,
+            };
+            solved = self.solve(cut, Some(cut / h));
+            h = cut;
+        };
+        let end_s = event.map_or(h, |theta| theta * h);
+        while let Some(t) = self.course.sample_due(t0 + end_s - 2.0 * SAME_MOMENT_S) {
+            let theta = ((t - t0) / h).clamp(0.0, 1.0);
+            self.stages.between(&self.course.y, theta, &mut self.at);
+            self.course.model.freedoms().project(&mut self.at);
+            self.course.sample(&self.at, false, observer)?;
+        }
+        self.stages.between(&self.course.y, end_s / h, &mut self.at);
+        std::mem::swap(&mut self.course.y, &mut self.at);
+        let t1 = if h == left && event.is_none() {
+            self.course.stop_s()
+        } else {
+            t0 + end_s
+        };
+        let switched = t1 >= self.course.stop_s();
+        if event.is_none() {
+            self.at.copy_from_slice(&self.course.y);
+            while self.course.sample_due(t1).is_some() {
+                self.course.sample(&self.at, false, observer)?;
+            }
+        }
+        self.course.arrive(t1, observer)?;
+        for (bend, f) in self.bend.iter_mut().zip(&self.stages.f) {
+            let f = f.as_array();
+            *bend = (f[MOMENTS - 1] - f[MOMENTS - 2]) / ((1.0 - C[MOMENTS - 2]) * h);
+        }
+        if event.is_some() {
+            self.course.fire(observer);
+            self.modes_hold = false;
+            self.jumped = Some(self.course.resting_handles().min(2));
+        }
+        if (event.is_some() || switched) && !self.course.finished() {
+            self.begin();
+        }
+        Ok(())
+    }
+
+    /// A step of about h that leaves no crumb before the next moment that must not be crossed.
+    fn fitted(&self, h: f64, left: f64) -> f64 {
+        if left <= 1.01 * h {
+            left
+        } else if left < 2.0 * h {
+            0.5 * left
+        } else {
+            h
+        }
+    }
+
+    /// The first zero of the margins within the step of size h that was solved last.
+    fn event(&mut self, t0: f64, h: f64, roughly: bool) -> Option<f64> {
+        self.looks.clear();
+        self.looks.note_start(self.margin_n);
+        for (theta, &margin) in C.into_iter().zip(self.stages.margins()) {
+            self.looks.note(theta, margin);
+        }
+        if !self.looks.suspicious() {
+            return None;
+        }
+        let fine = (0.25 * SAME_MOMENT_S / h).max(2.0 * f64::EPSILON);
+        let resolution = if roughly {
+            fine.max(0.2 * ROUGHLY)
+        } else {
+            fine
+        };
+        let y0 = std::mem::take(&mut self.course.y);
+        let (stages, at, course) = (&self.stages, &mut self.at, &mut self.course);
+        let event = events::first(&self.looks, resolution, |theta| {
+            stages.between(&y0, theta, at);
+            course.margin_at_n(t0 + theta * h, at)
+        });
+        self.course.y = y0;
+        event
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::model::Workspace;
+    use crate::scene::{builtin, parse};
+
+    struct Last(Vec<f64>);
+
+    impl Observer for Last {
+        fn sample(&mut self, _t_s: f64, y: &[f64], _w: &Workspace) -> bool {
+            self.0 = y.to_vec();
+            true
+        }
+    }
+
+    /// The last state of a scene, and the work, with registers of a kind.
+    fn end<E: Solve>(model: &Model) -> (Vec<f64>, Stats) {
+        let settings = Settings {
+            tolerance: 1e-8,
+            step_s: f64::NAN,
+            most_evaluations: 1 << 40,
+        };
+        let course = Course::new(model, NAME, &settings, true);
+        let mut last = Last(Vec::new());
+        let (course, outcome) = Run::<E>::new(course, &settings).integrate(&mut last);
+        assert_eq!(outcome, Ok(true));
+        (last.0, course.stats)
+    }
+
+    #[test]
+    fn all_registers_give_the_same_run_but_for_rounding() {
+        for name in ["music", "eight-carriers"] {
+            let brief = ["duration_s=12".to_owned()];
+            let scene = parse(name, builtin(name).unwrap(), &brief).unwrap();
+            let model = Model::new(&scene);
+            let (plain, stats) = end::<Plain8>(&model);
+            let near = |(other, work): (Vec<f64>, Stats), what: &str| {
+                for (k, (a, b)) in plain.iter().zip(&other).enumerate() {
+                    assert!(
+                        (a - b).abs() < 1e-7 * (1.0 + a.abs()),
+                        "{what} {k}: {a} {b}"
+                    );
+                }
+                assert_eq!(stats.events, work.events);
+            };
+            #[cfg(target_arch = "x86_64")]
+            {
+                if is_x86_feature_detected!("avx2") && is_x86_feature_detected!("fma") {
+                    near(end::<Avx2>(&model), "avx2");
+                }
+                if is_x86_feature_detected!("avx512f") && is_x86_feature_detected!("avx512dq") {
+                    near(end::<Avx512>(&model), "avx512");
+                }
+            }
+            near(end::<Plain8>(&model), "plain");
+        }
+    }
+
+    /// Steps of one size, solved to rounding: the error falls as h¹⁵.
+    #[test]
+    fn the_order_is_fifteen() {
+        let scene = r#"
+            name = "tumble"
+            duration_s = 1.0
+            [body]
+            gravity_m_per_s2 = [0.0, 0.0, 0.0]
+            inertia_kg_m2 = { xx = 1.0, yy = 2.0, zz = 2.5 }
+            [start]
+            height_m = 0.0
+            angular_velocity_rad_per_s = [1.0, 0.7, 2.0]
+            [solver]
+            energy = false
+        "#;
+        let model = Model::new(&parse("tumble", scene, &[]).unwrap());
+        let spin_after = |steps: u32| {
+            let h = 8.0 / f64::from(steps);
+            let mut stages = Stages::<Plain8>::new(&model);
+            let mut w = model.workspace();
+            model.begin_segment(0.0, &mut w);
+            w.spread(&mut stages.w);
+            stages.scale.fill(1.0);
+            let mut y = model.initial_state();
+            let mut slope = vec![0.0; y.len()];
+            let flat = vec![0.0; y.len()];
+            let demand = Demand {
+                tolerance: 1e300,
+                iteration: 1e-15,
+            };
+            for step in 0..steps {
+                let t = h * f64::from(step);
+                model.rhs(t, &y, &mut slope, &mut w);
+                let start = y.clone();
+                let guess = Guess::Slope(&slope, &flat);
+                Plain8::solve(&mut stages, &model, (t, &start), h, &guess, &[], demand);
+                stages.between(&start, 1.0, &mut y);
+                model.freedoms().project(&mut y);
+            }
+            [y[10], y[11], y[12]]
+        };
+        let truth = spin_after(64);
+        let error = |steps: u32| -> f64 {
+            let spin = spin_after(steps);
+            let square = |a: usize| (spin[a] - truth[a]).powi(2);
+            (square(0) + square(1) + square(2)).sqrt()
+        };
+        let order = (error(6) / error(12)).log2();
+        assert!((order - 15.0).abs() < 1.5, "{order}");
+    }
+}
