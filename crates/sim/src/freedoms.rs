@@ -7,10 +7,13 @@ mod reduced;
 pub use reduced::{Pinned, choose};
 
 use crate::body::Body;
-use crate::lanes::{Moments, Number, f64x2, pack, sum};
+#[cfg(target_arch = "x86_64")]
+use crate::lanes::{Avx2, Avx512};
+use crate::lanes::{Eight, Moments, Number, Plain8, f64x2, pack, sum};
 use crate::model::{All, Block, Pair, Part, Workspace};
 use crate::scene::Start;
 use nalgebra::{Matrix3, Quaternion, UnitQuaternion, Vector3};
+use std::ops::Range;
 
 /// Where the body is and how it moves.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -67,10 +70,14 @@ pub trait Freedoms: Send + Sync {
     fn orient(&self, _y: &[f64], _w: &mut Workspace) {}
     /// Writes the derivatives of the body's states from the forces in the workspace.
     fn accelerate(&self, y: &[f64], w: &mut Workspace, dy: &mut [f64]);
-    /// All six freedoms, which can be evaluated at eight moments at once.
-    fn as_six(&self) -> Option<&Six> {
-        None
-    }
+    /// The same at eight moments side by side.
+    fn on_eight(&self) -> &dyn FreedomsOnEight;
+    /// Which of the positions are angles or a quaternion.
+    fn attitude(&self) -> Range<usize>;
+    /// How fast each velocity, of which there are six at most, moves a handle (body coordinates, m) along one of the world's axes.
+    fn levers(&self, y: &[f64], handle_m: [f64; 3], axis: usize) -> [f64; 6];
+    /// The inverse mass or moment that belongs to each velocity, 1/kg or 1/(kg·m²); products are left out.
+    fn inverse_masses(&self, y: &[f64]) -> [f64; 6];
     /// The pose at a state.
     fn pose(&self, y: &[f64]) -> Pose;
     /// From a state and its rates: acceleration of the centre of mass in the world [m/s²], angular acceleration in the body [rad/s²].
@@ -90,6 +97,83 @@ pub trait Freedoms: Send + Sync {
     /// −∂v̇/∂v of each velocity, 1/s, that vertical dampers of `damping` (N·s/m) at the handles make where `contact_gain` lets them act.
     /// Zero where it is not worth knowing.
     fn damping_per_s(&self, _y: &[f64], _pairs: &[Pair], _damping: &[f64x2], _rates: &mut [f64]) {}
+}
+
+/// Coordinates written for any number of moments.
+pub(crate) trait Coordinates: Send + Sync {
+    /// As [`Freedoms::gaps`], of some of the handles.
+    fn gaps_at<N: Moments>(&self, y: &[N::Each], w: &mut Workspace<N>, part: impl Part);
+    /// As [`Freedoms::accelerate`].
+    fn rates_at<N: Moments>(&self, y: &[N::Each], w: &Workspace<N>, dy: &mut [N::Each]);
+}
+
+/// [`Freedoms::gaps`] and [`Freedoms::accelerate`] at eight moments, for each kind of registers: see [`crate::model::OnEight`].
+#[allow(missing_docs)]
+pub trait FreedomsOnEight {
+    fn gaps_plain(&self, y: &[Plain8], w: &mut Workspace<Eight<Plain8>>);
+    fn rates_plain(&self, y: &[Plain8], w: &Workspace<Eight<Plain8>>, dy: &mut [Plain8]);
+    /// # Safety
+    /// The processor has AVX2 and FMA.
+    #[cfg(target_arch = "x86_64")]
+    #[allow(unsafe_code)]
+    unsafe fn gaps_avx2(&self, y: &[Avx2], w: &mut Workspace<Eight<Avx2>>);
+    /// # Safety
+    /// The processor has AVX2 and FMA.
+    #[cfg(target_arch = "x86_64")]
+    #[allow(unsafe_code)]
+    unsafe fn rates_avx2(&self, y: &[Avx2], w: &Workspace<Eight<Avx2>>, dy: &mut [Avx2]);
+    /// # Safety
+    /// The processor has AVX-512 F and DQ.
+    #[cfg(target_arch = "x86_64")]
+    #[allow(unsafe_code)]
+    unsafe fn gaps_avx512(&self, y: &[Avx512], w: &mut Workspace<Eight<Avx512>>);
+    /// # Safety
+    /// The processor has AVX-512 F and DQ.
+    #[cfg(target_arch = "x86_64")]
+    #[allow(unsafe_code)]
+    unsafe fn rates_avx512(&self, y: &[Avx512], w: &Workspace<Eight<Avx512>>, dy: &mut [Avx512]);
+}
+
+impl<T: Coordinates> FreedomsOnEight for T {
+    fn gaps_plain(&self, y: &[Plain8], w: &mut Workspace<Eight<Plain8>>) {
+        self.gaps_at(y, w, All);
+    }
+    fn rates_plain(&self, y: &[Plain8], w: &Workspace<Eight<Plain8>>, dy: &mut [Plain8]) {
+        self.rates_at(y, w, dy);
+    }
+    #[cfg(target_arch = "x86_64")]
+    #[target_feature(enable = "avx2,fma")]
+    #[allow(unsafe_code)]
+    unsafe fn gaps_avx2(&self, y: &[Avx2], w: &mut Workspace<Eight<Avx2>>) {
+        self.gaps_at(y, w, All);
+    }
+    #[cfg(target_arch = "x86_64")]
+    #[target_feature(enable = "avx2,fma")]
+    #[allow(unsafe_code)]
+    unsafe fn rates_avx2(&self, y: &[Avx2], w: &Workspace<Eight<Avx2>>, dy: &mut [Avx2]) {
+        self.rates_at(y, w, dy);
+    }
+    #[cfg(target_arch = "x86_64")]
+    #[target_feature(enable = "avx512f,avx512dq")]
+    #[allow(unsafe_code)]
+    unsafe fn gaps_avx512(&self, y: &[Avx512], w: &mut Workspace<Eight<Avx512>>) {
+        self.gaps_at(y, w, All);
+    }
+    #[cfg(target_arch = "x86_64")]
+    #[target_feature(enable = "avx512f,avx512dq")]
+    #[allow(unsafe_code)]
+    unsafe fn rates_avx512(&self, y: &[Avx512], w: &Workspace<Eight<Avx512>>, dy: &mut [Avx512]) {
+        self.rates_at(y, w, dy);
+    }
+}
+
+/// p × e
+fn lever(p: [f64; 3], e: [f64; 3]) -> [f64; 3] {
+    [
+        p[1] * e[2] - p[2] * e[1],
+        p[2] * e[0] - p[0] * e[2],
+        p[0] * e[1] - p[1] * e[0],
+    ]
 }
 
 /// All six freedoms: r (world), q = (x, y, z, w) body → world, v (world), ω (body); 13 states.
@@ -157,14 +241,11 @@ impl Six {
             inverse_inertia: Tensor::new(&body.inverse_inertia),
         }
     }
+}
 
+impl Coordinates for Six {
     #[inline(always)]
-    pub(crate) fn place_handles<N: Moments>(
-        &self,
-        y: &[N::Each],
-        w: &mut Workspace<N>,
-        part: impl Part,
-    ) {
+    fn gaps_at<N: Moments>(&self, y: &[N::Each], w: &mut Workspace<N>, part: impl Part) {
         let y: &[N::Each; 13] = y.first_chunk().expect("thirteen states");
         let r = rotation(&y[3..7]);
         let spin = [y[10], y[11], y[12]];
@@ -176,16 +257,12 @@ impl Six {
             &self.handle,
             part,
             [position, velocity],
-            turning::<N>(r, spin),
+            &Turned::new(r, spin),
         );
     }
-}
 
-/// The same at any number of moments.
-impl Six {
-    /// As [`Freedoms::accelerate`].
     #[inline(always)]
-    pub(crate) fn rates<N: Moments>(&self, y: &[N::Each], w: &Workspace<N>, dy: &mut [N::Each]) {
+    fn rates_at<N: Moments>(&self, y: &[N::Each], w: &Workspace<N>, dy: &mut [N::Each]) {
         let y: &[N::Each; 13] = y.first_chunk().expect("thirteen states");
         let dy: &mut [N::Each; 13] = dy.first_chunk_mut().expect("thirteen states");
         let ([force, t], r) = (pull(&w.pair), &w.rotation);
@@ -225,16 +302,16 @@ pub(crate) fn turn<T: Number>(q: [T; 4], [wx, wy, wz]: [T; 3]) -> [T; 4] {
 /// Places the handles, two by two: arm and its rate from `arm_of`, gap and its rate against a centre of mass at
 /// `motion` = position (m) and velocity (m/s).
 #[inline(always)]
-fn place_handles<N: Moments, H>(
+fn place_handles<N: Moments, A: Arms<N>>(
     pairs: &mut [Pair<N>],
-    handles: &[H],
+    handles: &[A::Handle],
     part: impl Part,
     motion: [[N::Each; 3]; 2],
-    arm_of: impl Fn(&H) -> [[N::Pair; 3]; 2],
+    arms: &A,
 ) {
     let [position, velocity] = [both::<N>(motion[0]), both::<N>(motion[1])];
     for (p, h) in part.of_mut(pairs).iter_mut().zip(part.of(handles)) {
-        let [arm, arm_rate] = arm_of(h);
+        let [arm, arm_rate] = arms.of(h);
         for a in 0..3 {
             p.arm[a] = arm[a];
             p.gap[a] = p.base[a] - position[a] - arm[a];
@@ -243,30 +320,48 @@ fn place_handles<N: Moments, H>(
     }
 }
 
-/// Arms in the world and their rates ω × arm, for a body of this rotation and this spin (body axes, rad/s).
-#[inline(always)]
-fn turning<N: Moments>(
-    r: [[N::Each; 3]; 3],
-    spin: [N::Each; 3],
-) -> impl Fn(&[f64x2; 3]) -> [[N::Pair; 3]; 2] {
-    let world = both::<N>(by_rows(r, spin));
-    let rows = [both::<N>(r[0]), both::<N>(r[1]), both::<N>(r[2])];
-    move |h| {
-        let h = [N::always(h[0]), N::always(h[1]), N::always(h[2])];
-        let arm = by_rows(rows, h);
-        let arm_rate = [
-            world[1] * arm[2] - world[2] * arm[1],
-            world[2] * arm[0] - world[0] * arm[2],
-            world[0] * arm[1] - world[1] * arm[0],
-        ];
-        [arm, arm_rate]
+/// Where the body holds its handles.
+trait Arms<N: Moments> {
+    /// What is known of two handles beforehand.
+    type Handle;
+    /// Arms in the world, m, and their rates, m/s.
+    fn of(&self, handle: &Self::Handle) -> [[N::Pair; 3]; 2];
+}
+
+/// A body of some rotation that turns: the rates of its arms are ω × arm.
+struct Turned<N: Moments> {
+    rows: [[N::Pair; 3]; 3],
+    /// ω in the world, rad/s.
+    spin: [N::Pair; 3],
+}
+
+impl<N: Moments> Turned<N> {
+    /// With rows of the rotation and the spin in the body, rad/s.
+    #[inline(always)]
+    fn new(r: [[N::Each; 3]; 3], spin: [N::Each; 3]) -> Self {
+        Self {
+            rows: [both::<N>(r[0]), both::<N>(r[1]), both::<N>(r[2])],
+            spin: both::<N>(by_rows(r, spin)),
+        }
     }
 }
 
-/// a · b
-#[inline(always)]
-fn dot<T: Number>(a: [T; 3], b: [T; 3]) -> T {
-    a[2].madd(b[2], a[1].madd(b[1], a[0] * b[0]))
+impl<N: Moments> Arms<N> for Turned<N> {
+    type Handle = [f64x2; 3];
+    #[inline(always)]
+    fn of(&self, h: &[f64x2; 3]) -> [[N::Pair; 3]; 2] {
+        let w = &self.spin;
+        let arm = by_rows(
+            self.rows,
+            [N::always(h[0]), N::always(h[1]), N::always(h[2])],
+        );
+        let arm_rate = [
+            w[1] * arm[2] - w[2] * arm[1],
+            w[2] * arm[0] - w[0] * arm[2],
+            w[0] * arm[1] - w[1] * arm[0],
+        ];
+        [arm, arm_rate]
+    }
 }
 
 // Functions rather than closures, which would not be inlined into code compiled for wide registers.
@@ -289,6 +384,12 @@ fn by_rows<T: Number>(rows: [[T; 3]; 3], v: [T; 3]) -> [T; 3] {
     [dot(rows[0], v), dot(rows[1], v), dot(rows[2], v)]
 }
 
+/// a · b
+#[inline(always)]
+fn dot<T: Number>(a: [T; 3], b: [T; 3]) -> T {
+    a[2].madd(b[2], a[1].madd(b[1], a[0] * b[0]))
+}
+
 /// Sums of the handle forces (N) and of their torques about the centre of mass (N·m), in the world.
 #[inline(always)]
 fn pull<N: Moments>(pairs: &[Pair<N>]) -> [[N::Each; 3]; 2] {
@@ -308,8 +409,12 @@ fn pull<N: Moments>(pairs: &[Pair<N>]) -> [[N::Each; 3]; 2] {
 
 /// M v
 #[inline(always)]
-fn times(m: &Matrix3<f64>, v: [f64; 3]) -> [f64; 3] {
-    [0, 1, 2].map(|a| m[(a, 0)] * v[0] + m[(a, 1)] * v[1] + m[(a, 2)] * v[2])
+fn times<T: Number>(m: &Matrix3<f64>, v: [T; 3]) -> [T; 3] {
+    [
+        v[0] * m[(0, 0)] + v[1] * m[(0, 1)] + v[2] * m[(0, 2)],
+        v[0] * m[(1, 0)] + v[1] * m[(1, 1)] + v[2] * m[(1, 2)],
+        v[0] * m[(2, 0)] + v[1] * m[(2, 1)] + v[2] * m[(2, 2)],
+    ]
 }
 
 /// Rows of the rotation matrix of q/|q|.
@@ -393,19 +498,35 @@ impl Freedoms for Six {
     }
 
     fn gaps(&self, y: &[f64], w: &mut Workspace) {
-        self.place_handles(y, w, All);
+        self.gaps_at(y, w, All);
     }
 
     fn gaps_of(&self, y: &[f64], w: &mut Workspace, block: Block) {
-        self.place_handles(y, w, block);
+        self.gaps_at(y, w, block);
     }
 
     fn accelerate(&self, y: &[f64], w: &mut Workspace, dy: &mut [f64]) {
-        self.rates(y, w, dy);
+        self.rates_at(y, w, dy);
     }
 
-    fn as_six(&self) -> Option<&Six> {
-        Some(self)
+    fn on_eight(&self) -> &dyn FreedomsOnEight {
+        self
+    }
+
+    fn attitude(&self) -> Range<usize> {
+        3..7
+    }
+
+    fn levers(&self, y: &[f64], handle_m: [f64; 3], axis: usize) -> [f64; 6] {
+        let [a, b, c] = lever(handle_m, rotation(&y[3..7])[axis]);
+        let mut levers = [0.0, 0.0, 0.0, a, b, c];
+        levers[axis] = 1.0;
+        levers
+    }
+
+    fn inverse_masses(&self, _y: &[f64]) -> [f64; 6] {
+        let (m, [a, b, c]) = (self.inverse_mass, self.inverse_inertia.moments);
+        [m, m, m, a, b, c]
     }
 
     fn pose(&self, y: &[f64]) -> Pose {

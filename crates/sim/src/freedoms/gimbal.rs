@@ -6,10 +6,9 @@
 //! φ roll, θ tilt, ψ yaw, the held one with its value and no rate (rad); ω in the body (rad/s). JᵀIJ is singular only where roll and yaw are
 //! the same turn (θ = ±90°), which a scene with these two free may not hold. Source: see [`super::reduced`].
 
-use super::reduced::{Rails, Turning, cross, dot, sin_cos};
-use super::{place_handles, times, turning};
-use crate::lanes::Now;
-use crate::lanes::f64x2;
+use super::reduced::{Rails, Turning, cross, dot};
+use super::{Turned, by_rows, place_handles, times};
+use crate::lanes::{Moments, Number, f64x2};
 use crate::model::{Part, Workspace};
 
 pub(super) struct Gimbal {
@@ -19,18 +18,18 @@ pub(super) struct Gimbal {
 }
 
 /// The attitude at a state: what gaps and accelerations both need.
-struct Attitude {
+struct Attitude<T> {
     /// Sine and cosine of roll, tilt, yaw.
-    roll: (f64, f64),
-    tilt: (f64, f64),
-    yaw: (f64, f64),
+    roll: (T, T),
+    tilt: (T, T),
+    yaw: (T, T),
     /// Rates of roll, tilt, yaw; zero for the held one.
-    rates: [f64; 3],
+    rates: [T; 3],
 }
 
-impl Attitude {
+impl<T: Number> Attitude<T> {
     #[inline(always)]
-    fn rows(&self) -> [[f64; 3]; 3] {
+    fn rows(&self) -> [[T; 3]; 3] {
         let ((sr, cr), (st, ct), (sy, cy)) = (self.roll, self.tilt, self.yaw);
         [
             [cy * ct, cy * st * sr - sy * cr, cy * st * cr + sy * sr],
@@ -40,20 +39,19 @@ impl Attitude {
     }
 
     #[inline(always)]
-    fn columns(&self) -> [[f64; 3]; 3] {
+    fn columns(&self) -> [[T; 3]; 3] {
         let ((sr, cr), (st, ct)) = (self.roll, self.tilt);
-        [[1.0, 0.0, 0.0], [0.0, cr, -sr], [-st, ct * sr, ct * cr]]
+        let (zero, one) = (T::splat(0.0), T::splat(1.0));
+        [[one, zero, zero], [zero, cr, -sr], [-st, ct * sr, ct * cr]]
     }
 
     #[inline(always)]
-    fn spin(&self) -> [f64; 3] {
-        let j = self.columns();
-        [0, 1, 2]
-            .map(|a| j[0][a] * self.rates[0] + j[1][a] * self.rates[1] + j[2][a] * self.rates[2])
+    fn spin(&self) -> [T; 3] {
+        by_columns(self.columns(), self.rates)
     }
 
     #[inline(always)]
-    fn drag(&self) -> [f64; 3] {
+    fn drag(&self) -> [T; 3] {
         let ((sr, cr), (st, ct), [roll, tilt, yaw]) = (self.roll, self.tilt, self.rates);
         [
             -yaw * ct * tilt,
@@ -63,15 +61,29 @@ impl Attitude {
     }
 }
 
+/// A matrix, by its columns, times a vector.
+#[inline(always)]
+fn by_columns<T: Number>(m: [[T; 3]; 3], v: [T; 3]) -> [T; 3] {
+    let rows = [0, 1, 2].map(|a| [m[0][a], m[1][a], m[2][a]]);
+    by_rows(rows, v)
+}
+
 impl Gimbal {
     #[inline(always)]
-    fn attitude(&self, rails: &Rails, y: &[f64]) -> Attitude {
-        let angle = |a: usize| rails.place[3 + a].map_or(self.held[a], |p| sin_cos(y[p]));
+    fn angle<T: Number>(&self, a: usize, rails: &Rails, y: &[T]) -> (T, T) {
+        match rails.place[3 + a] {
+            Some(p) => Number::sin_cos(y[p]),
+            None => (T::splat(self.held[a].0), T::splat(self.held[a].1)),
+        }
+    }
+
+    #[inline(always)]
+    fn attitude<T: Number>(&self, rails: &Rails, y: &[T]) -> Attitude<T> {
         Attitude {
-            roll: angle(0),
-            tilt: angle(1),
-            yaw: angle(2),
-            rates: [3, 4, 5].map(|c| rails.rate(c, y)),
+            roll: self.angle(0, rails, y),
+            tilt: self.angle(1, rails, y),
+            yaw: self.angle(2, rails, y),
+            rates: [rails.rate(3, y), rails.rate(4, y), rails.rate(5, y)],
         }
     }
 }
@@ -85,12 +97,12 @@ impl Turning for Gimbal {
     }
 
     #[inline(always)]
-    fn gaps(
+    fn gaps<N: Moments>(
         &self,
         rails: &Rails,
-        y: &[f64],
-        motion: [[f64; 3]; 2],
-        w: &mut Workspace,
+        y: &[N::Each],
+        motion: [[N::Each; 3]; 2],
+        w: &mut Workspace<N>,
         part: impl Part,
     ) {
         let at = self.attitude(rails, y);
@@ -101,33 +113,33 @@ impl Turning for Gimbal {
             &self.handles,
             part,
             motion,
-            turning::<Now>(w.rotation, w.spin),
+            &Turned::new(w.rotation, w.spin),
         );
     }
 
     #[inline(always)]
-    fn accelerate(
+    fn accelerate<N: Moments>(
         &self,
         rails: &Rails,
-        torque: [f64; 3],
-        y: &[f64],
-        w: &Workspace,
-        dy: &mut [f64],
+        torque: [N::Each; 3],
+        y: &[N::Each],
+        w: &Workspace<N>,
+        dy: &mut [N::Each],
     ) {
         let at = self.attitude(rails, y);
-        let (j, spin, r) = (at.columns(), w.spin, &w.rotation);
+        let (j, spin) = (at.columns(), w.spin);
         let gyro = cross(spin, times(&rails.inertia, spin));
         let drag = times(&rails.inertia, at.drag());
-        let left = [0, 1, 2].map(|a| {
-            let in_body = r[0][a] * torque[0] + r[1][a] * torque[1] + r[2][a] * torque[2];
-            in_body + w.body_torque[a] - gyro[a] - drag[a]
-        });
+        let mut left = by_columns(w.rotation, torque);
+        for a in 0..3 {
+            left[a] = left[a] + w.body_torque[a] - gyro[a] - drag[a];
+        }
         let mut free = (0..3).filter_map(|a| rails.place[3 + a].map(|p| (j[a], rails.free + p)));
         if let (Some((a, pa)), Some((b, pb))) = (free.next(), free.next()) {
             let (ia, ib) = (times(&rails.inertia, a), times(&rails.inertia, b));
             let (aa, ab, bb) = (dot(a, ia), dot(a, ib), dot(b, ib));
             let (la, lb) = (dot(a, left), dot(b, left));
-            let scale = 1.0 / (aa * bb - ab * ab);
+            let scale = N::Each::splat(1.0) / (aa * bb - ab * ab);
             dy[pa] = (bb * la - ab * lb) * scale;
             dy[pb] = (aa * lb - ab * la) * scale;
         }

@@ -7,9 +7,9 @@
 //! constant; τ torque beside that of the handle forces (N·m, body). ω × Iω has no part along j and J̇ = 0, so neither appears. Without a free angle
 //! j = 0 and R p = P. Source: rotation about an axis, Rodrigues; equation: see [`super::reduced`].
 
-use super::reduced::{Rails, Turning, cross, dot, sin_cos};
-use super::{place_handles, times};
-use crate::lanes::{f64x2, sum};
+use super::reduced::{Rails, Turning, cross, dot};
+use super::{Arms, place_handles, times};
+use crate::lanes::{Moments, Number, f64x2, sum};
 use crate::model::{Pair, Part, Workspace};
 use nalgebra::{Rotation3, Vector3};
 
@@ -72,42 +72,28 @@ impl<const AXIS: usize> Turning for Hinge<AXIS> {
     }
 
     #[inline(always)]
-    fn gaps(
+    fn gaps<N: Moments>(
         &self,
         rails: &Rails,
-        y: &[f64],
-        motion: [[f64; 3]; 2],
-        w: &mut Workspace,
+        y: &[N::Each],
+        motion: [[N::Each; 3]; 2],
+        w: &mut Workspace<N>,
         part: impl Part,
     ) {
+        let number = N::Each::splat;
         let ((sin, cos), rate) = match self.place {
-            Some(p) => (sin_cos(y[p]), y[rails.free + p]),
-            None => ((0.0, 1.0), 0.0),
+            Some(p) => (Number::sin_cos(y[p]), y[rails.free + p]),
+            None => ((number(0.0), number(1.0)), number(0.0)),
         };
-        w.spin = self.in_body.map(|j| j * rate);
-        let [sin, cos, rate] = [sin, cos, rate].map(f64x2::splat);
-        place_handles(&mut w.pair, &self.handles, part, motion, |[a, b, c]| {
-            [
-                [0, 1, 2].map(|k| {
-                    if k == AXIS {
-                        a[k]
-                    } else {
-                        a[k] + b[k] * cos + c[k] * sin
-                    }
-                }),
-                [0, 1, 2].map(|k| {
-                    if k == AXIS {
-                        f64x2::ZERO
-                    } else {
-                        (c[k] * cos - b[k] * sin) * rate
-                    }
-                }),
-            ]
-        });
+        let [jx, jy, jz] = self.in_body;
+        w.spin = [rate * jx, rate * jy, rate * jz];
+        let (sin, cos, rate) = (N::both(sin), N::both(cos), N::both(rate));
+        let swung = Swung::<N, AXIS> { sin, cos, rate };
+        place_handles(&mut w.pair, &self.handles, part, motion, &swung);
     }
 
     fn orient(&self, y: &[f64], w: &mut Workspace) {
-        let (sin, cos) = self.place.map_or((0.0, 1.0), |p| sin_cos(y[p]));
+        let (sin, cos) = self.place.map_or((0.0, 1.0), |p| Number::sin_cos(y[p]));
         let [a, b, c] = &self.rotation;
         for row in 0..3 {
             for column in 0..3 {
@@ -118,20 +104,20 @@ impl<const AXIS: usize> Turning for Hinge<AXIS> {
     }
 
     #[inline(always)]
-    fn accelerate(
+    fn accelerate<N: Moments>(
         &self,
         rails: &Rails,
-        torque: [f64; 3],
-        _y: &[f64],
-        w: &Workspace,
-        dy: &mut [f64],
+        torque: [N::Each; 3],
+        _y: &[N::Each],
+        w: &Workspace<N>,
+        dy: &mut [N::Each],
     ) {
         if let Some(p) = self.place {
             let along = match AXIS {
-                ASKEW.. => dot(self.in_world, torque),
+                ASKEW.. => part_along(torque, self.in_world),
                 axis => torque[axis],
             };
-            let turned = along + dot(self.in_body, w.body_torque);
+            let turned = along + part_along(w.body_torque, self.in_body);
             dy[rails.free + p] = turned * self.inverse_moment;
         }
     }
@@ -145,7 +131,7 @@ impl<const AXIS: usize> Turning for Hinge<AXIS> {
         rates: &mut [f64],
     ) {
         let Some(place) = self.place else { return };
-        let (sin, cos) = sin_cos(y[place]);
+        let (sin, cos) = Number::sin_cos(y[place]);
         let mut taken = f64x2::ZERO;
         for ((p, [_, b, c]), damping) in pairs.iter().zip(&self.handles).zip(damping) {
             let lever = c[2] * cos - b[2] * sin;
@@ -160,5 +146,39 @@ impl<const AXIS: usize> Turning for Hinge<AXIS> {
 
     fn drag(&self, _rails: &Rails, _y: &[f64]) -> [f64; 3] {
         [0.0; 3]
+    }
+}
+
+/// v · n
+#[inline(always)]
+fn part_along<T: Number>(v: [T; 3], n: [f64; 3]) -> T {
+    v[0] * n[0] + v[1] * n[1] + v[2] * n[2]
+}
+
+/// A body at an angle of a hinge.
+struct Swung<N: Moments, const AXIS: usize> {
+    sin: N::Pair,
+    cos: N::Pair,
+    /// rad/s
+    rate: N::Pair,
+}
+
+impl<N: Moments, const AXIS: usize> Arms<N> for Swung<N, AXIS> {
+    type Handle = [[f64x2; 3]; 3];
+    #[inline(always)]
+    fn of(&self, [a, b, c]: &[[f64x2; 3]; 3]) -> [[N::Pair; 3]; 2] {
+        let still = N::Pair::splat(0.0);
+        let (mut arm, mut arm_rate) = ([still; 3], [still; 3]);
+        for k in 0..3 {
+            let along = N::always(a[k]);
+            if k == AXIS {
+                arm[k] = along;
+            } else {
+                let (b, c) = (N::always(b[k]), N::always(c[k]));
+                arm[k] = along + b * self.cos + c * self.sin;
+                arm_rate[k] = (c * self.cos - b * self.sin) * self.rate;
+            }
+        }
+        [arm, arm_rate]
     }
 }

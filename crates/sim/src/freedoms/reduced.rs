@@ -13,12 +13,13 @@
 
 use super::gimbal::Gimbal;
 use super::hinge::{ASKEW, Hinge};
-use super::{Freedoms, Pose, Six, pull};
+use super::{Coordinates, Freedoms, FreedomsOnEight, Pose, Six, lever, pull, times};
 use crate::body::Body;
-use crate::lanes::{f64x2, pack, sum};
+use crate::lanes::{Moments, Number, f64x2, pack, sum};
 use crate::model::{All, Block, Pair, Part, Workspace};
 use crate::scene::{Freedom, Start};
-use nalgebra::{DMatrix, DVector, Matrix3, UnitQuaternion, Vector3};
+use nalgebra::{DMatrix, DVector, Matrix3, Rotation3, UnitQuaternion, Vector3};
+use std::ops::Range;
 
 /// The coordinates for a choice of freedoms.
 pub fn choose(
@@ -72,6 +73,22 @@ impl Pinned {
     }
 }
 
+impl Coordinates for Pinned {
+    #[inline(always)]
+    fn gaps_at<N: Moments>(&self, y: &[N::Each], w: &mut Workspace<N>, part: impl Part) {
+        self.six.gaps_at(y, w, part);
+    }
+    #[inline(always)]
+    fn rates_at<N: Moments>(&self, y: &[N::Each], w: &Workspace<N>, dy: &mut [N::Each]) {
+        self.six.rates_at(y, w, dy);
+        for (dy, free) in dy[7..10].iter_mut().zip(self.free) {
+            if !free {
+                *dy = N::Each::splat(0.0);
+            }
+        }
+    }
+}
+
 impl Freedoms for Pinned {
     fn size(&self) -> usize {
         self.six.size()
@@ -93,8 +110,21 @@ impl Freedoms for Pinned {
         self.six.gaps_of(y, w, block);
     }
     fn accelerate(&self, y: &[f64], w: &mut Workspace, dy: &mut [f64]) {
-        self.six.accelerate(y, w, dy);
-        self.hold(&mut dy[7..10]);
+        self.rates_at(y, w, dy);
+    }
+    fn on_eight(&self) -> &dyn FreedomsOnEight {
+        self
+    }
+    fn attitude(&self) -> Range<usize> {
+        self.six.attitude()
+    }
+    fn levers(&self, y: &[f64], handle_m: [f64; 3], axis: usize) -> [f64; 6] {
+        self.six.levers(y, handle_m, axis)
+    }
+    fn inverse_masses(&self, y: &[f64]) -> [f64; 6] {
+        let mut inverse = self.six.inverse_masses(y);
+        self.hold(&mut inverse[..3]);
+        inverse
     }
     fn pose(&self, y: &[f64]) -> Pose {
         self.six.pose(y)
@@ -181,15 +211,17 @@ impl Rails {
         }
     }
 
-    #[inline(always)]
     pub fn coordinate(&self, c: usize, y: &[f64]) -> f64 {
         self.place[c].map_or(self.held[c], |p| y[p])
     }
 
     /// Its rate, from the state; its second derivative, from the state's rates.
     #[inline(always)]
-    pub fn rate(&self, c: usize, y: &[f64]) -> f64 {
-        self.place[c].map_or(0.0, |p| y[self.free + p])
+    pub fn rate<T: Number>(&self, c: usize, y: &[T]) -> T {
+        match self.place[c] {
+            Some(p) => y[self.free + p],
+            None => T::splat(0.0),
+        }
     }
 }
 
@@ -198,18 +230,25 @@ pub(super) trait Turning: Send + Sync {
     /// For handles in body coordinates, packed two by two (m).
     fn new(rails: &Rails, handles: Vec<[f64x2; 3]>) -> Self;
     /// Fills `spin` of the workspace and places the handles; `motion` of the centre of mass as in [`super::place_handles`].
-    fn gaps(
+    fn gaps<N: Moments>(
         &self,
         rails: &Rails,
-        y: &[f64],
-        motion: [[f64; 3]; 2],
-        w: &mut Workspace,
+        y: &[N::Each],
+        motion: [[N::Each; 3]; 2],
+        w: &mut Workspace<N>,
         part: impl Part,
     );
     /// Fills `rotation` of the workspace, if `gaps` did not.
     fn orient(&self, _y: &[f64], _w: &mut Workspace) {}
     /// Writes the second derivatives of the free angles; `torque` of the handle forces in the world (N·m).
-    fn accelerate(&self, rails: &Rails, torque: [f64; 3], y: &[f64], w: &Workspace, dy: &mut [f64]);
+    fn accelerate<N: Moments>(
+        &self,
+        rails: &Rails,
+        torque: [N::Each; 3],
+        y: &[N::Each],
+        w: &Workspace<N>,
+        dy: &mut [N::Each],
+    );
     /// What vertical dampers take from the rate of a free angle, as [`Freedoms::damping_per_s`].
     fn damping_per_s(
         &self,
@@ -242,14 +281,25 @@ impl<T: Turning> Reduced<T> {
         }
     }
 
+    /// J (φ̇, θ̇, ψ̇), or with the rates of a state J (φ̈, θ̈, ψ̈).
+    fn through_columns(&self, y: &[f64], rates_from: &[f64]) -> [f64; 3] {
+        let j = self.turning.columns(&self.rails, y);
+        let rates = [3, 4, 5].map(|c| self.rails.rate(c, rates_from));
+        [0, 1, 2].map(|a| (0..3).map(|k| j[k][a] * rates[k]).sum())
+    }
+}
+
+impl<T: Turning> Coordinates for Reduced<T> {
     #[inline(always)]
-    fn place_handles(&self, y: &[f64], w: &mut Workspace, part: impl Part) {
-        let rails = &self.rails;
-        let (mut position, mut velocity) = ([0, 1, 2].map(|c| rails.held[c]), [0.0; 3]);
+    fn gaps_at<N: Moments>(&self, y: &[N::Each], w: &mut Workspace<N>, part: impl Part) {
+        let (rails, zero) = (&self.rails, N::Each::splat(0.0));
+        let [x, across, height] = [rails.held[0], rails.held[1], rails.held[2]];
+        let (x, across) = (N::Each::splat(x), N::Each::splat(across));
         if rails.height_alone {
-            let motion = [[position[0], position[1], y[0]], [0.0, 0.0, y[rails.free]]];
+            let motion = [[x, across, y[0]], [zero, zero, y[rails.free]]];
             return self.turning.gaps(rails, y, motion, w, part);
         }
+        let (mut position, mut velocity) = ([x, across, N::Each::splat(height)], [zero; 3]);
         for &(c, p) in &rails.translations {
             (position[c], velocity[c]) = (y[p], y[rails.free + p]);
         }
@@ -257,11 +307,24 @@ impl<T: Turning> Reduced<T> {
         self.turning.gaps(rails, y, motion, w, part);
     }
 
-    /// J (φ̇, θ̇, ψ̇), or with the rates of a state J (φ̈, θ̈, ψ̈).
-    fn through_columns(&self, y: &[f64], rates_from: &[f64]) -> [f64; 3] {
-        let j = self.turning.columns(&self.rails, y);
-        let rates = [3, 4, 5].map(|c| self.rails.rate(c, rates_from));
-        [0, 1, 2].map(|a| (0..3).map(|k| j[k][a] * rates[k]).sum())
+    #[inline(always)]
+    fn rates_at<N: Moments>(&self, y: &[N::Each], w: &Workspace<N>, dy: &mut [N::Each]) {
+        let (rails, n) = (&self.rails, self.rails.free);
+        let [force, torque] = pull(&w.pair);
+        // Three translations and two angles at most. Even a copy of one number would be a call.
+        for k in 0..5 {
+            if k < n {
+                dy[k] = y[n + k];
+            }
+        }
+        if rails.height_alone {
+            dy[n] = force[2] * rails.inverse_mass + rails.gravity[2];
+        } else {
+            for &(c, p) in &rails.translations {
+                dy[n + p] = force[c] * rails.inverse_mass + rails.gravity[c];
+            }
+        }
+        self.turning.accelerate(rails, torque, y, w, dy);
     }
 }
 
@@ -319,11 +382,11 @@ impl<T: Turning> Freedoms for Reduced<T> {
     }
 
     fn gaps(&self, y: &[f64], w: &mut Workspace) {
-        self.place_handles(y, w, All);
+        self.gaps_at(y, w, All);
     }
 
     fn gaps_of(&self, y: &[f64], w: &mut Workspace, block: Block) {
-        self.place_handles(y, w, block);
+        self.gaps_at(y, w, block);
     }
 
     fn orient(&self, y: &[f64], w: &mut Workspace) {
@@ -331,22 +394,49 @@ impl<T: Turning> Freedoms for Reduced<T> {
     }
 
     fn accelerate(&self, y: &[f64], w: &mut Workspace, dy: &mut [f64]) {
-        let (rails, n) = (&self.rails, self.rails.free);
-        let [force, torque] = pull(&w.pair);
-        // Three translations and two angles at most. Even a copy of one number would be a call.
-        for k in 0..5 {
-            if k < n {
-                dy[k] = y[n + k];
+        self.rates_at(y, w, dy);
+    }
+
+    fn on_eight(&self) -> &dyn FreedomsOnEight {
+        self
+    }
+
+    fn attitude(&self) -> Range<usize> {
+        self.rails.translations.len()..self.rails.free
+    }
+
+    fn levers(&self, y: &[f64], handle_m: [f64; 3], axis: usize) -> [f64; 6] {
+        let rails = &self.rails;
+        let mut levers = [0.0; 6];
+        if let Some(p) = rails.place[axis] {
+            levers[p] = 1.0;
+        }
+        let [roll, tilt, yaw] = [3, 4, 5].map(|c| rails.coordinate(c, y));
+        let turned = Rotation3::from_euler_angles(roll, tilt, yaw);
+        let row = [0, 1, 2].map(|column| turned[(axis, column)]);
+        let arm = lever(handle_m, row);
+        let j = self.turning.columns(rails, y);
+        for (column, place) in j.into_iter().zip(&rails.place[3..]) {
+            if let Some(p) = *place {
+                levers[p] = dot(column, arm);
             }
         }
-        if rails.height_alone {
-            dy[n] = force[2] * rails.inverse_mass + rails.gravity[2];
-        } else {
-            for &(c, p) in &rails.translations {
-                dy[n + p] = force[c] * rails.inverse_mass + rails.gravity[c];
+        levers
+    }
+
+    fn inverse_masses(&self, y: &[f64]) -> [f64; 6] {
+        let rails = &self.rails;
+        let mut inverse = [0.0; 6];
+        for &(_, p) in &rails.translations {
+            inverse[p] = rails.inverse_mass;
+        }
+        let j = self.turning.columns(rails, y);
+        for (column, place) in j.into_iter().zip(&rails.place[3..]) {
+            if let Some(p) = *place {
+                inverse[p] = 1.0 / dot(column, times(&rails.inertia, column));
             }
         }
-        self.turning.accelerate(rails, torque, y, w, dy);
+        inverse
     }
 
     fn acceleration(&self, y: &[f64], dy: &[f64]) -> [[f64; 3]; 2] {
@@ -391,20 +481,13 @@ impl<T: Turning> Freedoms for Reduced<T> {
     }
 }
 
-/// Of one angle, in one lane: half the instructions of libm's.
 #[inline(always)]
-pub(super) fn sin_cos(x: f64) -> (f64, f64) {
-    let (s, c) = crate::lanes::sin_cos(f64x2::splat(x));
-    (s.to_array()[0], c.to_array()[0])
-}
-
-#[inline(always)]
-pub(super) fn dot(a: [f64; 3], b: [f64; 3]) -> f64 {
+pub(super) fn dot<T: Number>(a: [T; 3], b: [T; 3]) -> T {
     a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
 }
 
 #[inline(always)]
-pub(super) fn cross(a: [f64; 3], b: [f64; 3]) -> [f64; 3] {
+pub(super) fn cross<T: Number>(a: [T; 3], b: [T; 3]) -> [T; 3] {
     [
         a[1] * b[2] - a[2] * b[1],
         a[2] * b[0] - a[0] * b[2],

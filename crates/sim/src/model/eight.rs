@@ -1,7 +1,8 @@
 //! The right-hand side at eight moments side by side, for models all of whose parts are written for that.
 
-use super::{All, Model, Workspace};
+use super::{Model, Workspace};
 use super::{OnEight, Power, PowerOnEight, Stage};
+use crate::freedoms::FreedomsOnEight;
 #[cfg(target_arch = "x86_64")]
 use crate::lanes::{Avx2, Avx512};
 use crate::lanes::{Eight, LANES, Moments, Number, Plain8, Two, Wide};
@@ -13,6 +14,15 @@ const MOST_PAIRS: usize = 8;
 pub trait Registers: Wide {
     /// Applies a term. Only code that runs behind a check of the processor's features may have numbers of this type.
     fn apply(term: &dyn OnEight, t_s: Self, w: &mut Workspace<Eight<Self>>);
+    /// Places the handles.
+    fn gaps(freedoms: &dyn FreedomsOnEight, y: &[Self], w: &mut Workspace<Eight<Self>>);
+    /// Writes the rates of the body's states.
+    fn rates(
+        freedoms: &dyn FreedomsOnEight,
+        y: &[Self],
+        w: &Workspace<Eight<Self>>,
+        dy: &mut [Self],
+    );
     /// Asks an account.
     fn power(account: &dyn PowerOnEight, w: &Workspace<Eight<Self>>) -> Power<Self>;
 }
@@ -21,6 +31,19 @@ impl Registers for Plain8 {
     #[inline(always)]
     fn apply(term: &dyn OnEight, t_s: Self, w: &mut Workspace<Eight<Self>>) {
         term.plain(t_s, w);
+    }
+    #[inline(always)]
+    fn gaps(freedoms: &dyn FreedomsOnEight, y: &[Self], w: &mut Workspace<Eight<Self>>) {
+        freedoms.gaps_plain(y, w);
+    }
+    #[inline(always)]
+    fn rates(
+        freedoms: &dyn FreedomsOnEight,
+        y: &[Self],
+        w: &Workspace<Eight<Self>>,
+        dy: &mut [Self],
+    ) {
+        freedoms.rates_plain(y, w, dy);
     }
     #[inline(always)]
     fn power(account: &dyn PowerOnEight, w: &Workspace<Eight<Self>>) -> Power<Self> {
@@ -37,6 +60,19 @@ impl Registers for Avx2 {
         unsafe { term.avx2(t_s, w) }
     }
     #[inline(always)]
+    fn gaps(freedoms: &dyn FreedomsOnEight, y: &[Self], w: &mut Workspace<Eight<Self>>) {
+        unsafe { freedoms.gaps_avx2(y, w) }
+    }
+    #[inline(always)]
+    fn rates(
+        freedoms: &dyn FreedomsOnEight,
+        y: &[Self],
+        w: &Workspace<Eight<Self>>,
+        dy: &mut [Self],
+    ) {
+        unsafe { freedoms.rates_avx2(y, w, dy) }
+    }
+    #[inline(always)]
     fn power(account: &dyn PowerOnEight, w: &Workspace<Eight<Self>>) -> Power<Self> {
         unsafe { account.avx2(w) }
     }
@@ -51,18 +87,29 @@ impl Registers for Avx512 {
         unsafe { term.avx512(t_s, w) }
     }
     #[inline(always)]
+    fn gaps(freedoms: &dyn FreedomsOnEight, y: &[Self], w: &mut Workspace<Eight<Self>>) {
+        unsafe { freedoms.gaps_avx512(y, w) }
+    }
+    #[inline(always)]
+    fn rates(
+        freedoms: &dyn FreedomsOnEight,
+        y: &[Self],
+        w: &Workspace<Eight<Self>>,
+        dy: &mut [Self],
+    ) {
+        unsafe { freedoms.rates_avx512(y, w, dy) }
+    }
+    #[inline(always)]
     fn power(account: &dyn PowerOnEight, w: &Workspace<Eight<Self>>) -> Power<Self> {
         unsafe { account.avx512(w) }
     }
 }
 
 impl Model {
-    /// Whether the right-hand side can be evaluated at eight moments side by side: six freedoms, few carriers, and every effect written
-    /// for it.
+    /// Whether the right-hand side can be evaluated at eight moments side by side: few carriers, and every effect written for it.
     pub fn on_eight(&self) -> bool {
         let empty = |stage: Stage| self.terms[stage as usize].is_empty();
-        self.freedoms.as_six().is_some()
-            && super::pairs(self.carriers()) <= MOST_PAIRS
+        super::pairs(self.carriers()) <= MOST_PAIRS
             && empty(Stage::Party)
             && empty(Stage::Bends)
             && self.terms.iter().flatten().all(|t| t.on_eight().is_some())
@@ -81,7 +128,7 @@ impl Model {
         dy: &mut [E],
         w: &mut Workspace<Eight<E>>,
     ) {
-        let six = self.freedoms.as_six().expect("six freedoms");
+        let freedoms = self.freedoms.on_eight();
         let (phases, extra) = (self.layout.phase_range(), self.layout.extra_range());
         let apply = |stage: Stage, w: &mut Workspace<Eight<E>>| {
             for term in &self.terms[stage as usize] {
@@ -101,11 +148,11 @@ impl Model {
             apply(Stage::Phases, w);
             apply(Stage::Shoulders, w);
         }
-        six.place_handles(y, w, All);
+        E::gaps(freedoms, y, w);
         apply(Stage::Handles, w);
         w.body_torque = [E::splat(0.0); 3];
         apply(Stage::Body, w);
-        six.rates(y, w, dy);
+        E::rates(freedoms, y, w, dy);
         for (p, rate) in w.pair.iter().zip(dy[phases].chunks_mut(LANES)) {
             for (lane, rate) in rate.iter_mut().enumerate() {
                 *rate = Eight::of(p.rate, lane);

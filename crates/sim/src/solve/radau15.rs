@@ -28,7 +28,7 @@ use crate::energy::unit_j;
 use crate::lanes::{Avx2, Avx512};
 use crate::lanes::{MOMENTS, Plain8};
 use crate::model::{Model, Registers};
-use modes::{Mode, Row, in_body, modes};
+use modes::{Mode, Row, modes};
 use stages::{Demand, Guess, Solved, Stages};
 use tableau::C;
 
@@ -50,10 +50,12 @@ const TRUST: f64 = 3.0;
 const ROUGHLY: f64 = 1e-4;
 /// So much of its unit an energy of the ledger counts in the error.
 const LEDGER: f64 = 0.1;
-/// The modes are computed anew when the vertical has moved by so much in the body.
-const TURNED: f64 = 0.03;
-/// So many steps in a row that the iteration limits, and another method is better.
-const MANY: u32 = 50;
+/// The modes are computed anew when a number of the attitude has changed by so much.
+const TURNED: f64 = 0.015;
+/// A step whose iteration does not converge counts as much as so many that do, and this many more than those are too many: another
+/// method is better.
+const FAILED: u32 = 8;
+const MANY: u32 = 400;
 
 /// Integrates a model.
 pub fn run(
@@ -79,10 +81,15 @@ pub fn run(
     (course.stats, outcome)
 }
 
-/// Whether it is the cheapest for a model: one that can be evaluated at eight moments at once, with contacts whose damping makes explicit
-/// steps short.
+/// Whether it is the cheapest for a model: one that can be evaluated at eight moments at once, on contacts that damp and drive what is
+/// free.
 pub fn suits(model: &Model) -> bool {
-    model.on_eight() && (0..model.carriers()).any(|i| model.springs(i, 2) != [0.0; 2])
+    let (mut rows, mut all) = (Vec::new(), Vec::new());
+    let (y, w) = (model.initial_state(), model.workspace());
+    model.on_eight() && {
+        modes(model, &y, &w, 2..3, &mut rows, &mut all);
+        !all.is_empty()
+    }
 }
 
 /// Goes on from where a course stands: to its end (`true`), or until it turns out that the sweeps limit the steps, or that the model is not
@@ -173,10 +180,11 @@ struct Run<'m, E: Registers> {
     /// Those of sideways springs first, so many.
     modes: Vec<Mode>,
     sideways: usize,
-    sideways_up: [f64; 3],
+    sideways_at: [f64; 4],
     rows: Vec<Row>,
-    /// The vertical in the body when they were computed, and whether contacts have changed since.
-    modes_up: [f64; 3],
+    /// The attitude when they were computed, and whether contacts have changed since.
+    modes_at: [f64; 4],
+    modes_known: bool,
     modes_hold: bool,
     ledger_unit_j: f64,
     looks: Looks,
@@ -185,7 +193,7 @@ struct Run<'m, E: Registers> {
     /// How many handles rest after the jump that the next step begins with, and what a first step could be then.
     jumped: Option<usize>,
     after_jump: [f64; 3],
-    /// Steps in a row that convergence has limited.
+    /// How often convergence has limited the steps lately.
     limited: u32,
 }
 
@@ -210,9 +218,10 @@ impl<'m, E: Solve> Run<'m, E> {
             units: vec![0.0; model.layout().body],
             modes: Vec::new(),
             sideways: 0,
-            sideways_up: [f64::INFINITY; 3],
+            sideways_at: [0.0; 4],
+            modes_known: false,
             rows: Vec::new(),
-            modes_up: [0.0; 3],
+            modes_at: [0.0; 4],
             modes_hold: false,
             ledger_unit_j: unit_j(&model.scene),
             looks: Looks::new(),
@@ -264,22 +273,25 @@ impl<'m, E: Solve> Run<'m, E> {
             };
         }
         // Sideways springs hold whatever the contacts, and little depends on how the body has turned.
-        let up = in_body(y, 2);
-        let moved = |since: &[f64; 3]| {
-            let each = up.iter().zip(since).map(|(a, b)| (a - b).abs());
+        let attitude = &y[model.freedoms().attitude()];
+        let moved = |since: &[f64; 4]| {
+            let each = attitude.iter().zip(since).map(|(a, b)| (a - b).abs());
             each.fold(0.0, f64::max)
         };
-        let sideways = moved(&self.sideways_up) > 10.0 * TURNED;
+        let mut now = [0.0; 4];
+        now[..attitude.len()].copy_from_slice(attitude);
+        let sideways = moved(&self.sideways_at) > 10.0 * TURNED || !self.modes_known;
         if sideways {
             self.modes.clear();
             modes(model, y, &course.w, 0..2, &mut self.rows, &mut self.modes);
-            (self.sideways_up, self.sideways) = (up, self.modes.len());
+            (self.sideways_at, self.sideways) = (now, self.modes.len());
         }
-        if sideways || !self.modes_hold || moved(&self.modes_up) > TURNED {
+        if sideways || !self.modes_hold || moved(&self.modes_at) > TURNED {
             self.modes.truncate(self.sideways);
             modes(model, y, &course.w, 2..3, &mut self.rows, &mut self.modes);
-            (self.modes_up, self.modes_hold) = (up, true);
+            (self.modes_at, self.modes_hold) = (now, true);
         }
+        self.modes_known = true;
     }
 
     /// Solves a step of size h, which counts.
@@ -334,13 +346,13 @@ impl<'m, E: Solve> Run<'m, E> {
                 });
             }
             let part = solved.converged.then_some(shorter / h);
-            self.limited += u32::from(!solved.converged);
+            if !solved.converged {
+                self.limited += FAILED;
+            }
             h = shorter;
             solved = self.solve(h, part);
         }
-        if solved.sweeps < 12 {
-            self.limited = 0;
-        }
+        self.limited = self.limited.saturating_sub(1);
         let tried = h;
         let factor = (SAFETY * solved.error.max(1e-14).powf(-EXPONENT))
             .clamp(SHRINK, if rejected { 1.0 } else { GROW });

@@ -3,7 +3,7 @@
 use crate::lanes::LANES;
 use crate::model::{Model, Workspace};
 
-/// Velocities: three of the centre of mass, three of rotation.
+/// Most velocities that a body has.
 pub const WATCHED: usize = 6;
 /// A mode slower than this leaves the sweeps as they are, 1/s.
 const SLOWEST: f64 = 1.0;
@@ -35,7 +35,7 @@ pub struct Row {
 
 /// Adds the modes that the springs of all handles along some of the world's `axes` have at a state. `rows` is room to work in.
 ///
-/// With M = diag(m, I) and g = (e, p × Rᵀe) the row that takes velocities to the rate of a handle along the axis e, they are the
+/// With M the masses and moments of the velocities and g the row that takes these to the rate of a handle along an axis, they are the
 /// eigenvectors of M^{-1/2} Σ (τ k + c) g gᵀ M^{-1/2} over the springs that act; products of inertia are left out, since a mode only has to be
 /// near. The rows √(τ k + c) M^{-1/2} g are turned two by two until they are at right angles (one-sided Jacobi: Golub & Van Loan, Matrix
 /// Computations, 8.6.3), which for two rows is one turn.
@@ -49,13 +49,9 @@ pub fn modes(
 ) {
     rows.clear();
     let already = all.len();
-    let inverse = &model.body.inverse_inertia;
-    let straight = (1.0 / model.body.mass_kg).sqrt();
-    let turning = [0, 1, 2].map(|a| inverse[(a, a)].sqrt());
-    let scale: [f64; WATCHED] =
-        std::array::from_fn(|a| if a < 3 { straight } else { turning[a - 3] });
+    let freedoms = model.freedoms();
+    let scale = freedoms.inverse_masses(y).map(f64::sqrt);
     for axis in axes {
-        let e = in_body(y, axis);
         for (i, h) in model.scene.carriers.handles_m.iter().enumerate() {
             let [damping, stiffness] = model.springs(i, axis);
             let acts = axis < 2 || w.pair[i / LANES].contact_gain.as_array()[i % LANES] != 0.0;
@@ -63,15 +59,8 @@ pub fn modes(
             if !acts || size == 0.0 {
                 continue;
             }
-            let mut along = [
-                0.0,
-                0.0,
-                0.0,
-                turning[0] * (h[1] * e[2] - h[2] * e[1]),
-                turning[1] * (h[2] * e[0] - h[0] * e[2]),
-                turning[2] * (h[0] * e[1] - h[1] * e[0]),
-            ];
-            along[axis] = straight;
+            let levers = freedoms.levers(y, *h, axis);
+            let along = std::array::from_fn(|a| scale[a] * levers[a]);
             rows.push(Row {
                 along,
                 damping,
@@ -100,7 +89,8 @@ pub fn modes(
         all[kept] = Mode {
             damping_per_s: weighed(|row| row.damping),
             stiffness_per_s2: weighed(|row| row.stiffness),
-            from: std::array::from_fn(|a| v[a] / scale[a]),
+            // A velocity that is held, or that there is not, has no part in it.
+            from: std::array::from_fn(|a| if scale[a] > 0.0 { v[a] / scale[a] } else { 0.0 }),
             to: std::array::from_fn(|a| v[a] * scale[a]),
         };
         kept += 1;
@@ -136,26 +126,4 @@ fn turn_apart(modes: &mut [Mode]) {
 
 fn dot(a: &[f64; WATCHED], b: &[f64; WATCHED]) -> f64 {
     a.iter().zip(b).map(|(a, b)| a * b).sum()
-}
-
-/// One of the world's axes in the body: a row of the rotation.
-pub fn in_body(y: &[f64], axis: usize) -> [f64; 3] {
-    let (x, y, z, w) = (y[3], y[4], y[5], y[6]);
-    match axis {
-        0 => [
-            1.0 - 2.0 * (y * y + z * z),
-            2.0 * (x * y - w * z),
-            2.0 * (x * z + w * y),
-        ],
-        1 => [
-            2.0 * (x * y + w * z),
-            1.0 - 2.0 * (x * x + z * z),
-            2.0 * (y * z - w * x),
-        ],
-        _ => [
-            2.0 * (x * z - w * y),
-            2.0 * (y * z + w * x),
-            1.0 - 2.0 * (x * x + y * y),
-        ],
-    }
 }

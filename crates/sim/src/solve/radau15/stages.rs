@@ -6,10 +6,8 @@ use crate::freedoms::turn;
 use crate::lanes::{Eight, MOMENTS, Moments, Number, Two, f64x2};
 use crate::model::{Model, Registers, Workspace};
 use nalgebra::Complex;
+use std::ops::Range;
 
-/// Positions come first: three of the centre of mass, four of the attitude.
-const POSITIONS: usize = 7;
-const BODY: usize = POSITIONS + WATCHED;
 /// After so many sweeps an iteration that has not ended will not.
 const MOST_SWEEPS: u32 = 16;
 /// From this sweep on the stages are near enough to see that a step is far too long.
@@ -61,6 +59,10 @@ pub struct Stages<E: Registers> {
     pub f: Vec<E>,
     /// What half a unit and more of each state counts: 1/unit.
     pub scale: Vec<f64>,
+    /// Where the body's velocities are; its positions come before them.
+    velocities: Range<usize>,
+    /// Whether the attitude is a quaternion, in which case the body has all thirteen states.
+    quaternion: bool,
     a: Columns<E>,
     legendre: Columns<E>,
     nodes: E,
@@ -107,6 +109,8 @@ impl<E: Registers> Stages<E> {
             y: vec![zero; size],
             f: vec![zero; size],
             scale: vec![0.0; size],
+            velocities: model.freedoms().positions()..model.layout().body,
+            quaternion: model.freedoms().rotation().is_some(),
             a: columns(&TABLEAU.a),
             legendre: columns(&TABLEAU.legendre),
             nodes: E::load(&C),
@@ -234,9 +238,9 @@ impl<E: Registers> Stages<E> {
         let (y, f) = (&mut self.y[..watched], &mut self.f[..watched]);
         let (y0, scale) = (&y0[..watched], &self.scale[..watched]);
         let mut moved = E::splat(0.0);
+        let (from, body) = (self.velocities.start, self.velocities.end);
         let mut by = [E::splat(0.0); WATCHED];
-        for (k, by) in by.iter_mut().enumerate() {
-            let d = POSITIONS + k;
+        for (d, by) in (from..body).zip(&mut by) {
             *by = product(&self.a, &f[d]).madd(step, E::splat(y0[d])) - y[d];
         }
         let residual = by;
@@ -250,23 +254,26 @@ impl<E: Registers> Stages<E> {
                 *by = further.madd(E::splat(to), *by);
             }
         }
-        for (k, by) in by.into_iter().enumerate() {
-            let d = POSITIONS + k;
+        for (d, by) in (from..body).zip(by) {
             y[d] += by;
             let part = by * scale[d];
             moved = part.madd(part, moved);
         }
-        for d in BODY..watched {
+        for d in body..watched {
             let by = product(&self.a, &f[d]).madd(step, E::splat(y0[d])) - y[d];
             y[d] += by;
             let part = by * scale[d];
             moved = part.madd(part, moved);
         }
         // Positions follow from the new velocities.
-        f[..3].copy_from_slice(&y[POSITIONS..POSITIONS + 3]);
-        let turned = turn([y[3], y[4], y[5], y[6]], [y[10], y[11], y[12]]);
-        f[3..POSITIONS].copy_from_slice(&turned);
-        for d in 0..POSITIONS {
+        if self.quaternion {
+            f[..3].copy_from_slice(&y[7..10]);
+            let turned = turn([y[3], y[4], y[5], y[6]], [y[10], y[11], y[12]]);
+            f[3..7].copy_from_slice(&turned);
+        } else {
+            f[..from].copy_from_slice(&y[from..body]);
+        }
+        for d in 0..from {
             let new = product(&self.a, &f[d]).madd(step, E::splat(y0[d]));
             let part = (new - y[d]) * scale[d];
             y[d] = new;
