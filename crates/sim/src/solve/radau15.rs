@@ -338,12 +338,7 @@ impl<'m, E: Solve> Run<'m, E> {
             };
             let shorter = self.fitted(h * factor, left).min(0.95 * h);
             if shorter < SMALLEST_STEP_S && shorter < left {
-                return Err(Stopped::StepTooSmall {
-                    method: NAME,
-                    t_s: t0,
-                    step_s: shorter,
-                    tolerance: self.asked,
-                });
+                return Err(self.too_small(shorter));
             }
             let part = solved.converged.then_some(shorter / h);
             if !solved.converged {
@@ -384,6 +379,16 @@ impl<'m, E: Solve> Run<'m, E> {
             };
             solved = self.solve(cut, Some(cut / h));
             h = cut;
+            // Shorter than what has just been solved, it hardly ever fails.
+            while !solved.converged {
+                self.course.stats.rejected += 1;
+                self.course.check_work()?;
+                h *= 0.5;
+                if h < SMALLEST_STEP_S {
+                    return Err(self.too_small(h));
+                }
+                solved = self.solve(h, None);
+            }
         };
         let end_s = event.map_or(h, |theta| theta * h);
         while let Some(t) = self.course.sample_due(t0 + end_s - 2.0 * SAME_MOMENT_S) {
@@ -420,6 +425,15 @@ impl<'m, E: Solve> Run<'m, E> {
             self.begin();
         }
         Ok(())
+    }
+
+    fn too_small(&self, step_s: f64) -> Stopped {
+        Stopped::StepTooSmall {
+            method: NAME,
+            t_s: self.course.t_s,
+            step_s,
+            tolerance: self.asked,
+        }
     }
 
     /// A step of about h that leaves no crumb before the next moment that must not be crossed.
