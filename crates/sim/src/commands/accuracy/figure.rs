@@ -11,9 +11,9 @@ use kuva::render::render::render_multiple;
 use sim::accuracy::{Rung, Study};
 use std::sync::Arc;
 
-/// Okabe and Ito's colours, which the colour-blind can tell apart; one for each family of methods.
-const COLOURS: [&str; 7] = [
-    "#000000", "#0072B2", "#D55E00", "#009E73", "#E69F00", "#CC79A7", "#56B4E9",
+/// Okabe and Ito's colours, which the colour-blind can tell apart, and a brown; one for each family of methods.
+const COLOURS: [&str; 8] = [
+    "#000000", "#0072B2", "#D55E00", "#009E73", "#E69F00", "#CC79A7", "#56B4E9", "#8C564B",
 ];
 /// A method whose name ends so is its family's without located events.
 const BLIND: &str = "-blind";
