@@ -87,9 +87,9 @@ pub struct Model {
     has_phases: bool,
     /// Whether anything looks at the carriers or acts on the handles.
     carried: bool,
-    terms: [Vec<Box<dyn Term>>; 6],
+    terms: [Vec<Box<dyn Term>>; 7],
     /// Whose each term is, in the same order.
-    owners: [Vec<&'static str>; 6],
+    owners: [Vec<&'static str>; 7],
     building: &'static str,
     /// Names and first values of the effects' own states.
     extra: Vec<(String, f64)>,
@@ -101,6 +101,8 @@ pub struct Model {
     contact_damping: Vec<f64x2>,
     /// Damping and stiffness of every carrier's hold, both ways.
     sideways: [Vec<f64x2>; 2],
+    /// The same of the straps, per newton of load: τ/L (s/m), 1/L (1/m).
+    straps: [f64; 2],
     watches_contact: bool,
     /// Whether there are so many carriers that they are treated block by block.
     in_blocks: bool,
@@ -152,6 +154,7 @@ impl Model {
             contact_exponent: 1.0,
             contact_damping: Vec::new(),
             sideways: Default::default(),
+            straps: [0.0; 2],
             extra: Vec::new(),
             watches_contact: false,
             in_blocks: false,
@@ -273,6 +276,11 @@ impl Model {
         self.sideways = [damping, stiffness];
     }
 
+    /// Damping (s/m) and stiffness (1/m) of every carrier's straps, sideways, per newton of load.
+    pub(crate) fn set_straps(&mut self, damping_s_per_m: f64, stiffness_per_m: f64) {
+        self.straps = [damping_s_per_m, stiffness_per_m];
+    }
+
     /// The clock that ticks at `rate_hz`; sensors of one rate share it.
     pub(crate) fn sensor_clock(&mut self, rate_hz: f64) -> usize {
         let clock = Clock { rate_hz };
@@ -345,17 +353,29 @@ impl Model {
         }
     }
 
-    /// Damping (N·s/m) and stiffness (N/m) of the springs at a carrier's handle along one of the world's axes; zero where there are none.
-    pub(crate) fn springs(&self, carrier: usize, axis: usize) -> [f64; 2] {
+    /// Whether springs at the handles grow with the load.
+    pub(crate) fn has_straps(&self) -> bool {
+        self.straps != [0.0; 2]
+    }
+
+    /// Damping (N·s/m) and stiffness (N/m) of the springs at a carrier's handle along one of the world's axes, and what straps add to both
+    /// per newton of its load (s/m, 1/m); zero where there are none.
+    pub(crate) fn springs(&self, carrier: usize, axis: usize) -> [f64; 4] {
         let of = |springs: &[f64x2]| {
             let pair = springs.get(carrier / lanes::LANES);
             pair.map_or(0.0, |x| x.as_array()[carrier % lanes::LANES])
         };
         if axis < 2 {
-            return [of(&self.sideways[0]), of(&self.sideways[1])];
+            let [damping, stiffness] = &self.sideways;
+            return [of(damping), of(stiffness), self.straps[0], self.straps[1]];
         }
         let stiffness = self.contact_stiffness.get(carrier).copied();
-        [of(&self.contact_damping), stiffness.unwrap_or(0.0)]
+        [
+            of(&self.contact_damping),
+            stiffness.unwrap_or(0.0),
+            0.0,
+            0.0,
+        ]
     }
 
     /// Natural gait frequencies, rad/s.
@@ -437,6 +457,7 @@ impl Model {
             rotation: [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]],
             spin: [0.0; 3],
             least_load_n: 0.0,
+            beat: [0.0; 2],
             body_torque: [0.0; 3],
             extra: self.extra.iter().map(|(_, first)| *first).collect(),
             extra_rate: vec![0.0; self.extra.len()],
@@ -657,8 +678,10 @@ impl Model {
                 pair.stand();
             }
         }
-        for term in &self.terms[Stage::Phases as usize] {
-            term.apply(t_s, w);
+        for stage in [Stage::Clock, Stage::Phases] {
+            for term in &self.terms[stage as usize] {
+                term.apply(t_s, w);
+            }
         }
     }
 

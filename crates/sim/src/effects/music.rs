@@ -139,25 +139,24 @@ impl Music {
         if beat.pieces.len() == 1 && self.pauses.is_empty() {
             let (rate, phase) = (beat.pieces[0].rate, beat.pieces[0].phase);
             model.add(
-                Stage::Phases,
+                Stage::Clock,
                 AsWhole(Steady {
                     onset_s: self.onset_s,
                     rate,
                     phase,
-                    strength,
                     per_s,
                 }),
             );
         } else {
             model.add(
-                Stage::Phases,
+                Stage::Clock,
                 AsWhole(Varied {
                     beat: beat.clone(),
-                    strength,
                     per_s,
                 }),
             );
         }
+        model.add(Stage::Phases, AsWhole(Pull { strength }));
         if !moments.is_empty() {
             model.add_switch(Times(moments));
         }
@@ -168,14 +167,27 @@ impl Music {
 /// Beyond this nobody hears a beat.
 const FASTEST_HZ: f64 = 1000.0;
 
-#[inline(always)]
-fn pull<N: Moments>(w: &mut Workspace<N>, beat_phase: N::Each, strength: &[f64x2], grown: N::Each) {
-    // sin(ψ − φ) from the sines and cosines that are there already.
-    let (sin, cos) = beat_phase.sin_cos();
-    let (sin, cos) = (N::both(sin * grown), N::both(cos * grown));
-    for (p, strength) in w.pair.iter_mut().zip(strength) {
-        p.rate += N::always(*strength) * (p.cos * sin - p.sin * cos);
+/// Draws the phases to the beat that [`Workspace::beat`] tells of.
+#[derive(Debug)]
+struct Pull {
+    strength: Vec<f64x2>,
+}
+
+impl Whole for Pull {
+    #[inline(always)]
+    fn act<N: Moments>(&self, _t_s: N::Each, w: &mut Workspace<N>) {
+        // sin(ψ − φ) from the sines and cosines that are there already.
+        let [sin, cos] = w.beat.map(N::both);
+        for (p, strength) in w.pair.iter_mut().zip(&self.strength) {
+            p.rate += N::always(*strength) * (p.cos * sin - p.sin * cos);
+        }
     }
+}
+
+#[inline(always)]
+fn beat<T: Number>(phase: T, grown: T) -> [T; 2] {
+    let (sin, cos) = phase.sin_cos();
+    [sin * grown, cos * grown]
 }
 
 #[inline(always)]
@@ -193,7 +205,6 @@ struct Steady {
     onset_s: f64,
     rate: f64,
     phase: f64,
-    strength: Vec<f64x2>,
     per_s: Option<f64>,
 }
 
@@ -201,38 +212,32 @@ impl Whole for Steady {
     #[inline(always)]
     fn act<N: Moments>(&self, t_s: N::Each, w: &mut Workspace<N>) {
         // `segment_s` decides, not t: the last stage of the step that ends at the onset still hears nothing.
-        if w.segment_s >= self.onset_s {
-            pull(
-                w,
-                t_s * self.rate + self.phase,
-                &self.strength,
-                grown(self.per_s, t_s + -self.onset_s),
-            );
-        }
+        w.beat = if w.segment_s >= self.onset_s {
+            let grown = grown(self.per_s, t_s + -self.onset_s);
+            beat(t_s * self.rate + self.phase, grown)
+        } else {
+            [N::Each::splat(0.0); 2]
+        };
     }
 }
 
 #[derive(Debug)]
 struct Varied {
     beat: Beat,
-    strength: Vec<f64x2>,
     per_s: Option<f64>,
 }
 
 impl Whole for Varied {
     #[inline(always)]
     fn act<N: Moments>(&self, t_s: N::Each, w: &mut Workspace<N>) {
-        if self.beat.sounds(w.segment_s) {
+        w.beat = if self.beat.sounds(w.segment_s) {
             let piece = self.beat.piece(w.segment_s);
             let s = t_s + -piece.begin_s;
             let phase = s * (s * (0.5 * piece.bend) + piece.rate) + piece.phase;
-            pull(
-                w,
-                phase,
-                &self.strength,
-                grown(self.per_s, t_s + -self.beat.onset_s),
-            );
-        }
+            beat(phase, grown(self.per_s, t_s + -self.beat.onset_s))
+        } else {
+            [N::Each::splat(0.0); 2]
+        };
     }
 }
 

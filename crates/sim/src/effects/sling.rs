@@ -54,6 +54,7 @@ impl Sling {
                 f64::NEG_INFINITY
             },
         };
+        model.set_straps(self.damping_s / self.length_m, 1.0 / self.length_m);
         if scene.effects.hold.is_some() {
             // The hold has set its force already, and its account books all that there is sideways.
             model.add(Stage::Handles, Beside(law));

@@ -14,6 +14,8 @@ pub trait Wide: Number {
     fn load(x: &[f64; MOMENTS]) -> Self;
     /// As an array.
     fn as_array(&self) -> &[f64; MOMENTS];
+    /// The last four before the first four.
+    fn swapped(self) -> Self;
     /// The bits of 2^n for a whole number n within ±1022 that 1.5·2⁵² has been added to.
     #[doc(hidden)]
     fn power_of_two(shifted: Self) -> Self;
@@ -215,6 +217,10 @@ impl Wide for Plain8 {
         &self.0
     }
     #[inline(always)]
+    fn swapped(self) -> Self {
+        Plain8(std::array::from_fn(|l| self.0[(l + 4) % MOMENTS]))
+    }
+    #[inline(always)]
     fn power_of_two(shifted: Self) -> Self {
         Plain8(
             shifted
@@ -334,6 +340,10 @@ mod x86 {
         fn as_array(&self) -> &[f64; MOMENTS] {
             // A register in memory is its numbers in order.
             unsafe { &*std::ptr::from_ref(self).cast() }
+        }
+        #[inline(always)]
+        fn swapped(self) -> Self {
+            Avx512(unsafe { _mm512_shuffle_f64x2::<0b01_00_11_10>(self.0, self.0) })
         }
         #[inline(always)]
         fn power_of_two(shifted: Self) -> Self {
@@ -472,6 +482,10 @@ mod x86 {
             unsafe { &*std::ptr::from_ref(self).cast() }
         }
         #[inline(always)]
+        fn swapped(self) -> Self {
+            Avx2([self.0[1], self.0[0]])
+        }
+        #[inline(always)]
         fn power_of_two(shifted: Self) -> Self {
             Avx2([power_of_two(shifted.0[0]), power_of_two(shifted.0[1])])
         }
@@ -522,6 +536,9 @@ mod tests {
         assert_eq!(E::load(&edges).abs().as_array()[6], 1.0);
         let signs = E::load(&edges).if_positive(E::splat(1.0), E::splat(2.0));
         assert_eq!(signs.as_array()[2..], [2.0, 2.0, 1.0, 1.0, 2.0, 2.0]);
+        let swapped = E::load(&edges).swapped();
+        assert_eq!(swapped.as_array()[..4], edges[4..]);
+        assert_eq!(swapped.as_array()[5..], edges[1..4]);
         assert_eq!(E::splat(2.0).signed_power(3.0).as_array()[0], 8.0);
         assert_eq!((-E::splat(9.0)).signed_power(0.5).as_array()[7], -3.0);
     }

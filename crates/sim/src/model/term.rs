@@ -117,6 +117,8 @@ on_eight!(Whole, AsWhole<T>, |term, t, w| term.0.act(t, w));
 /// Where a term belongs in an evaluation.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Stage {
+    /// Sets what depends on time alone.
+    Clock,
     /// Adds to the phase rates.
     Phases,
     /// Moves the shoulders.

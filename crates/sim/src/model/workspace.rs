@@ -68,6 +68,8 @@ pub struct Workspace<N: Moments = Now> {
     /// within a step and wants the law to go on as it was behind a lift-off that is still to be located. A kink there would be taken for
     /// an error.
     pub least_load_n: f64,
+    /// Sine and cosine of the beat's phase, times how far its pull has grown; 0 in silence.
+    pub beat: [N::Each; 2],
     /// Torque on the body beside that of the handle forces, body axes, N·m.
     pub body_torque: [N::Each; 3],
     /// States of the effects' own.

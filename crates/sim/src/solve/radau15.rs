@@ -6,8 +6,9 @@
 //! A small system on a wide processor: the right-hand side at all eight stages costs hardly more than at one, and the stages follow from it
 //! by one product with (a_ij). Sweeps converge like Picard's iteration, a factor of ten to a hundred each; where a contact damps or drives a
 //! motion faster than the step is long, the sweep solves that mode alone exactly ([`modes`]), and positions follow from new velocities,
-//! so convergence depends on what is left: geometry and coupling. Noise and contacts break a run into pieces of tens of
-//! milliseconds, most of which are one such step, where an explicit method needs four of twelve evaluations.
+//! so convergence depends on what is left: geometry and coupling. Carriers who do not feel the load are solved before it. Noise and
+//! contacts break a run into pieces of tens of milliseconds, most of which are one such step, where an explicit method needs four of twelve
+//! evaluations.
 //!
 //! The stages are a polynomial of degree 8, which holds samples and events; where it does not, the step is taken anew to the moment that
 //! is asked for, from what is known of it. Within a step contacts are frozen, as in [`super::pair`].
@@ -29,7 +30,7 @@ use crate::lanes::{Avx2, Avx512};
 use crate::lanes::{MOMENTS, Plain8};
 use crate::model::{Model, Registers};
 use modes::{Mode, Row, modes};
-use stages::{Demand, Guess, Solved, Stages};
+use stages::{Demand, Guess, Solved, Stages, Step};
 use tableau::C;
 
 const NAME: &str = "radau15";
@@ -116,46 +117,22 @@ pub fn go<'m>(
 
 /// Solves a step with the code for a kind of registers.
 trait Solve: Registers {
-    fn solve(
-        stages: &mut Stages<Self>,
-        model: &Model,
-        start: (f64, &[f64]),
-        h: f64,
-        guess: &Guess<'_>,
-        modes: &[Mode],
-        demand: Demand,
-    ) -> Solved;
+    fn solve(stages: &mut Stages<Self>, step: &Step<'_>) -> Solved;
 }
 
 macro_rules! solve {
     ($type:ident, $function:ident $(, $features:literal)?) => {
         $(#[cfg(target_arch = "x86_64")] #[target_feature(enable = $features)])?
-        fn $function(
-            stages: &mut Stages<$type>,
-            model: &Model,
-            start: (f64, &[f64]),
-            h: f64,
-            guess: &Guess<'_>,
-            modes: &[Mode],
-            demand: Demand,
-        ) -> Solved {
-            stages.solve_here(model, start, h, guess, modes, demand)
+        fn $function(stages: &mut Stages<$type>, step: &Step<'_>) -> Solved {
+            stages.solve_here(step)
         }
         $(#[cfg(target_arch = "x86_64")] #[doc = $features])?
         impl Solve for $type {
-            fn solve(
-                stages: &mut Stages<Self>,
-                model: &Model,
-                start: (f64, &[f64]),
-                h: f64,
-                guess: &Guess<'_>,
-                modes: &[Mode],
-                demand: Demand,
-            ) -> Solved {
+            fn solve(stages: &mut Stages<Self>, step: &Step<'_>) -> Solved {
                 // SAFETY: stages of this type are made only behind a check of the processor's features, in `go`.
                 #[allow(unsafe_code, unused_unsafe)]
                 unsafe {
-                    $function(stages, model, start, h, guess, modes, demand)
+                    $function(stages, step)
                 }
             }
         }
@@ -172,20 +149,21 @@ struct Run<'m, E: Registers> {
     /// As [`TRUST`], for samples: errors of what is only looked at do not add up.
     trust: f64,
     stages: Stages<E>,
-    /// Slope at the start of the step, and how fast it changes as far as is known.
+    /// Slope at the start of the step, and whether the step before has told it, with the margin.
     slope: Vec<f64>,
-    bend: Vec<f64>,
+    slope_known: bool,
+    /// Size of the step accepted last, and at which part of it it ended.
+    before_s: f64,
+    ended: f64,
     at: Vec<f64>,
     units: Vec<f64>,
     /// Those of sideways springs first, so many.
     modes: Vec<Mode>,
     sideways: usize,
-    sideways_at: [f64; 4],
     rows: Vec<Row>,
-    /// The attitude when they were computed, and whether contacts have changed since.
-    modes_at: [f64; 4],
-    modes_known: bool,
-    modes_hold: bool,
+    /// The attitude when those of sideways springs and the others were computed, unless contacts have changed since.
+    sideways_at: Option<[f64; 4]>,
+    upright_at: Option<[f64; 4]>,
     ledger_unit_j: f64,
     looks: Looks,
     margin_n: f64,
@@ -213,16 +191,16 @@ impl<'m, E: Solve> Run<'m, E> {
             trust: (0.1 * settings.tolerance / tolerance).max(TRUST),
             stages: Stages::new(model),
             slope: vec![0.0; size],
-            bend: vec![0.0; size],
+            slope_known: false,
+            before_s: 1.0,
+            ended: 0.0,
             at: vec![0.0; size],
             units: vec![0.0; model.layout().body],
             modes: Vec::new(),
             sideways: 0,
-            sideways_at: [0.0; 4],
-            modes_known: false,
             rows: Vec::new(),
-            modes_at: [0.0; 4],
-            modes_hold: false,
+            sideways_at: None,
+            upright_at: None,
             ledger_unit_j: unit_j(&model.scene),
             looks: Looks::new(),
             margin_n: 0.0,
@@ -258,8 +236,10 @@ impl<'m, E: Solve> Run<'m, E> {
     /// Slope, units and modes at the start of a step.
     fn look_around(&mut self) {
         let course = &mut self.course;
-        course.slope(&mut self.slope);
-        self.margin_n = course.margin_n();
+        if !std::mem::take(&mut self.slope_known) {
+            course.slope(&mut self.slope);
+            self.margin_n = course.margin_n();
+        }
         let (model, y) = (course.model, &course.y);
         model.units(y, &course.w, &mut self.units);
         let watched = model.layout().ledger_range().start;
@@ -272,44 +252,46 @@ impl<'m, E: Solve> Run<'m, E> {
                 LEDGER / (self.ledger_unit_j + LEDGER * y[d].abs())
             };
         }
-        // Sideways springs hold whatever the contacts, and little depends on how the body has turned.
         let attitude = &y[model.freedoms().attitude()];
-        let moved = |since: &[f64; 4]| {
-            let each = attitude.iter().zip(since).map(|(a, b)| (a - b).abs());
-            each.fold(0.0, f64::max)
-        };
         let mut now = [0.0; 4];
         now[..attitude.len()].copy_from_slice(attitude);
-        let sideways = moved(&self.sideways_at) > 10.0 * TURNED || !self.modes_known;
+        let moved = |since: Option<[f64; 4]>, far: f64| {
+            since.is_none_or(|since| now.iter().zip(since).any(|(a, b)| (a - b).abs() > far))
+        };
+        // Sideways springs depend little on how the body has turned.
+        let sideways = moved(self.sideways_at, 10.0 * TURNED);
         if sideways {
             self.modes.clear();
             modes(model, y, &course.w, 0..2, &mut self.rows, &mut self.modes);
-            (self.sideways_at, self.sideways) = (now, self.modes.len());
+            (self.sideways_at, self.sideways) = (Some(now), self.modes.len());
         }
-        if sideways || !self.modes_hold || moved(&self.modes_at) > TURNED {
+        if sideways || moved(self.upright_at, TURNED) {
             self.modes.truncate(self.sideways);
             modes(model, y, &course.w, 2..3, &mut self.rows, &mut self.modes);
-            (self.modes_at, self.modes_hold) = (now, true);
+            self.upright_at = Some(now);
         }
-        self.modes_known = true;
     }
 
     /// Solves a step of size h, which counts.
     fn solve(&mut self, h: f64, part: Option<f64>) -> Solved {
         let guess = match part {
             Some(part) => Guess::Part(part),
-            None => Guess::Slope(&self.slope, &self.bend),
+            None => Guess::Onward {
+                slope: &self.slope,
+                before_s: self.before_s,
+                ended: self.ended,
+            },
         };
-        let (model, start) = (self.course.model, (self.course.t_s, &self.course.y[..]));
-        let solved = E::solve(
-            &mut self.stages,
-            model,
-            start,
-            h,
-            &guess,
-            &self.modes,
-            self.demand,
-        );
+        let step = Step {
+            model: self.course.model,
+            t_s: self.course.t_s,
+            y: &self.course.y,
+            h_s: h,
+            guess,
+            modes: &self.modes,
+            demand: self.demand,
+        };
+        let solved = E::solve(&mut self.stages, &step);
         self.course.stats.evaluations += u64::from(solved.sweeps) * MOMENTS as u64;
         solved
     }
@@ -412,14 +394,21 @@ impl<'m, E: Solve> Run<'m, E> {
             }
         }
         self.course.arrive(t1, observer)?;
-        for (bend, f) in self.bend.iter_mut().zip(&self.stages.f) {
-            let f = f.as_array();
-            *bend = (f[MOMENTS - 1] - f[MOMENTS - 2]) / ((1.0 - C[MOMENTS - 2]) * h);
-        }
+        self.stages.keep();
+        (self.before_s, self.ended) = (h, end_s / h);
         if event.is_some() {
             self.course.fire(observer);
-            self.modes_hold = false;
+            self.upright_at = None;
+            if self.course.model.has_straps() {
+                self.sideways_at = None;
+            }
             self.jumped = Some(self.course.resting_handles().min(2));
+        } else if !switched {
+            for (slope, f) in self.slope.iter_mut().zip(&self.stages.f) {
+                *slope = f.as_array()[MOMENTS - 1];
+            }
+            self.margin_n = self.stages.margins()[MOMENTS - 1];
+            self.slope_known = true;
         }
         if (event.is_some() || switched) && !self.course.finished() {
             self.begin();
@@ -557,7 +546,6 @@ mod tests {
             stages.scale.fill(1.0);
             let mut y = model.initial_state();
             let mut slope = vec![0.0; y.len()];
-            let flat = vec![0.0; y.len()];
             let demand = Demand {
                 tolerance: 1e300,
                 iteration: 1e-15,
@@ -566,8 +554,20 @@ mod tests {
                 let t = h * f64::from(step);
                 model.rhs(t, &y, &mut slope, &mut w);
                 let start = y.clone();
-                let guess = Guess::Slope(&slope, &flat);
-                Plain8::solve(&mut stages, &model, (t, &start), h, &guess, &[], demand);
+                let step = Step {
+                    model: &model,
+                    t_s: t,
+                    y: &start,
+                    h_s: h,
+                    guess: Guess::Onward {
+                        slope: &slope,
+                        before_s: h,
+                        ended: 0.0,
+                    },
+                    modes: &[],
+                    demand,
+                };
+                Plain8::solve(&mut stages, &step);
                 stages.between(&start, 1.0, &mut y);
                 model.freedoms().project(&mut y);
             }

@@ -12,25 +12,38 @@ const WEIGH_S: f64 = 0.01;
 /// Handles more than a few turn against each other in rounds.
 const MOST_ROUNDS: usize = 8;
 
+/// What springs and dampers do along a direction: damping, stiffness, and what straps add to both per newton of load.
+type Springs = [f64; 4];
+
 /// A direction in which the springs and dampers under the handles act alone: u̇ = −d u − κ ∫u.
 #[derive(Clone, Copy, Debug)]
 pub struct Mode {
-    /// d, 1/s
-    pub damping_per_s: f64,
-    /// κ, 1/s²
-    pub stiffness_per_s2: f64,
+    /// d (1/s), κ (1/s²); by the load on all handles together.
+    springs: Springs,
     /// From residuals of the velocities to the mode.
     pub from: [f64; WATCHED],
     /// And back.
     pub to: [f64; WATCHED],
 }
 
-/// A spring and damper at a handle: M^{-1/2} g, with its damping (N·s/m) and stiffness (N/m).
+impl Mode {
+    /// d (1/s) and κ (1/s²) under a load on all handles together, N.
+    #[inline(always)]
+    pub fn at(&self, load_n: f64) -> [f64; 2] {
+        at(&self.springs, load_n)
+    }
+}
+
+#[inline(always)]
+fn at(&[d, k, by_load_d, by_load_k]: &Springs, load_n: f64) -> [f64; 2] {
+    [d + by_load_d * load_n, k + by_load_k * load_n]
+}
+
+/// Springs and dampers at a handle: M^{-1/2} g, with their damping (N·s/m) and stiffness (N/m).
 #[derive(Clone, Copy, Debug)]
 pub struct Row {
     along: [f64; WATCHED],
-    damping: f64,
-    stiffness: f64,
+    springs: Springs,
 }
 
 /// Adds the modes that the springs of all handles along some of the world's `axes` have at a state. `rows` is room to work in.
@@ -51,24 +64,25 @@ pub fn modes(
     let already = all.len();
     let freedoms = model.freedoms();
     let scale = freedoms.inverse_masses(y).map(f64::sqrt);
+    let weight_n = model.body.mass_kg * model.body.gravity_m_per_s2.norm();
+    let share = 1.0 / model.carriers() as f64;
     for axis in axes {
         for (i, h) in model.scene.carriers.handles_m.iter().enumerate() {
-            let [damping, stiffness] = model.springs(i, axis);
-            let acts = axis < 2 || w.pair[i / LANES].contact_gain.as_array()[i % LANES] != 0.0;
+            let mut springs = model.springs(i, axis);
+            // Who rests bears a fair share.
+            let rests = w.pair[i / LANES].contact_gain.as_array()[i % LANES] != 0.0;
+            let borne = if rests { share } else { 0.0 };
+            springs[2..].iter_mut().for_each(|x| *x *= borne);
+            let [damping, stiffness] = at(&springs, weight_n);
             let size = (damping + WEIGH_S * stiffness).sqrt();
-            if !acts || size == 0.0 {
+            if size == 0.0 || (axis == 2 && !rests) {
                 continue;
             }
             let levers = freedoms.levers(y, *h, axis);
             let along = std::array::from_fn(|a| scale[a] * levers[a]);
-            rows.push(Row {
-                along,
-                damping,
-                stiffness,
-            });
+            rows.push(Row { along, springs });
             all.push(Mode {
-                damping_per_s: 0.0,
-                stiffness_per_s2: 0.0,
+                springs: [0.0; 4],
                 from: along.map(|x| x * size),
                 to: [0.0; WATCHED],
             });
@@ -82,13 +96,15 @@ pub fn modes(
             continue;
         }
         let v = all[k].from.map(|x| x / size.sqrt());
-        let weighed = |of: fn(&Row) -> f64| -> f64 {
-            let each = rows.iter().map(|row| of(row) * dot(&row.along, &v).powi(2));
-            each.sum()
-        };
+        let mut springs = [0.0; 4];
+        for row in &*rows {
+            let part = dot(&row.along, &v).powi(2);
+            for (sum, x) in springs.iter_mut().zip(row.springs) {
+                *sum += x * part;
+            }
+        }
         all[kept] = Mode {
-            damping_per_s: weighed(|row| row.damping),
-            stiffness_per_s2: weighed(|row| row.stiffness),
+            springs,
             // A velocity that is held, or that there is not, has no part in it.
             from: std::array::from_fn(|a| if scale[a] > 0.0 { v[a] / scale[a] } else { 0.0 }),
             to: std::array::from_fn(|a| v[a] * scale[a]),

@@ -1,11 +1,10 @@
 //! The stages of one step, all eight side by side.
 
 use super::modes::{Mode, WATCHED};
-use super::tableau::{C, TABLEAU, with_start};
+use super::tableau::{C, HALF, TABLEAU, with_start};
 use crate::freedoms::turn;
 use crate::lanes::{Eight, MOMENTS, Moments, Number, Two, f64x2};
 use crate::model::{Model, Registers, Workspace};
-use nalgebra::Complex;
 use std::ops::Range;
 
 /// After so many sweeps an iteration that has not ended will not.
@@ -17,21 +16,59 @@ const HOPELESS: f64 = 20.0;
 /// A mode that a step hardly moves is left to the sweeps.
 const SLIGHT: f64 = 0.08;
 
+/// So many Legendre coefficients of the slopes of a step say how the next begins.
+const REACH: usize = 6;
+
+/// P_k(2x − 1) and their integrals from 0 to x.
+#[inline(always)]
+fn integrals<T: Number>(x: T) -> [(T, T); REACH] {
+    let z = x * 2.0 + -1.0;
+    let mut p = [T::splat(1.0); REACH + 1];
+    p[1] = z;
+    for k in 1..REACH {
+        let n = k as f64;
+        p[k + 1] = (p[k] * z * (2.0 * n + 1.0) - p[k - 1] * n) * (1.0 / (n + 1.0));
+    }
+    std::array::from_fn(|k| {
+        if k == 0 {
+            (p[0], x)
+        } else {
+            (p[k], (p[k + 1] - p[k - 1]) * (0.5 / (2.0 * k as f64 + 1.0)))
+        }
+    })
+}
+
 /// A matrix by columns.
 type Columns<E> = [E; MOMENTS];
 
 /// Where the iteration begins.
 pub enum Guess<'a> {
-    /// The slope at the start, and how fast it changes.
-    Slope(&'a [f64], &'a [f64]),
+    /// On from the step accepted last: its size, and the part of it that it ended at. Its slopes, bent so that they begin with `slope`.
+    Onward {
+        slope: &'a [f64],
+        before_s: f64,
+        ended: f64,
+    },
     /// This part of the step solved last, which began at the same state.
     Part(f64),
+}
+
+/// A step to be solved.
+pub struct Step<'a> {
+    pub model: &'a Model,
+    /// Where it begins.
+    pub t_s: f64,
+    pub y: &'a [f64],
+    pub h_s: f64,
+    pub guess: Guess<'a>,
+    pub modes: &'a [Mode],
+    pub demand: Demand,
 }
 
 /// What is known of a step that was solved.
 #[derive(Clone, Copy, Debug)]
 pub struct Solved {
-    /// How often the right-hand side was evaluated at all stages.
+    /// How often the right-hand side was evaluated at all stages; where the phases alone were, it does not count.
     pub sweeps: u32,
     /// The error at its end, in units of the tolerance.
     pub error: f64,
@@ -50,6 +87,25 @@ pub struct Demand {
     pub iteration: f64,
 }
 
+/// (a_ij) seen from its eigenvectors, four real parts and four imaginary parts side by side.
+struct Eigen<E> {
+    to: Columns<E>,
+    from: Columns<E>,
+    values: E,
+    squares: E,
+    /// 1 for real parts, 0 for imaginary parts; and the other way round.
+    real: E,
+    imaginary: E,
+}
+
+/// Multiplies by (1 + h d A + h² κ A²)⁻¹ − 1 of a mode, as a complex number for each eigenvalue of A.
+struct Solver<E> {
+    mode: Mode,
+    /// Its real parts, twice; and its imaginary parts, those that meet imaginary parts with the other sign.
+    straight: E,
+    across: E,
+}
+
 /// Stages of a step and what they are computed with.
 pub struct Stages<E: Registers> {
     pub w: Workspace<Eight<E>>,
@@ -57,6 +113,9 @@ pub struct Stages<E: Registers> {
     pub y: Vec<E>,
     /// Slopes at the nodes.
     pub f: Vec<E>,
+    /// Legendre coefficients of the slopes: of the step solved last, and of the one accepted last.
+    parts: Vec<E>,
+    smooth: Vec<E>,
     /// What half a unit and more of each state counts: 1/unit.
     pub scale: Vec<f64>,
     /// Where the body's velocities are; its positions come before them.
@@ -66,7 +125,10 @@ pub struct Stages<E: Registers> {
     a: Columns<E>,
     legendre: Columns<E>,
     nodes: E,
-    solvers: Vec<(Mode, Columns<E>)>,
+    eigen: Eigen<E>,
+    solvers: Vec<Solver<E>>,
+    /// Whether the phases, where there are any, are solved before the rest.
+    carriers_lead: bool,
     watch: Vec<(Two<E>, Two<E>)>,
     margin: E,
 }
@@ -89,6 +151,47 @@ fn product<E: Registers>(m: &Columns<E>, x: &E) -> E {
     even + odd
 }
 
+/// The largest of eight; not a number where one of them is not.
+#[inline(always)]
+fn largest<E: Registers>(of: &E) -> f64 {
+    let m = of.as_array();
+    let larger = |a: f64, b: f64| if a > b { a } else { b };
+    // A comparison loses what is not a number, a sum does not.
+    let total: f64 = m.iter().sum();
+    if total.is_finite() {
+        larger(
+            larger(larger(m[0], m[1]), larger(m[2], m[3])),
+            larger(larger(m[4], m[5]), larger(m[6], m[7])),
+        )
+    } else {
+        f64::NAN
+    }
+}
+
+/// What a sweep leaves of what it changed, as far as the last two tell; what a first one leaves is not known before the second.
+#[inline(always)]
+fn rate(change: f64, last: f64) -> f64 {
+    const FIRST: f64 = 0.8;
+    if last.is_finite() {
+        (change / last).min(FIRST)
+    } else {
+        FIRST
+    }
+}
+
+/// How the carriers' phases are solved.
+#[derive(Clone, Copy, PartialEq)]
+enum Carriers {
+    /// Before the load, which they do not feel.
+    Lead,
+    /// They are: only what follows from them is still to be known.
+    Settle,
+    /// They are, and so is what follows from them.
+    Solved,
+    /// With the load.
+    Feel,
+}
+
 impl<E: Registers> Stages<E> {
     /// For a model's states.
     #[inline(always)]
@@ -102,43 +205,67 @@ impl<E: Registers> Stages<E> {
                 rotation: [[zero; 3]; 3],
                 spin: [zero; 3],
                 least_load_n: 0.0,
+                beat: [zero; 2],
                 body_torque: [zero; 3],
                 extra: Vec::new(),
                 extra_rate: Vec::new(),
             },
             y: vec![zero; size],
             f: vec![zero; size],
+            parts: vec![zero; size],
+            smooth: vec![zero; size],
             scale: vec![0.0; size],
             velocities: model.freedoms().positions()..model.layout().body,
             quaternion: model.freedoms().rotation().is_some(),
             a: columns(&TABLEAU.a),
             legendre: columns(&TABLEAU.legendre),
             nodes: E::load(&C),
+            eigen: Eigen {
+                to: columns(&TABLEAU.to_eigen),
+                from: columns(&TABLEAU.from_eigen),
+                values: E::load(&TABLEAU.values),
+                squares: E::load(&TABLEAU.squares),
+                real: E::load(&std::array::from_fn(|m| f64::from(u8::from(m < HALF)))),
+                imaginary: E::load(&std::array::from_fn(|m| f64::from(u8::from(m >= HALF)))),
+            },
             solvers: Vec::new(),
+            carriers_lead: model.carriers_lead(),
             watch: Vec::new(),
             margin: zero,
         }
     }
 
-    /// What undoes h d A + h² κ A² of a mode: (1 + h d A + h² κ A²)⁻¹ − 1, from the eigenvalues of A.
+    /// What undoes h d A + h² κ A² of each mode.
     #[inline(always)]
     fn prepare(&mut self, modes: &[Mode], h: f64) {
         self.solvers.clear();
+        let eigen = &self.eigen;
+        let mut load = E::splat(0.0);
+        for p in &self.w.pair {
+            load += Eight::sum(p.normal);
+        }
+        let load_n = (load.as_array().iter().sum::<f64>() / MOMENTS as f64).max(0.0);
         for mode in modes {
-            let (d, k) = (h * mode.damping_per_s, h * h * mode.stiffness_per_s2);
+            let [d, k] = mode.at(load_n);
+            let (d, k) = (h * d, h * h * k);
             if d + k < SLIGHT {
                 continue;
             }
-            let mut matrix = [E::splat(0.0); MOMENTS];
-            for (value, parts) in &TABLEAU.parts {
-                let factor = (value * d + value * value * k + 1.0).inv() - Complex::new(1.0, 0.0);
-                let (re, im) = (E::splat(factor.re), E::splat(-factor.im));
-                for (j, out) in matrix.iter_mut().enumerate() {
-                    *out = re.madd(E::load(&parts[0][j]), *out);
-                    *out = im.madd(E::load(&parts[1][j]), *out);
-                }
-            }
-            self.solvers.push((*mode, matrix));
+            // −x/(1 + x), x = λ h d + λ² h² κ
+            let x = eigen.squares.madd(E::splat(k), eigen.values * d);
+            let all = x + eigen.real;
+            let squares = all * all;
+            let over = E::splat(-1.0) / (squares + squares.swapped());
+            let (re, im) = (all * eigen.real, all * eigen.imaginary);
+            let (re, im) = (re + re.swapped(), im + im.swapped());
+            let turned = x.swapped() * im * (eigen.real - eigen.imaginary);
+            let factor = x.madd(re, turned) * over;
+            let (re, im) = (factor * eigen.real, factor * eigen.imaginary);
+            self.solvers.push(Solver {
+                mode: *mode,
+                straight: re + re.swapped(),
+                across: im - im.swapped(),
+            });
         }
     }
 
@@ -146,12 +273,30 @@ impl<E: Registers> Stages<E> {
     #[inline(always)]
     fn guess(&mut self, y0: &[f64], h: f64, guess: &Guess<'_>) {
         match guess {
-            Guess::Slope(slope, bend) => {
+            &Guess::Onward {
+                slope,
+                before_s,
+                ended,
+            } => {
                 let t = self.nodes * h;
-                let half = t * t * 0.5;
+                let onward = t.madd(E::splat(1.0 / before_s), E::splat(ended));
+                let (there, here) = (integrals(onward), integrals(ended));
+                let columns: [E; REACH] =
+                    std::array::from_fn(|k| (there[k].1 - E::splat(here[k].1)) * before_s);
+                // The farther, the less of it holds.
+                let reach = match h / before_s {
+                    ..=2.0 => REACH,
+                    ..=5.0 => 3,
+                    _ => 1,
+                };
                 for (d, y) in self.y.iter_mut().enumerate() {
-                    let straight = t.madd(E::splat(slope[d]), E::splat(y0[d]));
-                    *y = half.madd(E::splat(bend[d]), straight);
+                    let part = self.smooth[d].as_array();
+                    let (mut jump, mut guess) = (slope[d], E::splat(y0[d]));
+                    for k in 0..reach {
+                        jump -= part[k] * here[k].0;
+                        guess = columns[k].madd(E::splat(part[k]), guess);
+                    }
+                    *y = t.madd(E::splat(jump), guess);
                 }
             }
             &Guess::Part(part) => {
@@ -165,42 +310,71 @@ impl<E: Registers> Stages<E> {
         }
     }
 
-    /// Solves a step of size h from y0 at t0.
+    /// Solves a step.
     #[inline(always)]
-    pub fn solve_here(
-        &mut self,
-        model: &Model,
-        (t0, y0): (f64, &[f64]),
-        h: f64,
-        guess: &Guess<'_>,
-        modes: &[Mode],
-        demand: Demand,
-    ) -> Solved {
+    pub fn solve_here(&mut self, step: &Step<'_>) -> Solved {
+        let &Step {
+            model,
+            t_s: t0,
+            y: y0,
+            h_s: h,
+            ref guess,
+            modes,
+            demand,
+        } = step;
         let ledger = model.layout().ledger_range();
         let watched = ledger.start;
-        self.prepare(modes, h);
+        let phases = model.layout().phase_range();
         self.guess(y0, h, guess);
         let t = self.nodes.madd(E::splat(h), E::splat(t0));
-        let (mut sweeps, mut last) = (0, f64::INFINITY);
-        // Squares, of sums over all states.
-        let enough = demand.iteration * demand.iteration * watched as f64;
+        model.clock_at_eight(t, &mut self.w);
+        let mut carriers = if !self.carriers_lead {
+            Carriers::Feel
+        } else if phases.is_empty() {
+            Carriers::Solved
+        } else {
+            Carriers::Lead
+        };
+        let (mut sweeps, mut rounds, mut last) = (0, 0, f64::INFINITY);
+        // Squares, of sums over states.
+        let enough = demand.iteration * demand.iteration;
         let mut converged = false;
+        // Each function is called at one place: at two it is not inlined, nor are the registers' operations then.
         loop {
-            // The only call: at two places it is not inlined, nor are the registers' operations then.
-            model.motion_at_eight(t, &self.y, &mut self.f, &mut self.w);
+            if carriers != Carriers::Solved {
+                model.phases_at_eight(t, &self.y, &mut self.f, &mut self.w);
+            }
+            if carriers == Carriers::Lead {
+                let change = self.follow(y0, h, phases.clone());
+                rounds += 1;
+                if change * rate(change, last) <= enough * phases.len() as f64 {
+                    carriers = Carriers::Settle;
+                } else if !change.is_finite() || rounds >= MOST_SWEEPS {
+                    break;
+                }
+                last = change;
+                continue;
+            }
+            if carriers != Carriers::Solved {
+                model.shoulders_at_eight(t, &mut self.w);
+            }
+            if carriers == Carriers::Settle {
+                (carriers, last) = (Carriers::Solved, f64::INFINITY);
+            }
+            model.load_at_eight(t, &self.y, &mut self.f, &mut self.w);
             sweeps += 1;
+            if sweeps == 1 {
+                self.prepare(modes, h);
+            }
             // Nothing feeds the ledger's errors back to the motion, so no sweep takes them away: it is booked at the stages as they are.
             if converged {
                 break;
             }
-            let change = self.sweep(y0, h, watched);
-            // What a first sweep leaves is not known before the second.
-            let rate = if last.is_finite() {
-                (change / last).min(0.8)
-            } else {
-                0.8
-            };
-            converged = change * rate <= enough;
+            let mut change = self.sweep(y0, h);
+            if carriers == Carriers::Feel {
+                change += self.follow(y0, h, self.velocities.end..watched);
+            }
+            converged = change * rate(change, last) <= enough * watched as f64;
             let telling =
                 sweeps == TELLING && self.errors(watched, h, demand.tolerance).0 > HOPELESS;
             if telling || !change.is_finite() || sweeps >= MOST_SWEEPS {
@@ -231,36 +405,46 @@ impl<E: Registers> Stages<E> {
         }
     }
 
-    /// New stages from the slopes at the old ones. The largest sum of squares, over the states, of what they moved by, in units.
+    /// New stages of some states that nothing makes stiff, from the slopes at the old ones; returns as [`Self::sweep`].
     #[inline(always)]
-    fn sweep(&mut self, y0: &[f64], h: f64, watched: usize) -> f64 {
+    fn follow(&mut self, y0: &[f64], h: f64, states: Range<usize>) -> f64 {
         let step = E::splat(h);
-        let (y, f) = (&mut self.y[..watched], &mut self.f[..watched]);
-        let (y0, scale) = (&y0[..watched], &self.scale[..watched]);
         let mut moved = E::splat(0.0);
+        for d in states {
+            let new = product(&self.a, &self.f[d]).madd(step, E::splat(y0[d]));
+            let part = (new - self.y[d]) * self.scale[d];
+            self.y[d] = new;
+            moved = part.madd(part, moved);
+        }
+        largest(&moved)
+    }
+
+    /// New stages of the body from the slopes at the old ones. The largest sum of squares, over the states, of what they moved by, in units.
+    #[inline(always)]
+    fn sweep(&mut self, y0: &[f64], h: f64) -> f64 {
+        let step = E::splat(h);
         let (from, body) = (self.velocities.start, self.velocities.end);
+        let (y, f) = (&mut self.y[..body], &mut self.f[..body]);
+        let (y0, scale) = (&y0[..body], &self.scale[..body]);
+        let mut moved = E::splat(0.0);
         let mut by = [E::splat(0.0); WATCHED];
         for (d, by) in (from..body).zip(&mut by) {
             *by = product(&self.a, &f[d]).madd(step, E::splat(y0[d])) - y[d];
         }
         let residual = by;
-        for (mode, matrix) in &self.solvers {
-            let mut along = residual[0] * mode.from[0];
+        for solver in &self.solvers {
+            let mut along = residual[0] * solver.mode.from[0];
             for a in 1..WATCHED {
-                along = residual[a].madd(E::splat(mode.from[a]), along);
+                along = residual[a].madd(E::splat(solver.mode.from[a]), along);
             }
-            let further = product(matrix, &along);
-            for (by, &to) in by.iter_mut().zip(&mode.to) {
+            let along = product(&self.eigen.to, &along);
+            let turned = along.swapped() * solver.across;
+            let further = product(&self.eigen.from, &solver.straight.madd(along, turned));
+            for (by, &to) in by.iter_mut().zip(&solver.mode.to) {
                 *by = further.madd(E::splat(to), *by);
             }
         }
         for (d, by) in (from..body).zip(by) {
-            y[d] += by;
-            let part = by * scale[d];
-            moved = part.madd(part, moved);
-        }
-        for d in body..watched {
-            let by = product(&self.a, &f[d]).madd(step, E::splat(y0[d])) - y[d];
             y[d] += by;
             let part = by * scale[d];
             moved = part.madd(part, moved);
@@ -279,18 +463,7 @@ impl<E: Registers> Stages<E> {
             y[d] = new;
             moved = part.madd(part, moved);
         }
-        let m = moved.as_array();
-        let larger = |a: f64, b: f64| if a > b { a } else { b };
-        // A comparison loses what is not a number, a sum does not.
-        let total: f64 = m.iter().sum();
-        if total.is_finite() {
-            larger(
-                larger(larger(m[0], m[1]), larger(m[2], m[3])),
-                larger(larger(m[4], m[5]), larger(m[6], m[7])),
-            )
-        } else {
-            f64::NAN
-        }
+        largest(&moved)
     }
 
     /// Errors at the end of the step and between the stages, in units of the tolerance, from the last Legendre coefficients of the slopes.
@@ -299,10 +472,12 @@ impl<E: Registers> Stages<E> {
     /// leaves out the next, e₇ (e₇/e₅), whose integrals are less than 1/17 of them. At the end of the step Radau's nodes integrate to
     /// degree 14, as far beyond again; half of that is claimed: e₇ (e₇/e₅)², of order 12.
     #[inline(always)]
-    fn errors(&self, states: usize, h: f64, tolerance: f64) -> (f64, f64) {
+    fn errors(&mut self, states: usize, h: f64, tolerance: f64) -> (f64, f64) {
         let mut squares = E::splat(0.0);
-        for (f, scale) in self.f[..states].iter().zip(&self.scale) {
-            let part = product(&self.legendre, f) * *scale;
+        let each = self.f[..states].iter().zip(&mut self.parts);
+        for ((f, part), scale) in each.zip(&self.scale) {
+            *part = product(&self.legendre, f);
+            let part = *part * *scale;
             squares = part.madd(part, squares);
         }
         let s = squares.as_array();
@@ -311,6 +486,11 @@ impl<E: Registers> Stages<E> {
         let ratio = (last / before.max(f64::MIN_POSITIVE)).min(1.0);
         let of = |part: f64| last * part / tolerance;
         (of(ratio.powi(2)), of(ratio / 17.0))
+    }
+
+    /// The step solved last is accepted.
+    pub fn keep(&mut self) {
+        std::mem::swap(&mut self.parts, &mut self.smooth);
     }
 
     /// How far the contacts are from an event at each node, N.

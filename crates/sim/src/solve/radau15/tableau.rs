@@ -10,6 +10,9 @@ use std::sync::LazyLock;
 
 type Square<T> = [[T; MOMENTS]; MOMENTS];
 
+/// Eigenvalues come in pairs.
+pub const HALF: usize = MOMENTS / 2;
+
 /// c_i
 pub const C: [f64; MOMENTS] = [
     0.022479386438712498109,
@@ -113,8 +116,14 @@ pub struct Tableau {
     pub legendre: Square<f64>,
     /// Weights of barycentric interpolation at 0 and the nodes.
     pub barycentric: [f64; MOMENTS + 1],
-    /// Eigenvalues of (a_ij) with positive imaginary part, and twice the projectors on their eigenvectors, real and imaginary part.
-    pub parts: [(Complex<f64>, [Square<f64>; 2]); MOMENTS / 2],
+    /// Eigenvalues of (a_ij) with positive imaginary part: four real parts, four imaginary parts.
+    pub values: [f64; MOMENTS],
+    /// Their squares.
+    pub squares: [f64; MOMENTS],
+    /// From values at the nodes to what they have of the eigenvectors, real parts and imaginary parts.
+    pub to_eigen: Square<f64>,
+    /// And back.
+    pub from_eigen: Square<f64>,
 }
 
 /// Computed when it is first asked for.
@@ -128,19 +137,34 @@ impl Tableau {
         let columns = |m: &SMatrix<f64, MOMENTS, MOMENTS>| -> Square<f64> {
             std::array::from_fn(|j| std::array::from_fn(|i| m[(i, j)]))
         };
-        let mut values: [Complex<f64>; MOMENTS] = a.complex_eigenvalues().into();
-        values.sort_by(|a, b| b.im.total_cmp(&a.im));
+        let mut all: [Complex<f64>; MOMENTS] = a.complex_eigenvalues().into();
+        all.sort_by(|a, b| b.im.total_cmp(&a.im));
         let wide = a.map(|x| Complex::new(x, 0.0));
         let one = SMatrix::<Complex<f64>, MOMENTS, MOMENTS>::identity();
-        let parts = std::array::from_fn(|m| {
-            // Π (A − λ_j)/(λ_m − λ_j) over the other eigenvalues.
-            let others = (0..MOMENTS).filter(|&j| j != m);
-            let projector = others.fold(one, |product, j| {
-                product * (wide - one * values[j]) / (values[m] - values[j])
+        let values = &all[..HALF];
+        let (mut to, mut from) = ([[0.0; MOMENTS]; MOMENTS], [[0.0; MOMENTS]; MOMENTS]);
+        for m in 0..HALF {
+            // Π (A − λ_j)/(λ_m − λ_j) over the other eigenvalues is v wᵀ: a right and a left eigenvector.
+            let others = all.iter().filter(|&&other| other != values[m]);
+            let projector = others.fold(one, |product, &other| {
+                product * (wide - one * other) / (values[m] - other)
             });
-            let part = |pick: fn(&Complex<f64>) -> f64| columns(&projector.map(|x| 2.0 * pick(&x)));
-            (values[m], [part(|x| x.re), part(|x| x.im)])
-        });
+            let size = |k: &usize| projector.column(*k).norm();
+            let column = (0..MOMENTS)
+                .max_by(|a, b| size(a).total_cmp(&size(b)))
+                .unwrap_or(0);
+            let right = projector.column(column).normalize();
+            let left = right.adjoint() * projector;
+            for i in 0..MOMENTS {
+                (to[i][m], to[i][HALF + m]) = (left[i].re, left[i].im);
+                // With its conjugate a pair counts twice its real part.
+                (from[m][i], from[HALF + m][i]) = (2.0 * right[i].re, -2.0 * right[i].im);
+            }
+        }
+        let side_by_side = |each: fn(Complex<f64>) -> Complex<f64>| {
+            let parts: [Complex<f64>; MOMENTS] = std::array::from_fn(|m| each(values[m % HALF]));
+            std::array::from_fn(|m| if m < HALF { parts[m].re } else { parts[m].im })
+        };
         let nodes = with_start();
         Self {
             a: columns(&a),
@@ -149,7 +173,10 @@ impl Tableau {
                 let others = (0..=MOMENTS).filter(|&j| j != i);
                 others.map(|j| 1.0 / (nodes[i] - nodes[j])).product()
             }),
-            parts,
+            values: side_by_side(|x| x),
+            squares: side_by_side(|x| x * x),
+            to_eigen: to,
+            from_eigen: from,
         }
     }
 }
@@ -205,18 +232,34 @@ mod tests {
     }
 
     #[test]
-    fn projectors_resolve_the_matrix() {
-        // Σ Re(λ P) = A and Σ Re P = 1, each over pairs.
-        for i in 0..MOMENTS {
-            for j in 0..MOMENTS {
-                let (mut a, mut one) = (0.0, 0.0);
-                for (value, [re, im]) in &TABLEAU.parts {
-                    one += re[j][i];
-                    a += value.re * re[j][i] - value.im * im[j][i];
+    fn eigenvectors_resolve_the_matrix() {
+        // from·to = 1 and from·λ·to = A, where λ turns the parts of an eigenvector into each other.
+        for j in 0..MOMENTS {
+            let to = TABLEAU.to_eigen[j];
+            let times = |m: usize| {
+                let (re, im) = (TABLEAU.values[m % HALF], TABLEAU.values[m % HALF + HALF]);
+                if m < HALF {
+                    re * to[m] - im * to[m + HALF]
+                } else {
+                    re * to[m] + im * to[m - HALF]
                 }
-                assert!((one - f64::from(u8::from(i == j))).abs() < 1e-9);
-                assert!((a - A[i][j]).abs() < 1e-9);
+            };
+            for i in 0..MOMENTS {
+                let sum = |part: &dyn Fn(usize) -> f64| -> f64 {
+                    (0..MOMENTS)
+                        .map(|m| TABLEAU.from_eigen[m][i] * part(m))
+                        .sum()
+                };
+                let one = sum(&|m| to[m]);
+                // The eigenvectors are far from a right angle to each other.
+                assert!((one - f64::from(u8::from(i == j))).abs() < 1e-10, "{one}");
+                assert!((sum(&times) - A[i][j]).abs() < 1e-10, "{i} {j}");
             }
+        }
+        let re = |m: usize| Complex::new(TABLEAU.values[m], TABLEAU.values[m + HALF]);
+        for m in 0..HALF {
+            let square = Complex::new(TABLEAU.squares[m], TABLEAU.squares[m + HALF]);
+            assert!((re(m) * re(m) - square).norm() < 1e-16);
         }
     }
 }
