@@ -162,7 +162,7 @@ impl<'m> Recorder<'m> {
         self.write_beats(s.t_s)?;
         self.write_sound(s.t_s)?;
         let t_ns = self.stamp_ns(s.t_s);
-        let [roll_rad, pitch_rad, yaw_rad] = s.roll_pitch_yaw_rad;
+        let [roll_rad, pitch_rad, yaw_rad] = s.pose.roll_pitch_yaw_rad();
         let [x, y, z, w] = s.pose.orientation;
         self.writer.message(
             self.state,
@@ -454,7 +454,7 @@ fn motion(s: &Sample, t_ns: i64) -> JointState {
     let [x, y, z, w] = s.pose.orientation;
     let world_from_body = UnitQuaternion::new_normalize(Quaternion::new(w, x, y, z));
     let moment = world_from_body.inverse_transform_vector(&moment);
-    let [roll_rad, tilt_rad, _] = s.roll_pitch_yaw_rad;
+    let [roll_rad, tilt_rad, _] = s.pose.roll_pitch_yaw_rad();
     let [spin_x, spin_y, _] = s.pose.spin_rad_per_s;
     JointState {
         header: Header {

@@ -14,8 +14,6 @@ pub struct Sample {
     pub t_s: f64,
     /// Pose in the world, the walk of the party included.
     pub pose: Pose,
-    /// Roll, pitch, yaw, rad (REP-103).
-    pub roll_pitch_yaw_rad: [f64; 3],
     /// φ_i, rad, unwrapped; empty when nobody has a gait.
     pub phase_rad: Vec<f64>,
     /// ψ, rad, once the music has begun.
@@ -159,7 +157,6 @@ fn blank(model: &Model) -> Sample {
             velocity_m_per_s: [0.0; 3],
             spin_rad_per_s: [0.0; 3],
         },
-        roll_pitch_yaw_rad: [0.0; 3],
         phase_rad: vec![0.0; model.layout().phases],
         beat_phase_rad: None,
         normal_n: vec![0.0; n],
@@ -177,7 +174,6 @@ impl Observer for Bridge<'_> {
         let walk = model.scene.carriers.walk_m_per_s;
         s.t_s = t_s;
         s.pose = model.freedoms().pose(y);
-        s.roll_pitch_yaw_rad = s.pose.roll_pitch_yaw_rad();
         s.phase_rad
             .copy_from_slice(&y[model.layout().phase_range()]);
         s.beat_phase_rad = model

@@ -259,9 +259,9 @@ fn val_a_turn_takes_the_body_round() {
     let all = samples(&s);
     let last = all.last().unwrap();
     assert!(
-        (last.roll_pitch_yaw_rad[2] - turn).abs() < 1e-4,
+        (last.pose.roll_pitch_yaw_rad()[2] - turn).abs() < 1e-4,
         "{:?}",
-        last.roll_pitch_yaw_rad
+        last.pose.roll_pitch_yaw_rad()
     );
     assert!(
         last.pose.velocity_m_per_s[0].abs() < 1e-3

@@ -61,7 +61,9 @@ fn errors(case: &str, name: &str, tolerance: f64) -> Errors {
                     .sum::<f64>()
                     .sqrt()
                     .atan2(real.abs());
-            e.roll_rad = e.roll_rad.max((s.roll_pitch_yaw_rad[0] - row[1]).abs());
+            e.roll_rad = e
+                .roll_rad
+                .max((s.pose.roll_pitch_yaw_rad()[0] - row[1]).abs());
             e.z_m = e.z_m.max((s.pose.position_m[2] - row[2]).abs());
             e.turn_rad = e.turn_rad.max(turn);
             true

@@ -212,11 +212,12 @@ fn three_hundred_random_scenes_run() {
             &settings,
             &mut |s: &Sample| {
                 samples += 1;
+                let angles = s.pose.roll_pitch_yaw_rad();
                 let numbers = s
                     .pose
                     .position_m
                     .iter()
-                    .chain(&s.roll_pitch_yaw_rad)
+                    .chain(&angles)
                     .chain(&s.normal_n)
                     .chain(&s.phase_rad);
                 all_finite &= numbers

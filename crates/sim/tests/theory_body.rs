@@ -148,8 +148,8 @@ fn val_forced_roll_amplitude() {
         let (mut s, mut co) = (0.0, 0.0);
         for x in late {
             let a = TAU * hz * x.t_s;
-            s += x.roll_pitch_yaw_rad[0] * a.sin() / 32.0;
-            co += x.roll_pitch_yaw_rad[0] * a.cos() / 32.0;
+            s += x.pose.roll_pitch_yaw_rad()[0] * a.sin() / 32.0;
+            co += x.pose.roll_pitch_yaw_rad()[0] * a.cos() / 32.0;
         }
         let w = TAU * hz;
         let drive = 2.0 * l * amplitude * f64::hypot(k, c * w);
@@ -217,7 +217,7 @@ impl Hanging {
         ));
         samples(&scene)
             .iter()
-            .map(|s| s.roll_pitch_yaw_rad[0])
+            .map(|s| s.pose.roll_pitch_yaw_rad()[0])
             .collect()
     }
 

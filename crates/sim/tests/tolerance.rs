@@ -22,7 +22,7 @@ fn course(model: &Model, name: &str, tolerance: f64) -> Vec<[f64; 2]> {
         method(name).unwrap(),
         &settings,
         &mut |s: &Sample| {
-            all.push([s.roll_pitch_yaw_rad[0], s.pose.position_m[2]]);
+            all.push([s.pose.roll_pitch_yaw_rad()[0], s.pose.position_m[2]]);
             true
         },
     );

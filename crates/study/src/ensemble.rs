@@ -77,7 +77,7 @@ impl Columns {
     /// Adds a sample.
     pub fn push(&mut self, s: &Sample) {
         let i = &mut self.inputs;
-        let [roll, pitch, yaw] = s.roll_pitch_yaw_rad;
+        let [roll, pitch, yaw] = s.pose.roll_pitch_yaw_rad();
         i.t_s.push(s.t_s);
         i.height_m.push(s.pose.position_m[2]);
         i.roll_rad.push(roll);

@@ -69,7 +69,7 @@ fn worst(a: &[f64], b: &[f64], difference: impl Fn(f64, f64) -> f64) -> f64 {
 impl Course {
     pub fn push(&mut self, s: &Sample) {
         self.t_s.push(s.t_s);
-        self.roll_rad.push(s.roll_pitch_yaw_rad[0]);
+        self.roll_rad.push(s.pose.roll_pitch_yaw_rad()[0]);
         self.height_m.push(s.pose.position_m[2]);
         self.normal_n.extend_from_slice(&s.normal_n);
         if let Some(e) = &s.energy {

@@ -68,11 +68,12 @@ impl Checks {
     pub fn sound(&mut self, run: &Run) {
         for s in &run.samples {
             let energy = s.energy.map(|e| e.unexplained_j);
+            let angles = s.pose.roll_pitch_yaw_rad();
             let numbers = s.pose.position_m.iter().chain(&s.pose.velocity_m_per_s);
             let numbers = numbers
                 .chain(&s.pose.spin_rad_per_s)
                 .chain(&s.pose.orientation);
-            let numbers = numbers.chain(&s.normal_n).chain(&s.roll_pitch_yaw_rad);
+            let numbers = numbers.chain(&s.normal_n).chain(&angles);
             let numbers = numbers.chain(&s.phase_rad).chain(&energy);
             if !numbers
                 .chain(s.tangential_n.iter().flatten())
@@ -131,7 +132,7 @@ impl Checks {
         for (x, y) in a.iter().zip(b) {
             let off = [
                 x.pose.position_m[2] - y.pose.position_m[2],
-                x.roll_pitch_yaw_rad[0] - y.roll_pitch_yaw_rad[0],
+                x.pose.roll_pitch_yaw_rad()[0] - y.pose.roll_pitch_yaw_rad()[0],
                 (x.normal_n.iter().sum::<f64>() - y.normal_n.iter().sum::<f64>()) / force_n,
             ];
             for (w, o) in worst.iter_mut().zip(off) {

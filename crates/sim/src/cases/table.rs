@@ -223,7 +223,7 @@ pub const CASES: &[Case] = &[
         format!("duration_s = 10.0\n{FREE}angular_velocity_rad_per_s = [3.0, 0.0, 0.0]\n"),
         |r, c| {
             c.ended(r);
-            c.every("roll, rad", &r.samples, r.bound(1e-7, 1e-4), |s| (turned(s.roll_pitch_yaw_rad[0], 3.0 * s.t_s), 0.0));
+            c.every("roll, rad", &r.samples, r.bound(1e-7, 1e-4), |s| (turned(s.pose.roll_pitch_yaw_rad()[0], 3.0 * s.t_s), 0.0));
         }),
     case!("gimbal", every, "pitch through ±90°, a sample at exactly 90°",
         "the quaternion is that of the turn; roll, pitch, yaw make the same rotation",
@@ -236,7 +236,7 @@ pub const CASES: &[Case] = &[
                 ((s.pose.orientation[1] * half.sin() + s.pose.orientation[3] * half.cos()).abs(), 1.0)
             });
             c.every("q·q(roll, pitch, yaw)", &r.samples, 1e-12, |s| {
-                let [a, b, g] = s.roll_pitch_yaw_rad;
+                let [a, b, g] = s.pose.roll_pitch_yaw_rad();
                 let q = nalgebra::UnitQuaternion::from_euler_angles(a, b, g);
                 let [x, y, z, w] = s.pose.orientation;
                 ((q.i * x + q.j * y + q.k * z + q.w * w).abs(), 1.0)
@@ -258,7 +258,7 @@ pub const CASES: &[Case] = &[
             c.ended(r);
             c.every("height, m", &r.samples, 1e-9, |s| (height(s), TOUCH_M - MASS_KG * G / SPRING));
             for a in 0..3 {
-                c.every("angle, rad", &r.samples, 1e-9, |s| (s.roll_pitch_yaw_rad[a], 0.0));
+                c.every("angle, rad", &r.samples, 1e-9, |s| (s.pose.roll_pitch_yaw_rad()[a], 0.0));
             }
         }),
     case!("bouncing-to-rest", located, "weak damping: ever smaller bounces",

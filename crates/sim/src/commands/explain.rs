@@ -172,7 +172,7 @@ fn ms_per_s(scene: &Scene) -> f64 {
 fn motion(scene: &Scene) -> Result<Vec<[f64; 6]>, String> {
     let mut all = Vec::new();
     sim::run::run(scene, &mut |s: &Sample| {
-        let ([x, y, z], [roll, tilt, yaw]) = (s.pose.position_m, s.roll_pitch_yaw_rad);
+        let ([x, y, z], [roll, tilt, yaw]) = (s.pose.position_m, s.pose.roll_pitch_yaw_rad());
         all.push([
             x - scene.carriers.walk_m_per_s[0] * s.t_s,
             y - scene.carriers.walk_m_per_s[1] * s.t_s,

@@ -219,19 +219,19 @@ const COMPARED: &[Compared] = &[
         signal: "roll_deg",
         field: "roll_rad",
         factor: DEG,
-        modelled: |s| s.roll_pitch_yaw_rad[0] * DEG,
+        modelled: |s| s.pose.roll_pitch_yaw_rad()[0] * DEG,
     },
     Compared {
         signal: "pitch_deg",
         field: "pitch_rad",
         factor: DEG,
-        modelled: |s| s.roll_pitch_yaw_rad[1] * DEG,
+        modelled: |s| s.pose.roll_pitch_yaw_rad()[1] * DEG,
     },
     Compared {
         signal: "yaw_deg",
         field: "yaw_rad",
         factor: DEG,
-        modelled: |s| s.roll_pitch_yaw_rad[2] * DEG,
+        modelled: |s| s.pose.roll_pitch_yaw_rad()[2] * DEG,
     },
     Compared {
         signal: "force_n",

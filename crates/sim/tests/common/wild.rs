@@ -226,7 +226,8 @@ fn run(scene: &Scene, method: &'static Method) -> Outcome {
         let numbers = numbers
             .chain(&s.pose.orientation)
             .chain(&s.pose.spin_rad_per_s);
-        let numbers = numbers.chain(&s.roll_pitch_yaw_rad).chain(&s.normal_n);
+        let angles = s.pose.roll_pitch_yaw_rad();
+        let numbers = numbers.chain(&angles).chain(&s.normal_n);
         let numbers = numbers
             .chain(&s.phase_rad)
             .chain(s.tangential_n.iter().flatten());

@@ -57,7 +57,7 @@ pub fn simulated(
     // Once the roll is large there is nothing more to learn.
     let mut large = false;
     let (inputs, _, outcome) = observe(&scene, None, &mut |s: &Sample| {
-        large = s.roll_pitch_yaw_rad[0].abs() > 10.0 * LINEAR_RAD.1;
+        large = s.pose.roll_pitch_yaw_rad()[0].abs() > 10.0 * LINEAR_RAD.1;
         !large
     });
     if let (Err(e), false) = (outcome, large) {
