@@ -10,7 +10,8 @@ pub type State = ode_solvers::SVector<f64, 15>;
 pub struct Problem {
     stiffness: f64,
     damping: f64,
-    inertia: [f64; 3],
+    /// kg·m²
+    pub inertia: [f64; 3],
     carried: bool,
 }
 

@@ -1,7 +1,7 @@
 //! Other solvers on the same equations, each at its own dense output of 30 Hz.
 
-use crate::Course;
 use crate::by_hand::{Problem, State, rhs, unclamped};
+use crate::{Course, Look};
 use diffsol::{NalgebraMat, OdeBuilder, OdeSolverMethod, OdeSolverStopReason, VectorCommon};
 use std::cell::Cell;
 
@@ -23,9 +23,12 @@ impl ode_solvers::System<f64, State> for System {
     }
 }
 
-fn unit(y: &[f64]) -> [f64; 4] {
+fn look(y: &[f64]) -> Look {
     let length = y[3..7].iter().map(|q| q * q).sum::<f64>().sqrt();
-    [y[6], y[3], y[4], y[5]].map(|q| q / length)
+    Look {
+        turn: [y[6], y[3], y[4], y[5]].map(|q| q / length),
+        spin: [y[10], y[11], y[12]],
+    }
 }
 
 const END_S: f64 = 60.0;
@@ -48,13 +51,12 @@ macro_rules! classical {
                 .integrate()
                 .map_or(0, |stats| u64::from(stats.num_eval));
             // Its last sample is at the end or one short of it.
-            let mut turn: Vec<[f64; 4]> =
-                solver.y_out().iter().map(|y| unit(y.as_slice())).collect();
-            turn.truncate(SAMPLES);
-            if turn.len() + 1 == SAMPLES {
-                turn.extend(turn.last().copied());
+            let mut looks: Vec<Look> = solver.y_out().iter().map(|y| look(y.as_slice())).collect();
+            looks.truncate(SAMPLES);
+            if looks.len() + 1 == SAMPLES {
+                looks.extend(looks.last().copied());
             }
-            Course { turn, evaluations }
+            Course { looks, evaluations }
         }
     };
 }
@@ -65,7 +67,7 @@ classical!(dop853, Dop853);
 fn tsit45(problem: &Problem, tolerance: f64) -> Course {
     let evaluations = Cell::new(0u64);
     let failed = || Course {
-        turn: Vec::new(),
+        looks: Vec::new(),
         evaluations: 0,
     };
     let builder = OdeBuilder::<NalgebraMat<f64>>::new()
@@ -87,7 +89,7 @@ fn tsit45(problem: &Problem, tolerance: f64) -> Course {
     let Ok(mut solver) = built.tsit45() else {
         return failed();
     };
-    let mut turn = Vec::with_capacity(SAMPLES);
+    let mut looks = Vec::with_capacity(SAMPLES);
     let due = |n: usize| n as f64 / 30.0;
     if solver.set_stop_time(END_S).is_err() {
         return failed();
@@ -97,7 +99,7 @@ fn tsit45(problem: &Problem, tolerance: f64) -> Course {
             Ok(reason) => reason,
             Err(_) => {
                 return Course {
-                    turn,
+                    looks,
                     evaluations: evaluations.get(),
                 };
             }
@@ -106,12 +108,12 @@ fn tsit45(problem: &Problem, tolerance: f64) -> Course {
             OdeSolverStopReason::RootFound(t, _) => t,
             _ => solver.state().t,
         };
-        while turn.len() < SAMPLES && due(turn.len()) <= until + 1e-12 {
-            match solver.interpolate(due(turn.len()).min(until)) {
-                Ok(y) => turn.push(unit(y.inner().as_slice())),
+        while looks.len() < SAMPLES && due(looks.len()) <= until + 1e-12 {
+            match solver.interpolate(due(looks.len()).min(until)) {
+                Ok(y) => looks.push(look(y.inner().as_slice())),
                 Err(_) => {
                     return Course {
-                        turn,
+                        looks,
                         evaluations: evaluations.get(),
                     };
                 }
@@ -128,7 +130,7 @@ fn tsit45(problem: &Problem, tolerance: f64) -> Course {
         }
     }
     Course {
-        turn,
+        looks,
         evaluations: evaluations.get(),
     }
 }
