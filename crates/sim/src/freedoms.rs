@@ -167,15 +167,6 @@ impl<T: Coordinates> FreedomsOnEight for T {
     }
 }
 
-/// p × e
-fn lever(p: [f64; 3], e: [f64; 3]) -> [f64; 3] {
-    [
-        p[1] * e[2] - p[2] * e[1],
-        p[2] * e[0] - p[0] * e[2],
-        p[0] * e[1] - p[1] * e[0],
-    ]
-}
-
 /// All six freedoms: r (world), q = (x, y, z, w) body → world, v (world), ω (body); 13 states.
 ///
 /// ```text
@@ -390,6 +381,15 @@ fn dot<T: Number>(a: [T; 3], b: [T; 3]) -> T {
     a[2].madd(b[2], a[1].madd(b[1], a[0] * b[0]))
 }
 
+#[inline(always)]
+fn cross<T: Number>(a: [T; 3], b: [T; 3]) -> [T; 3] {
+    [
+        a[1] * b[2] - a[2] * b[1],
+        a[2] * b[0] - a[0] * b[2],
+        a[0] * b[1] - a[1] * b[0],
+    ]
+}
+
 /// Sums of the handle forces (N) and of their torques about the centre of mass (N·m), in the world.
 #[inline(always)]
 fn pull<N: Moments>(pairs: &[Pair<N>]) -> [[N::Each; 3]; 2] {
@@ -518,7 +518,7 @@ impl Freedoms for Six {
     }
 
     fn levers(&self, y: &[f64], handle_m: [f64; 3], axis: usize) -> [f64; 6] {
-        let [a, b, c] = lever(handle_m, rotation(&y[3..7])[axis]);
+        let [a, b, c] = cross(handle_m, rotation(&y[3..7])[axis]);
         let mut levers = [0.0, 0.0, 0.0, a, b, c];
         levers[axis] = 1.0;
         levers

@@ -6,8 +6,8 @@
 //! φ roll, θ tilt, ψ yaw, the held one with its value and no rate (rad); ω in the body (rad/s). JᵀIJ is singular only where roll and yaw are
 //! the same turn (θ = ±90°), which a scene with these two free may not hold. Source: see [`super::reduced`].
 
-use super::reduced::{Rails, Turning, cross, dot};
-use super::{Turned, by_rows, place_handles, times};
+use super::reduced::{Rails, Turning};
+use super::{Turned, by_rows, cross, dot, place_handles, times};
 use crate::lanes::{Moments, Number, f64x2};
 use crate::model::{Part, Workspace};
 

@@ -7,8 +7,8 @@
 //! constant; τ torque beside that of the handle forces (N·m, body). ω × Iω has no part along j and J̇ = 0, so neither appears. Without a free angle
 //! j = 0 and R p = P. Source: rotation about an axis, Rodrigues; equation: see [`super::reduced`].
 
-use super::reduced::{Rails, Turning, cross, dot};
-use super::{Arms, place_handles, times};
+use super::reduced::{Rails, Turning};
+use super::{Arms, cross, dot, place_handles, times};
 use crate::lanes::{Moments, Number, f64x2, sum};
 use crate::model::{Pair, Part, Workspace};
 use nalgebra::{Rotation3, Vector3};

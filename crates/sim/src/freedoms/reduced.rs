@@ -13,7 +13,7 @@
 
 use super::gimbal::Gimbal;
 use super::hinge::{ASKEW, Hinge};
-use super::{Coordinates, Freedoms, FreedomsOnEight, Pose, Six, lever, pull, times};
+use super::{Coordinates, Freedoms, FreedomsOnEight, Pose, Six, cross, dot, pull, times};
 use crate::body::Body;
 use crate::lanes::{Moments, Number, f64x2, pack, sum};
 use crate::model::{All, Block, Pair, Part, Workspace};
@@ -414,7 +414,7 @@ impl<T: Turning> Freedoms for Reduced<T> {
         let [roll, tilt, yaw] = [3, 4, 5].map(|c| rails.coordinate(c, y));
         let turned = Rotation3::from_euler_angles(roll, tilt, yaw);
         let row = [0, 1, 2].map(|column| turned[(axis, column)]);
-        let arm = lever(handle_m, row);
+        let arm = cross(handle_m, row);
         let j = self.turning.columns(rails, y);
         for (column, place) in j.into_iter().zip(&rails.place[3..]) {
             if let Some(p) = *place {
@@ -479,18 +479,4 @@ impl<T: Turning> Freedoms for Reduced<T> {
         let kinetic = 0.5 * (rails.mass * v.norm_squared() + spin.dot(&(rails.inertia * spin)));
         [kinetic, -rails.mass * dot(rails.gravity, pose.position_m)]
     }
-}
-
-#[inline(always)]
-pub(super) fn dot<T: Number>(a: [T; 3], b: [T; 3]) -> T {
-    a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
-}
-
-#[inline(always)]
-pub(super) fn cross<T: Number>(a: [T; 3], b: [T; 3]) -> [T; 3] {
-    [
-        a[1] * b[2] - a[2] * b[1],
-        a[2] * b[0] - a[0] * b[2],
-        a[0] * b[1] - a[1] * b[0],
-    ]
 }
