@@ -215,6 +215,11 @@ impl<'m> Course<'m> {
         self.contacts.iter().filter(resting).count()
     }
 
+    /// Whether a handle sits on its edge, whose law may change at the end of any step.
+    pub fn on_edge(&self) -> bool {
+        self.contacts.contains(&Contact::Clamped)
+    }
+
     /// Whether the work is still within what is allowed.
     pub fn check_work(&self) -> Result<(), Stopped> {
         if self.stats.evaluations > self.most_evaluations {
@@ -291,7 +296,7 @@ impl<'m> Course<'m> {
         self.check_work()?;
         if !self.locate {
             self.note_unlocated(observer);
-        } else if self.contacts.contains(&Contact::Clamped) {
+        } else if self.on_edge() {
             self.settle();
             self.note_standing(observer);
         }

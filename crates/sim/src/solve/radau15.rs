@@ -393,6 +393,7 @@ impl<'m, E: Solve> Run<'m, E> {
                 self.course.sample(&self.at, false, observer)?;
             }
         }
+        let on_edge = self.course.on_edge();
         self.course.arrive(t1, observer)?;
         self.stages.keep();
         (self.before_s, self.ended) = (h, end_s / h);
@@ -403,7 +404,7 @@ impl<'m, E: Solve> Run<'m, E> {
                 self.sideways_at = None;
             }
             self.jumped = Some(self.course.resting_handles().min(2));
-        } else if !switched {
+        } else if !switched && !on_edge {
             for (slope, f) in self.slope.iter_mut().zip(&self.stages.f) {
                 *slope = f.as_array()[MOMENTS - 1];
             }
