@@ -37,7 +37,7 @@ const NAME: &str = "radau15";
 /// What a step may err, in units of the tolerance asked for; as [`pair::Pair::SHARE`].
 const SHARE: f64 = 0.002;
 /// What the iteration may leave, in units of what a step may err.
-const ITERATION: f64 = 0.3;
+const ITERATION: f64 = 0.1;
 /// Below this a step's error estimate is rounding.
 const FINEST: f64 = 1e-14;
 const EXPONENT: f64 = 1.0 / 12.0;
