@@ -116,7 +116,7 @@ pub struct Stages<E: Registers> {
     /// Legendre coefficients of the slopes: of the step solved last, and of the one accepted last.
     parts: Vec<E>,
     smooth: Vec<E>,
-    /// What half a unit and more of each state counts: 1/unit.
+    /// Takes an error of a state to units: 1/(unit + |y|).
     pub scale: Vec<f64>,
     /// Where the body's velocities are; its positions come before them.
     velocities: Range<usize>,
