@@ -272,8 +272,8 @@ impl<E: Registers> Stages<E> {
     /// Puts the stages where the iteration begins.
     #[inline(always)]
     fn guess(&mut self, y0: &[f64], h: f64, guess: &Guess<'_>) {
-        match guess {
-            &Guess::Onward {
+        match *guess {
+            Guess::Onward {
                 slope,
                 before_s,
                 ended,
@@ -299,7 +299,7 @@ impl<E: Registers> Stages<E> {
                     *y = t.madd(E::splat(jump), guess);
                 }
             }
-            &Guess::Part(part) => {
+            Guess::Part(part) => {
                 let weights: [[f64; MOMENTS + 1]; MOMENTS] = C.map(|c| weights(c * part));
                 let start = E::load(&weights.map(|w| w[0]));
                 let rest: Columns<E> = std::array::from_fn(|j| E::load(&weights.map(|w| w[j + 1])));
