@@ -377,7 +377,7 @@ fn by_rows<T: Number>(rows: [[T; 3]; 3], v: [T; 3]) -> [T; 3] {
 
 /// a · b
 #[inline(always)]
-fn dot<T: Number>(a: [T; 3], b: [T; 3]) -> T {
+pub(crate) fn dot<T: Number>(a: [T; 3], b: [T; 3]) -> T {
     a[2].madd(b[2], a[1].madd(b[1], a[0] * b[0]))
 }
 
@@ -419,7 +419,7 @@ fn times<T: Number>(m: &Matrix3<f64>, v: [T; 3]) -> [T; 3] {
 
 /// Rows of the rotation matrix of q/|q|.
 #[inline(always)]
-fn rotation<T: Number>(q: &[T]) -> [[T; 3]; 3] {
+pub(crate) fn rotation<T: Number>(q: &[T]) -> [[T; 3]; 3] {
     let (x, y, z, w) = (q[0], q[1], q[2], q[3]);
     let (one, two) = (T::splat(1.0), T::splat(2.0));
     let s = two / (x * x + y * y + z * z + w * w);

@@ -353,11 +353,6 @@ impl Model {
         }
     }
 
-    /// Whether springs at the handles grow with the load.
-    pub(crate) fn has_straps(&self) -> bool {
-        self.straps != [0.0; 2]
-    }
-
     /// Damping (N·s/m) and stiffness (N/m) of the springs at a carrier's handle along one of the world's axes, and what straps add to both
     /// per newton of its load (s/m, 1/m); zero where there are none.
     pub(crate) fn springs(&self, carrier: usize, axis: usize) -> [f64; 4] {

@@ -25,6 +25,7 @@ use super::course::{Course, SAME_MOMENT_S};
 use super::events::{self, Looks};
 use super::{Observer, Settings, Stats, Stopped, dop853, pair};
 use crate::energy::unit_j;
+use crate::freedoms::rotation;
 #[cfg(target_arch = "x86_64")]
 use crate::lanes::{Avx2, Avx512};
 use crate::lanes::{MOMENTS, Plain8};
@@ -34,10 +35,14 @@ use stages::{Demand, Guess, Solved, Stages, Step};
 use tableau::C;
 
 const NAME: &str = "radau15";
-/// What a step may err, in units of the tolerance asked for; as [`pair::Pair::SHARE`].
-const SHARE: f64 = 0.002;
+/// What a step may err by its own estimate, in units of the tolerance asked for; as [`pair::Pair::SHARE`].
+const SHARE: f64 = 0.01;
 /// What the iteration may leave, in units of what a step may err.
-const ITERATION: f64 = 0.1;
+const ITERATION: f64 = 0.02;
+/// A step that leaves nothing before a moment that none may cross may err by so many times as much: it stands for two.
+const FILLS: f64 = 10.0;
+/// Such a step may be so many times as long as another: FILLS in the law of the step size, and a little less.
+const STRETCH: f64 = 1.3;
 /// Below this a step's error estimate is rounding.
 const FINEST: f64 = 1e-14;
 const EXPONENT: f64 = 1.0 / 12.0;
@@ -45,14 +50,14 @@ const SAFETY: f64 = 0.9;
 const SHRINK: f64 = 0.2;
 const GROW: f64 = 4.0;
 const SMALLEST_STEP_S: f64 = 1e-13;
-/// Where a step may end at an event, its polynomial may err by so many times what a step may err.
-const TRUST: f64 = 3.0;
+/// Where a step may end at an event, its polynomial may err by so much of what a step may err: this estimate is hardly more than the error.
+const TRUST: f64 = 0.5;
 /// So exactly an event is located, as a part of the step, where a shorter step will locate it again.
 const ROUGHLY: f64 = 1e-4;
 /// So much of its unit an energy of the ledger counts in the error.
-const LEDGER: f64 = 0.1;
+const LEDGER: f64 = 0.5;
 /// The modes are computed anew when a number of the attitude has changed by so much.
-const TURNED: f64 = 0.015;
+const TURNED: f64 = 0.03;
 /// A step whose iteration does not converge counts as much as so many that do, and this many more than those are too many: another
 /// method is better.
 const FAILED: u32 = 8;
@@ -157,13 +162,11 @@ struct Run<'m, E: Registers> {
     ended: f64,
     at: Vec<f64>,
     units: Vec<f64>,
-    /// Those of sideways springs first, so many.
     modes: Vec<Mode>,
-    sideways: usize,
     rows: Vec<Row>,
-    /// The attitude when those of sideways springs and the others were computed, unless contacts have changed since.
-    sideways_at: Option<[f64; 4]>,
-    upright_at: Option<[f64; 4]>,
+    /// The attitude where they were found, unless contacts have changed since; and its rotation.
+    modes_at: Option<[f64; 4]>,
+    found_at: [[f64; 3]; 3],
     ledger_unit_j: f64,
     looks: Looks,
     margin_n: f64,
@@ -197,10 +200,9 @@ impl<'m, E: Solve> Run<'m, E> {
             at: vec![0.0; size],
             units: vec![0.0; model.layout().body],
             modes: Vec::new(),
-            sideways: 0,
             rows: Vec::new(),
-            sideways_at: None,
-            upright_at: None,
+            modes_at: None,
+            found_at: [[0.0; 3]; 3],
             ledger_unit_j: unit_j(&model.scene),
             looks: Looks::new(),
             margin_n: 0.0,
@@ -255,29 +257,24 @@ impl<'m, E: Solve> Run<'m, E> {
         let attitude = &y[model.freedoms().attitude()];
         let mut now = [0.0; 4];
         now[..attitude.len()].copy_from_slice(attitude);
-        let moved = |since: Option<[f64; 4]>, far: f64| {
-            since.is_none_or(|since| now.iter().zip(since).any(|(a, b)| (a - b).abs() > far))
-        };
-        // Sideways springs depend little on how the body has turned.
-        let sideways = moved(self.sideways_at, 10.0 * TURNED);
-        if sideways {
+        let near = |then: [f64; 4]| now.iter().zip(then).all(|(a, b)| (a - b).abs() <= TURNED);
+        if !self.modes_at.is_some_and(near) {
             self.modes.clear();
-            modes(model, y, &course.w, 0..2, &mut self.rows, &mut self.modes);
-            (self.sideways_at, self.sideways) = (Some(now), self.modes.len());
-        }
-        if sideways || moved(self.upright_at, TURNED) {
-            self.modes.truncate(self.sideways);
-            modes(model, y, &course.w, 2..3, &mut self.rows, &mut self.modes);
-            self.upright_at = Some(now);
+            for axes in [0..2, 2..3] {
+                modes(model, y, &course.w, axes, &mut self.rows, &mut self.modes);
+            }
+            self.modes_at = Some(now);
+            if attitude.len() == 4 {
+                self.found_at = rotation(attitude);
+            }
         }
     }
 
-    /// Solves a step of size h, which counts.
-    fn solve(&mut self, h: f64, part: Option<f64>) -> Solved {
+    /// Solves a step of size h, which counts, and which may err by `room` times what others may.
+    fn solve(&mut self, h: f64, part: Option<f64>, room: f64) -> Solved {
         let guess = match part {
             Some(part) => Guess::Part(part),
             None => Guess::Onward {
-                slope: &self.slope,
                 before_s: self.before_s,
                 ended: self.ended,
             },
@@ -286,14 +283,23 @@ impl<'m, E: Solve> Run<'m, E> {
             model: self.course.model,
             t_s: self.course.t_s,
             y: &self.course.y,
+            slope: &self.slope,
             h_s: h,
             guess,
             modes: &self.modes,
-            demand: self.demand,
+            found_at: self.found_at,
+            demand: Demand {
+                tolerance: self.demand.tolerance * room,
+                ..self.demand
+            },
         };
         let solved = E::solve(&mut self.stages, &step);
         self.course.stats.evaluations += u64::from(solved.sweeps) * MOMENTS as u64;
-        solved
+        Solved {
+            error: solved.error * room,
+            between: solved.between * room,
+            ..solved
+        }
     }
 
     /// One step, cut short where somebody wants to see a state that its polynomial does not hold.
@@ -306,10 +312,11 @@ impl<'m, E: Solve> Run<'m, E> {
             Some(resting) => self.h_next.min(self.after_jump[resting]),
             None => self.h_next,
         };
+        let room = |h: f64| if h == left { FILLS } else { 1.0 };
         let mut h = self.fitted(wanted, left);
-        let mut solved = self.solve(h, None);
+        let mut solved = self.solve(h, None, room(h));
         let mut rejected = false;
-        while !(solved.converged && solved.error <= 1.0) {
+        while !(solved.converged && solved.error <= room(h)) {
             self.course.stats.rejected += 1;
             self.course.check_work()?;
             rejected = true;
@@ -327,7 +334,7 @@ impl<'m, E: Solve> Run<'m, E> {
                 self.limited += FAILED;
             }
             h = shorter;
-            solved = self.solve(h, part);
+            solved = self.solve(h, part, room(h));
         }
         self.limited = self.limited.saturating_sub(1);
         let tried = h;
@@ -359,7 +366,7 @@ impl<'m, E: Solve> Run<'m, E> {
                 (_, Some(_)) if roughly => break self.event(t0, h, false),
                 _ => break event,
             };
-            solved = self.solve(cut, Some(cut / h));
+            solved = self.solve(cut, Some(cut / h), 1.0);
             h = cut;
             // Shorter than what has just been solved, it hardly ever fails.
             while !solved.converged {
@@ -369,7 +376,7 @@ impl<'m, E: Solve> Run<'m, E> {
                 if h < SMALLEST_STEP_S {
                     return Err(self.too_small(h));
                 }
-                solved = self.solve(h, None);
+                solved = self.solve(h, None, 1.0);
             }
         };
         let end_s = event.map_or(h, |theta| theta * h);
@@ -399,10 +406,7 @@ impl<'m, E: Solve> Run<'m, E> {
         (self.before_s, self.ended) = (h, end_s / h);
         if event.is_some() {
             self.course.fire(observer);
-            self.upright_at = None;
-            if self.course.model.has_straps() {
-                self.sideways_at = None;
-            }
+            self.modes_at = None;
             self.jumped = Some(self.course.resting_handles().min(2));
         } else if !switched && !on_edge {
             for (slope, f) in self.slope.iter_mut().zip(&self.stages.f) {
@@ -428,7 +432,7 @@ impl<'m, E: Solve> Run<'m, E> {
 
     /// A step of about h that leaves no crumb before the next moment that must not be crossed.
     fn fitted(&self, h: f64, left: f64) -> f64 {
-        if left <= 1.01 * h {
+        if left <= STRETCH * h {
             left
         } else if left < 2.0 * h {
             0.5 * left
@@ -559,13 +563,14 @@ mod tests {
                     model: &model,
                     t_s: t,
                     y: &start,
+                    slope: &slope,
                     h_s: h,
                     guess: Guess::Onward {
-                        slope: &slope,
                         before_s: h,
                         ended: 0.0,
                     },
                     modes: &[],
+                    found_at: [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]],
                     demand,
                 };
                 Plain8::solve(&mut stages, &step);

@@ -2,7 +2,7 @@
 
 use super::modes::{Mode, WATCHED};
 use super::tableau::{C, HALF, TABLEAU, with_start};
-use crate::freedoms::turn;
+use crate::freedoms::{dot, turn};
 use crate::lanes::{Eight, MOMENTS, Moments, Number, Two, f64x2};
 use crate::model::{Model, Registers, Workspace};
 use std::ops::Range;
@@ -13,8 +13,12 @@ const MOST_SWEEPS: u32 = 16;
 const TELLING: u32 = 3;
 /// An error estimate so many times the tolerance will not fall below it by further sweeps.
 const HOPELESS: f64 = 20.0;
+/// So many times what the next coefficient would be, the slopes' polynomial may miss the slope at the start by.
+const EXPECTED: f64 = 10.0;
 /// A mode that a step hardly moves is left to the sweeps.
 const SLIGHT: f64 = 0.08;
+/// No sweep is believed to gain more than a factor of thirty: what falls faster at first leaves what falls more slowly. Squared.
+const BEST: f64 = 1e-3;
 
 /// So many Legendre coefficients of the slopes of a step say how the next begins.
 const REACH: usize = 6;
@@ -42,13 +46,10 @@ fn integrals<T: Number>(x: T) -> [(T, T); REACH] {
 type Columns<E> = [E; MOMENTS];
 
 /// Where the iteration begins.
-pub enum Guess<'a> {
-    /// On from the step accepted last: its size, and the part of it that it ended at. Its slopes, bent so that they begin with `slope`.
-    Onward {
-        slope: &'a [f64],
-        before_s: f64,
-        ended: f64,
-    },
+pub enum Guess {
+    /// On from the step accepted last: its size, and the part of it that it ended at. Its slopes, bent so that they begin with that of the
+    /// step.
+    Onward { before_s: f64, ended: f64 },
     /// This part of the step solved last, which began at the same state.
     Part(f64),
 }
@@ -59,9 +60,12 @@ pub struct Step<'a> {
     /// Where it begins.
     pub t_s: f64,
     pub y: &'a [f64],
+    pub slope: &'a [f64],
     pub h_s: f64,
-    pub guess: Guess<'a>,
+    pub guess: Guess,
     pub modes: &'a [Mode],
+    /// Rows of the rotation of the body where the modes were found, if its attitude is a quaternion.
+    pub found_at: [[f64; 3]; 3],
     pub demand: Demand,
 }
 
@@ -127,6 +131,8 @@ pub struct Stages<E: Registers> {
     nodes: E,
     eigen: Eigen<E>,
     solvers: Vec<Solver<E>>,
+    /// Rows of the rotation that takes an angular velocity in the body at each stage to the body as it stood where the modes were found.
+    turned: [[E; 3]; 3],
     /// Whether the phases, where there are any, are solved before the rest.
     carriers_lead: bool,
     watch: Vec<(Two<E>, Two<E>)>,
@@ -172,10 +178,13 @@ fn largest<E: Registers>(of: &E) -> f64 {
 #[inline(always)]
 fn rate(change: f64, last: f64) -> f64 {
     const FIRST: f64 = 0.8;
-    if last.is_finite() {
-        (change / last).min(FIRST)
-    } else {
+    let gained = change / last;
+    if !last.is_finite() {
         FIRST
+    } else if gained > BEST {
+        gained.min(FIRST)
+    } else {
+        BEST
     }
 }
 
@@ -229,16 +238,27 @@ impl<E: Registers> Stages<E> {
                 imaginary: E::load(&std::array::from_fn(|m| f64::from(u8::from(m >= HALF)))),
             },
             solvers: Vec::new(),
+            turned: [[zero; 3]; 3],
             carriers_lead: model.carriers_lead(),
             watch: Vec::new(),
             margin: zero,
         }
     }
 
-    /// What undoes h d A + h² κ A² of each mode.
+    /// What undoes h d A + h² κ A² of each mode, and how the body has turned since they were found.
     #[inline(always)]
-    fn prepare(&mut self, modes: &[Mode], h: f64) {
+    fn prepare(&mut self, modes: &[Mode], found_at: &[[f64; 3]; 3], h: f64) {
         self.solvers.clear();
+        if self.quaternion && !modes.is_empty() {
+            for (c, row) in self.turned.iter_mut().enumerate() {
+                for (b, to) in row.iter_mut().enumerate() {
+                    *to = E::splat(0.0);
+                    for (then, now) in found_at.iter().zip(&self.w.rotation) {
+                        *to = now[b].madd(E::splat(then[c]), *to);
+                    }
+                }
+            }
+        }
         let eigen = &self.eigen;
         let mut load = E::splat(0.0);
         for p in &self.w.pair {
@@ -271,13 +291,9 @@ impl<E: Registers> Stages<E> {
 
     /// Puts the stages where the iteration begins.
     #[inline(always)]
-    fn guess(&mut self, y0: &[f64], h: f64, guess: &Guess<'_>) {
+    fn guess(&mut self, y0: &[f64], h: f64, slope: &[f64], guess: &Guess) {
         match *guess {
-            Guess::Onward {
-                slope,
-                before_s,
-                ended,
-            } => {
+            Guess::Onward { before_s, ended } => {
                 let t = self.nodes * h;
                 let onward = t.madd(E::splat(1.0 / before_s), E::splat(ended));
                 let (there, here) = (integrals(onward), integrals(ended));
@@ -317,15 +333,17 @@ impl<E: Registers> Stages<E> {
             model,
             t_s: t0,
             y: y0,
+            slope,
             h_s: h,
             ref guess,
             modes,
+            ref found_at,
             demand,
         } = step;
         let ledger = model.layout().ledger_range();
         let watched = ledger.start;
         let phases = model.layout().phase_range();
-        self.guess(y0, h, guess);
+        self.guess(y0, h, slope, guess);
         let t = self.nodes.madd(E::splat(h), E::splat(t0));
         model.clock_at_eight(t, &mut self.w);
         let mut carriers = if !self.carriers_lead {
@@ -364,7 +382,7 @@ impl<E: Registers> Stages<E> {
             model.load_at_eight(t, &self.y, &mut self.f, &mut self.w);
             sweeps += 1;
             if sweeps == 1 {
-                self.prepare(modes, h);
+                self.prepare(modes, found_at, h);
             }
             // Nothing feeds the ledger's errors back to the motion, so no sweep takes them away: it is booked at the stages as they are.
             if converged {
@@ -375,8 +393,9 @@ impl<E: Registers> Stages<E> {
                 change += self.follow(y0, h, self.velocities.end..watched);
             }
             converged = change * rate(change, last) <= enough * watched as f64;
-            let telling =
-                sweeps == TELLING && self.errors(watched, h, demand.tolerance).0 > HOPELESS;
+            let telling = sweeps == TELLING
+                && !converged
+                && self.errors(watched, h, demand.tolerance).0 > HOPELESS;
             if telling || !change.is_finite() || sweeps >= MOST_SWEEPS {
                 converged |= telling;
                 break;
@@ -397,9 +416,10 @@ impl<E: Registers> Stages<E> {
             self.y[d] = product(&self.a, &self.f[d]).madd(E::splat(h), E::splat(y0[d]));
         }
         let (error, between) = self.errors(self.y.len(), h, demand.tolerance);
+        let missed = self.missed(slope, watched, h) / demand.tolerance;
         Solved {
             sweeps,
-            error,
+            error: error.max(missed),
             between,
             converged,
         }
@@ -431,6 +451,14 @@ impl<E: Registers> Stages<E> {
         for (d, by) in (from..body).zip(&mut by) {
             *by = product(&self.a, &f[d]).madd(step, E::splat(y0[d])) - y[d];
         }
+        // A mode is fixed in the world more than in the body, which may turn within a step.
+        let turns = self.quaternion && !self.solvers.is_empty();
+        if turns {
+            let spin = [by[3], by[4], by[5]];
+            for (by, row) in by[3..].iter_mut().zip(&self.turned) {
+                *by = dot(*row, spin);
+            }
+        }
         let residual = by;
         for solver in &self.solvers {
             let mut along = residual[0] * solver.mode.from[0];
@@ -442,6 +470,12 @@ impl<E: Registers> Stages<E> {
             let further = product(&self.eigen.from, &solver.straight.madd(along, turned));
             for (by, &to) in by.iter_mut().zip(&solver.mode.to) {
                 *by = further.madd(E::splat(to), *by);
+            }
+        }
+        if turns {
+            let ([a, b, c], spin) = (&self.turned, [by[3], by[4], by[5]]);
+            for (k, by) in by[3..].iter_mut().enumerate() {
+                *by = dot([a[k], b[k], c[k]], spin);
             }
         }
         for (d, by) in (from..body).zip(by) {
@@ -486,6 +520,23 @@ impl<E: Registers> Stages<E> {
         let ratio = (last / before.max(f64::MIN_POSITIVE)).min(1.0);
         let of = |part: f64| last * part / tolerance;
         (of(ratio.powi(2)), of(ratio / 17.0))
+    }
+
+    /// What lies before the first node and no stage has seen, from the slope at the start, which is none: where it is farther from the
+    /// polynomial of the slopes than their coefficients let expect, by what the part of the step before the first node makes of that.
+    #[inline(always)]
+    fn missed(&self, slope: &[f64], states: usize, h: f64) -> f64 {
+        let mut squares = [0.0; 3];
+        for ((part, slope), scale) in self.parts[..states].iter().zip(slope).zip(&self.scale) {
+            let p = part.as_array();
+            let start = (p[0] - p[1]) + (p[2] - p[3]) + (p[4] - p[5]) + (p[6] - p[7]);
+            squares[0] += ((slope - start) * scale).powi(2);
+            squares[1] += (p[4] * p[4] + p[5] * p[5]) * scale * scale;
+            squares[2] += (p[6] * p[6] + p[7] * p[7]) * scale * scale;
+        }
+        let [apart, before, last] = squares.map(f64::sqrt);
+        let next = last * (last / before.max(f64::MIN_POSITIVE)).min(1.0).sqrt();
+        (apart - EXPECTED * next).max(0.0) * h * C[0] / (states as f64).sqrt()
     }
 
     /// The step solved last is accepted.
