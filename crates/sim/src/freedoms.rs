@@ -371,13 +371,23 @@ fn sums<N: Moments>(v: [N::Pair; 3]) -> [N::Each; 3] {
 
 /// A matrix, by its rows, times a vector.
 #[inline(always)]
-fn by_rows<T: Number>(rows: [[T; 3]; 3], v: [T; 3]) -> [T; 3] {
+pub(crate) fn by_rows<T: Number>(rows: [[T; 3]; 3], v: [T; 3]) -> [T; 3] {
     [dot(rows[0], v), dot(rows[1], v), dot(rows[2], v)]
+}
+
+/// A matrix, by its columns, times a vector.
+#[inline(always)]
+pub(crate) fn by_columns<T: Number>(m: [[T; 3]; 3], v: [T; 3]) -> [T; 3] {
+    let [a, b, c] = m;
+    by_rows(
+        [[a[0], b[0], c[0]], [a[1], b[1], c[1]], [a[2], b[2], c[2]]],
+        v,
+    )
 }
 
 /// a · b
 #[inline(always)]
-pub(crate) fn dot<T: Number>(a: [T; 3], b: [T; 3]) -> T {
+fn dot<T: Number>(a: [T; 3], b: [T; 3]) -> T {
     a[2].madd(b[2], a[1].madd(b[1], a[0] * b[0]))
 }
 

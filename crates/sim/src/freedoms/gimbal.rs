@@ -7,7 +7,7 @@
 //! the same turn (θ = ±90°), which a scene with these two free may not hold. Source: see [`super::reduced`].
 
 use super::reduced::{Rails, Turning};
-use super::{Turned, by_rows, cross, dot, place_handles, times};
+use super::{Turned, by_columns, cross, dot, place_handles, times};
 use crate::lanes::{Moments, Number, f64x2};
 use crate::model::{Part, Workspace};
 
@@ -59,13 +59,6 @@ impl<T: Number> Attitude<T> {
             -tilt * cr * roll - yaw * (st * cr * tilt + ct * sr * roll),
         ]
     }
-}
-
-/// A matrix, by its columns, times a vector.
-#[inline(always)]
-fn by_columns<T: Number>(m: [[T; 3]; 3], v: [T; 3]) -> [T; 3] {
-    let rows = [0, 1, 2].map(|a| [m[0][a], m[1][a], m[2][a]]);
-    by_rows(rows, v)
 }
 
 impl Gimbal {

@@ -2,7 +2,7 @@
 
 use super::modes::{Mode, WATCHED};
 use super::tableau::{C, HALF, TABLEAU, with_start};
-use crate::freedoms::{dot, turn};
+use crate::freedoms::{by_columns, by_rows, turn};
 use crate::lanes::{Eight, MOMENTS, Moments, Number, Two, f64x2};
 use crate::model::{Model, Registers, Workspace};
 use std::ops::Range;
@@ -419,7 +419,8 @@ impl<E: Registers> Stages<E> {
         let missed = self.missed(slope, watched, h) / demand.tolerance;
         Solved {
             sweeps,
-            error: error.max(missed),
+            // An error that is not a number stays one.
+            error: if missed > error { missed } else { error },
             between,
             converged,
         }
@@ -454,10 +455,7 @@ impl<E: Registers> Stages<E> {
         // A mode is fixed in the world more than in the body, which may turn within a step.
         let turns = self.quaternion && !self.solvers.is_empty();
         if turns {
-            let spin = [by[3], by[4], by[5]];
-            for (by, row) in by[3..].iter_mut().zip(&self.turned) {
-                *by = dot(*row, spin);
-            }
+            [by[3], by[4], by[5]] = by_rows(self.turned, [by[3], by[4], by[5]]);
         }
         let residual = by;
         for solver in &self.solvers {
@@ -473,10 +471,7 @@ impl<E: Registers> Stages<E> {
             }
         }
         if turns {
-            let ([a, b, c], spin) = (&self.turned, [by[3], by[4], by[5]]);
-            for (k, by) in by[3..].iter_mut().enumerate() {
-                *by = dot([a[k], b[k], c[k]], spin);
-            }
+            [by[3], by[4], by[5]] = by_columns(self.turned, [by[3], by[4], by[5]]);
         }
         for (d, by) in (from..body).zip(by) {
             y[d] += by;
