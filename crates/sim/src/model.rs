@@ -15,6 +15,7 @@ mod term;
 mod workspace;
 
 pub use eight::Registers;
+pub(crate) use eight::{Octet, SideBySide};
 pub use term::{
     Account, AsWhole, Book, Local, OnBlock, OnEight, Power, PowerOnEight, Stage, Switch, Term,
     Whole,

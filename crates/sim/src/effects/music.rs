@@ -184,19 +184,17 @@ impl Whole for Pull {
     }
 }
 
+/// What [`Workspace::beat`] is told: the beat's phase where the drum sounds, and silence elsewhere.
 #[inline(always)]
-fn beat<T: Number>(phase: T, grown: T) -> [T; 2] {
-    let (sin, cos) = phase.sin_cos();
-    [sin * grown, cos * grown]
-}
-
-#[inline(always)]
-fn grown<T: Number>(per_s: Option<f64>, heard_s: T) -> T {
-    match per_s {
+fn heard<T: Number>(silent: T, phase: T, per_s: Option<f64>, heard_s: T) -> [T; 2] {
+    let grown = match per_s {
         // Beside 1 the digits that `exp_m1` would save are nothing.
         Some(per_s) => -(heard_s * -per_s).exp() + 1.0,
         None => T::splat(1.0),
-    }
+    };
+    let (sin, cos) = phase.sin_cos();
+    let grown = silent.if_positive(T::splat(0.0), grown);
+    [sin * grown, cos * grown]
 }
 
 /// One tempo, no pauses.
@@ -212,12 +210,9 @@ impl Whole for Steady {
     #[inline(always)]
     fn act<N: Moments>(&self, t_s: N::Each, w: &mut Workspace<N>) {
         // `segment_s` decides, not t: the last stage of the step that ends at the onset still hears nothing.
-        w.beat = if w.segment_s >= self.onset_s {
-            let grown = grown(self.per_s, t_s + -self.onset_s);
-            beat(t_s * self.rate + self.phase, grown)
-        } else {
-            [N::Each::splat(0.0); 2]
-        };
+        let silent = -w.segment_s + self.onset_s;
+        let phase = t_s * self.rate + self.phase;
+        w.beat = heard(silent, phase, self.per_s, t_s + -self.onset_s);
     }
 }
 
@@ -230,14 +225,20 @@ struct Varied {
 impl Whole for Varied {
     #[inline(always)]
     fn act<N: Moments>(&self, t_s: N::Each, w: &mut Workspace<N>) {
-        w.beat = if self.beat.sounds(w.segment_s) {
-            let piece = self.beat.piece(w.segment_s);
-            let s = t_s + -piece.begin_s;
-            let phase = s * (s * (0.5 * piece.bend) + piece.rate) + piece.phase;
-            beat(phase, grown(self.per_s, t_s + -self.beat.onset_s))
-        } else {
-            [N::Each::splat(0.0); 2]
-        };
+        let [silent, begin_s, rate, bend, phase] = N::look_up(w.segment_s, |segment_s| {
+            let piece = self.beat.piece(segment_s);
+            let silent = f64::from(!self.beat.sounds(segment_s));
+            [
+                silent,
+                piece.begin_s,
+                piece.rate,
+                0.5 * piece.bend,
+                piece.phase,
+            ]
+        });
+        let s = t_s - begin_s;
+        let phase = s * (s * bend + rate) + phase;
+        w.beat = heard(silent, phase, self.per_s, t_s + -self.beat.onset_s);
     }
 }
 

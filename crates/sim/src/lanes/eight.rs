@@ -14,6 +14,8 @@ pub trait Wide: Number {
     fn load(x: &[f64; MOMENTS]) -> Self;
     /// As an array.
     fn as_array(&self) -> &[f64; MOMENTS];
+    /// The same, to be changed.
+    fn as_mut_array(&mut self) -> &mut [f64; MOMENTS];
     /// The last four before the first four.
     fn swapped(self) -> Self;
     /// The bits of 2^n for a whole number n within ±1022 that 1.5·2⁵² has been added to.
@@ -122,38 +124,53 @@ fn exp<E: Wide>(x: E) -> E {
     (x + 700.0).if_positive(value, splat(0.0))
 }
 
+#[inline(always)]
+fn of_both<E: Wide>(constant: &super::f64x2) -> E {
+    E::splat(constant.as_array()[0])
+}
+
+/// A polynomial of degree 5 by pairs, as in [`super::sin_cos`].
+#[inline(always)]
+fn poly<E: Wide>(c: &[super::f64x2; 6], z: E, z2: E) -> E {
+    let high = of_both::<E>(&c[0]).madd(z, of_both(&c[1]));
+    let middle = of_both::<E>(&c[2]).madd(z, of_both(&c[3]));
+    let low = of_both::<E>(&c[4]).madd(z, of_both(&c[5]));
+    high.madd(z2, middle).madd(z2, low)
+}
+
 /// As [`super::sin_cos`], eight at a time.
 #[inline(always)]
 fn sin_cos<E: Wide>(x: E) -> (E, E) {
     use super::{COS, FAR_RAD, HALF_PI, ROUND, SIN};
-    if !x.all_within(FAR_RAD) {
-        return far(x);
-    }
     let splat = E::splat;
-    let first = |c: &super::f64x2| splat(c.as_array()[0]);
     let shifted = x.madd(splat(std::f64::consts::FRAC_2_PI), splat(ROUND));
     let n = splat(ROUND) - shifted;
-    let r = n.madd(first(&HALF_PI[0]), x);
-    let r = n.madd(first(&HALF_PI[1]), r);
-    let r = n.madd(first(&HALF_PI[2]), r);
+    let r = n.madd(of_both(&HALF_PI[0]), x);
+    let r = n.madd(of_both(&HALF_PI[1]), r);
+    let r = n.madd(of_both(&HALF_PI[2]), r);
     let z = r * r;
-    let poly = |c: &[super::f64x2; 6]| {
-        let mut sum = first(&c[0]);
-        for next in &c[1..] {
-            sum = sum.madd(z, first(next));
-        }
-        sum
-    };
-    let s = (r * z).madd(poly(&SIN), r);
-    let c = (z * z).madd(poly(&COS), z.madd(splat(-0.5), splat(1.0)));
-    E::quadrant(shifted, s, c)
+    let z2 = z * z;
+    let s = (r * z).madd(poly(&SIN, z, z2), r);
+    let c = z2.madd(poly(&COS, z, z2), z.madd(splat(-0.5), splat(1.0)));
+    let turned = E::quadrant(shifted, s, c);
+    if x.all_within(FAR_RAD) {
+        return turned;
+    }
+    let mut mended = turned;
+    far(&x, &mut mended);
+    mended
 }
 
+/// Those that are far by libm. The others keep what they have: runs side by side must not feel each other.
 #[cold]
 #[inline(never)]
-fn far<E: Wide>(x: E) -> (E, E) {
-    let turned = x.as_array().map(f64::sin_cos);
-    (E::load(&turned.map(|t| t.0)), E::load(&turned.map(|t| t.1)))
+fn far<E: Wide>(x: &E, (sin, cos): &mut (E, E)) {
+    use super::FAR_RAD;
+    for (l, x) in x.as_array().iter().enumerate() {
+        if x.is_nan() || x.abs() > FAR_RAD {
+            (sin.as_mut_array()[l], cos.as_mut_array()[l]) = x.sin_cos();
+        }
+    }
 }
 
 macro_rules! shared {
@@ -215,6 +232,10 @@ impl Wide for Plain8 {
     #[inline(always)]
     fn as_array(&self) -> &[f64; MOMENTS] {
         &self.0
+    }
+    #[inline(always)]
+    fn as_mut_array(&mut self) -> &mut [f64; MOMENTS] {
+        &mut self.0
     }
     #[inline(always)]
     fn swapped(self) -> Self {
@@ -340,6 +361,10 @@ mod x86 {
         fn as_array(&self) -> &[f64; MOMENTS] {
             // A register in memory is its numbers in order.
             unsafe { &*std::ptr::from_ref(self).cast() }
+        }
+        #[inline(always)]
+        fn as_mut_array(&mut self) -> &mut [f64; MOMENTS] {
+            unsafe { &mut *std::ptr::from_mut(self).cast() }
         }
         #[inline(always)]
         fn swapped(self) -> Self {
@@ -480,6 +505,10 @@ mod x86 {
         #[inline(always)]
         fn as_array(&self) -> &[f64; MOMENTS] {
             unsafe { &*std::ptr::from_ref(self).cast() }
+        }
+        #[inline(always)]
+        fn as_mut_array(&mut self) -> &mut [f64; MOMENTS] {
+            unsafe { &mut *std::ptr::from_mut(self).cast() }
         }
         #[inline(always)]
         fn swapped(self) -> Self {

@@ -134,6 +134,11 @@ pub trait Moments: Copy + Debug + Send + Sync + 'static {
     fn of(pair: Self::Pair, lane: usize) -> Self::Each;
     /// The same, to be changed.
     fn set(pair: &mut Self::Pair, lane: usize, each: Self::Each);
+    /// What a table says at each moment.
+    fn look_up<const K: usize>(
+        each: Self::Each,
+        table: impl Fn(f64) -> [f64; K],
+    ) -> [Self::Each; K];
 }
 
 /// One moment.
@@ -162,6 +167,10 @@ impl Moments for Now {
     #[inline(always)]
     fn set(pair: &mut f64x2, lane: usize, each: f64) {
         pair.as_mut_array()[lane] = each;
+    }
+    #[inline(always)]
+    fn look_up<const K: usize>(each: f64, table: impl Fn(f64) -> [f64; K]) -> [f64; K] {
+        table(each)
     }
 }
 
@@ -196,6 +205,16 @@ impl<E: Wide> Moments for Eight<E> {
     #[inline(always)]
     fn set(pair: &mut Two<E>, lane: usize, each: E) {
         pair.0[lane] = each;
+    }
+    #[inline(always)]
+    fn look_up<const K: usize>(each: E, table: impl Fn(f64) -> [f64; K]) -> [E; K] {
+        let mut out = [E::splat(0.0); K];
+        for (moment, at) in each.as_array().iter().enumerate() {
+            for (out, found) in out.iter_mut().zip(table(*at)) {
+                out.as_mut_array()[moment] = found;
+            }
+        }
+        out
     }
 }
 

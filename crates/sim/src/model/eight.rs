@@ -1,6 +1,6 @@
 //! The right-hand side at eight moments side by side, for models all of whose parts are written for that.
 
-use super::{Model, OnEight, Pair, Power, PowerOnEight, Stage, Workspace};
+use super::{Layout, Model, OnEight, Pair, Power, PowerOnEight, Stage, Term, Workspace};
 use crate::freedoms::FreedomsOnEight;
 #[cfg(target_arch = "x86_64")]
 use crate::lanes::{Avx2, Avx512};
@@ -78,78 +78,120 @@ impl Model {
         self.layout.extra_range().is_empty()
     }
 
+    /// The right-hand side for eight moments, where [`Self::on_eight`] says yes.
+    pub(crate) fn side_by_side(&self) -> SideBySide<'_> {
+        fn of(stage: &Vec<Box<dyn Term>>) -> Vec<&dyn OnEight> {
+            stage.iter().filter_map(|t| t.on_eight()).collect()
+        }
+        SideBySide {
+            layout: &self.layout,
+            freedoms: self.freedoms.on_eight(),
+            terms: self.terms.each_ref().map(of),
+            accounts: self
+                .accounts
+                .iter()
+                .filter_map(|(_, a)| a.on_eight())
+                .collect(),
+        }
+    }
+}
+
+/// What a model does at eight moments side by side.
+pub(crate) struct SideBySide<'m> {
+    pub layout: &'m Layout,
+    freedoms: &'m dyn FreedomsOnEight,
+    terms: [Vec<&'m dyn OnEight>; 7],
+    accounts: Vec<&'m dyn PowerOnEight>,
+}
+
+/// Eight moments, the states there, where their rates go, and the numbers of the evaluation.
+///
+/// Several are evaluated term by term: while the processor waits for one it does the other.
+pub(crate) struct Octet<'a, E: Registers> {
+    pub t_s: E,
+    pub y: &'a [E],
+    pub dy: &'a mut [E],
+    pub w: &'a mut Workspace<Eight<E>>,
+}
+
+impl SideBySide<'_> {
     #[inline(always)]
-    fn apply_at_eight<E: Registers>(&self, stage: Stage, t_s: E, w: &mut Workspace<Eight<E>>) {
+    fn apply<E: Registers>(&self, stage: Stage, octets: &mut [Octet<'_, E>]) {
         for term in &self.terms[stage as usize] {
-            E::apply(term.on_eight().expect("written for eight"), t_s, w);
-        }
-    }
-
-    /// What depends on time alone, at eight moments.
-    #[inline(always)]
-    pub(crate) fn clock_at_eight<E: Registers>(&self, t_s: E, w: &mut Workspace<Eight<E>>) {
-        self.apply_at_eight(Stage::Clock, t_s, w);
-    }
-
-    /// The rates of the phases at eight moments.
-    #[inline(always)]
-    pub(crate) fn phases_at_eight<E: Registers>(
-        &self,
-        t_s: E,
-        y: &[E],
-        dy: &mut [E],
-        w: &mut Workspace<Eight<E>>,
-    ) {
-        let (phases, extra) = (self.layout.phase_range(), self.layout.extra_range());
-        if !w.extra.is_empty() {
-            w.extra.copy_from_slice(&y[extra]);
-        }
-        for (p, phase) in w.pair.iter_mut().zip(y[phases.clone()].chunks(LANES)) {
-            let second = phase.get(1).copied().unwrap_or(E::splat(0.0));
-            (p.sin, p.cos) = Two([phase[0], second]).sin_cos();
-            p.rate = p.constant_rate;
-        }
-        self.apply_at_eight(Stage::Phases, t_s, w);
-        for (p, rate) in w.pair.iter().zip(dy[phases].chunks_mut(LANES)) {
-            for (lane, rate) in rate.iter_mut().enumerate() {
-                *rate = Eight::of(p.rate, lane);
+            for at in octets.iter_mut() {
+                E::apply(*term, at.t_s, at.w);
             }
         }
     }
 
-    /// The shoulders at eight moments, where [`Self::phases_at_eight`] has just been called.
+    /// What depends on time alone.
     #[inline(always)]
-    pub(crate) fn shoulders_at_eight<E: Registers>(&self, t_s: E, w: &mut Workspace<Eight<E>>) {
-        w.pair.iter_mut().for_each(Pair::stand);
-        self.apply_at_eight(Stage::Shoulders, t_s, w);
-    }
-
-    /// The rates of body and extra states at eight moments, where the shoulders are known.
-    #[inline(always)]
-    pub(crate) fn load_at_eight<E: Registers>(
-        &self,
-        t_s: E,
-        y: &[E],
-        dy: &mut [E],
-        w: &mut Workspace<Eight<E>>,
-    ) {
-        let freedoms = self.freedoms.on_eight();
-        E::gaps(freedoms, y, w);
-        self.apply_at_eight(Stage::Handles, t_s, w);
-        w.body_torque = [E::splat(0.0); 3];
-        self.apply_at_eight(Stage::Body, t_s, w);
-        E::rates(freedoms, y, w, dy);
-        if !w.extra.is_empty() {
-            dy[self.layout.extra_range()].copy_from_slice(&w.extra_rate);
+    pub fn clock<E: Registers>(&self, t_s: E, w: &mut Workspace<Eight<E>>) {
+        for term in &self.terms[Stage::Clock as usize] {
+            E::apply(*term, t_s, w);
         }
     }
 
-    /// The rates of the ledger where [`Self::load_at_eight`] has just been called.
+    /// The rates of the phases.
     #[inline(always)]
-    pub(crate) fn powers_at_eight<E: Registers>(&self, dy: &mut [E], w: &Workspace<Eight<E>>) {
+    pub fn phases<E: Registers>(&self, octets: &mut [Octet<'_, E>]) {
+        let (phases, extra) = (self.layout.phase_range(), self.layout.extra_range());
+        for at in octets.iter_mut() {
+            if !at.w.extra.is_empty() {
+                at.w.extra.copy_from_slice(&at.y[extra.clone()]);
+            }
+            let states = at.y[phases.clone()].chunks(LANES);
+            for (p, phase) in at.w.pair.iter_mut().zip(states) {
+                let second = phase.get(1).copied().unwrap_or(E::splat(0.0));
+                (p.sin, p.cos) = Two([phase[0], second]).sin_cos();
+                p.rate = p.constant_rate;
+            }
+        }
+        self.apply(Stage::Phases, octets);
+        for at in octets.iter_mut() {
+            let rates = at.dy[phases.clone()].chunks_mut(LANES);
+            for (p, rate) in at.w.pair.iter().zip(rates) {
+                for (lane, rate) in rate.iter_mut().enumerate() {
+                    *rate = Eight::of(p.rate, lane);
+                }
+            }
+        }
+    }
+
+    /// The shoulders, where [`Self::phases`] has just been called.
+    #[inline(always)]
+    pub fn shoulders<E: Registers>(&self, octets: &mut [Octet<'_, E>]) {
+        for at in octets.iter_mut() {
+            at.w.pair.iter_mut().for_each(Pair::stand);
+        }
+        self.apply(Stage::Shoulders, octets);
+    }
+
+    /// The rates of body and extra states, where the shoulders are known.
+    #[inline(always)]
+    pub fn load<E: Registers>(&self, octets: &mut [Octet<'_, E>]) {
+        for at in octets.iter_mut() {
+            E::gaps(self.freedoms, at.y, at.w);
+        }
+        self.apply(Stage::Handles, octets);
+        for at in octets.iter_mut() {
+            at.w.body_torque = [E::splat(0.0); 3];
+        }
+        self.apply(Stage::Body, octets);
+        for at in octets.iter_mut() {
+            E::rates(self.freedoms, at.y, at.w, at.dy);
+            if !at.w.extra.is_empty() {
+                at.dy[self.layout.extra_range()].copy_from_slice(&at.w.extra_rate);
+            }
+        }
+    }
+
+    /// The rates of the ledger where [`Self::load`] has just been called.
+    #[inline(always)]
+    pub fn powers<E: Registers>(&self, dy: &mut [E], w: &Workspace<Eight<E>>) {
         let ledger = self.layout.ledger_range();
-        for ((_, account), out) in self.accounts.iter().zip(dy[ledger].chunks_exact_mut(2)) {
-            let power = E::power(account.on_eight().expect("written for eight"), w);
+        for (account, out) in self.accounts.iter().zip(dy[ledger].chunks_exact_mut(2)) {
+            let power = E::power(*account, w);
             out.copy_from_slice(&[power.work_w, power.dissipated_w]);
         }
     }

@@ -1,6 +1,6 @@
 //! The numbers of one evaluation, and which of them a term treats.
 
-use crate::lanes::{LANES, Moments, Now, Number, f64x2};
+use crate::lanes::{Eight, LANES, Moments, Now, Number, Two, Wide, f64x2};
 use std::ops::Range;
 
 /// The numbers of two carriers in one evaluation, and in the present segment. Padding exerts nothing.
@@ -57,7 +57,7 @@ impl<N: Moments> Pair<N> {
 #[derive(Clone, Debug)]
 pub struct Workspace<N: Moments = Now> {
     /// When the present segment began, s.
-    pub segment_s: f64,
+    pub segment_s: N::Each,
     /// The carriers, two by two: carrier i is lane i mod 2 of pair i / 2.
     pub pair: Vec<Pair<N>>,
     /// Rows of the rotation body → world; where the freedoms do not need it, set only if something bends.
@@ -79,6 +79,23 @@ pub struct Workspace<N: Moments = Now> {
 }
 
 impl<N: Moments> Workspace<N> {
+    /// Without carriers: for [`Workspace::spread`] to fill.
+    #[inline(always)]
+    pub fn blank() -> Self {
+        let zero = N::Each::splat(0.0);
+        Self {
+            segment_s: zero,
+            pair: Vec::new(),
+            rotation: [[zero; 3]; 3],
+            spin: [zero; 3],
+            least_load_n: 0.0,
+            beat: [zero; 2],
+            body_torque: [zero; 3],
+            extra: Vec::new(),
+            extra_rate: Vec::new(),
+        }
+    }
+
     /// A number of carrier `i`.
     #[inline(always)]
     pub fn of(&self, i: usize, pick: impl Fn(&Pair<N>) -> N::Pair) -> N::Each {
@@ -101,7 +118,7 @@ impl Workspace {
 
     /// What changes from one segment to the next, for an evaluation at other moments.
     pub fn refresh<M: Moments>(&self, to: &mut Workspace<M>) {
-        to.segment_s = self.segment_s;
+        to.segment_s = M::Each::splat(self.segment_s);
         for (to, p) in to.pair.iter_mut().zip(&self.pair) {
             to.constant_rate = M::always(p.constant_rate);
             to.contact_gain = M::always(p.contact_gain);
@@ -112,7 +129,8 @@ impl Workspace {
     /// The same segment for an evaluation at other moments: what `M` does not compute itself is what it is here.
     pub fn spread<M: Moments>(&self, to: &mut Workspace<M>) {
         let zero = M::Each::splat(0.0);
-        (to.segment_s, to.least_load_n) = (self.segment_s, self.least_load_n);
+        to.segment_s = M::Each::splat(self.segment_s);
+        to.least_load_n = self.least_load_n;
         to.extra.resize(self.extra.len(), zero);
         to.extra_rate.resize(self.extra.len(), zero);
         to.pair.clear();
@@ -137,6 +155,45 @@ impl Workspace {
                 rest,
             }
         }));
+    }
+}
+
+impl<E: Wide> Workspace<Eight<E>> {
+    /// What was evaluated at one of the moments.
+    pub fn pick(&self, moment: usize, to: &mut Workspace) {
+        let one = |x: &E| x.as_array()[moment];
+        let two = |x: &Two<E>| f64x2::new([one(&x.0[0]), one(&x.0[1])]);
+        for (to, p) in to.pair.iter_mut().zip(&self.pair) {
+            to.sin = two(&p.sin);
+            to.cos = two(&p.cos);
+            to.rate = two(&p.rate);
+            to.unclamped = two(&p.unclamped);
+            to.normal = two(&p.normal);
+            for axis in 0..3 {
+                to.base[axis] = two(&p.base[axis]);
+                to.base_rate[axis] = two(&p.base_rate[axis]);
+                to.gap[axis] = two(&p.gap[axis]);
+                to.gap_rate[axis] = two(&p.gap_rate[axis]);
+                to.arm[axis] = two(&p.arm[axis]);
+            }
+            for axis in 0..2 {
+                to.tangential[axis] = two(&p.tangential[axis]);
+            }
+        }
+        for axis in 0..3 {
+            for other in 0..3 {
+                to.rotation[axis][other] = one(&self.rotation[axis][other]);
+            }
+            to.spin[axis] = one(&self.spin[axis]);
+            to.body_torque[axis] = one(&self.body_torque[axis]);
+        }
+        to.beat = [one(&self.beat[0]), one(&self.beat[1])];
+        for (to, from) in to.extra.iter_mut().zip(&self.extra) {
+            *to = one(from);
+        }
+        for (to, from) in to.extra_rate.iter_mut().zip(&self.extra_rate) {
+            *to = one(from);
+        }
     }
 }
 

@@ -21,10 +21,20 @@ pub fn run(
 ) -> (Stats, Result<(), Stopped>) {
     let name = resolve(&METHODS[0], model, settings).name;
     let mut course = Course::new(model, name, settings, true);
-    let mut watch = model.layout().size() <= MOST_STATES;
-    if let Err(stopped) = course.begin_log(observer) {
-        return (course.stats, Err(stopped));
+    match course.begin_log(observer) {
+        Ok(()) => go(course, settings, observer),
+        Err(stopped) => (course.stats, Err(stopped)),
     }
+}
+
+/// Goes on from where a course stands, to its end.
+pub fn go(
+    mut course: Course<'_>,
+    settings: &Settings,
+    observer: &mut dyn Observer,
+) -> (Stats, Result<(), Stopped>) {
+    let name = resolve(&METHODS[0], course.model, settings).name;
+    let mut watch = course.model.layout().size() <= MOST_STATES;
     if name == "radau15" {
         let outcome;
         (course, outcome) = radau15::go(course, settings, observer);

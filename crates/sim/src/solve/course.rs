@@ -314,6 +314,10 @@ impl<'m> Course<'m> {
     /// that is there change with it. A handle that changes again and again at one moment sits on its edge: it is clamped,
     /// which is exact for it, until it has left the edge.
     pub fn fire(&mut self, observer: &mut dyn Observer) {
+        // A segment that begins at this very moment has just said how they stand.
+        if self.fresh {
+            return;
+        }
         self.model.forces(self.t_s, &self.y, &mut self.w);
         self.stats.evaluations += 1;
         // The located zero is one to rounding: its handle may be a hair short of it.

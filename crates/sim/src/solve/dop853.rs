@@ -7,7 +7,7 @@ use super::pair::{Arithmetic, Pair, Polynomial, Row, Slopes, TILE, sum};
 
 pub struct Dop853;
 
-const E3: Row = &[
+pub(super) const E3: Row = &[
     (0, -0.18980075407240762),
     (5, 4.450312892752409),
     (6, 1.8915178993145003),
@@ -17,7 +17,7 @@ const E3: Row = &[
     (10, 0.20136540080403034),
     (11, 0.02265179219836082),
 ];
-const E5: Row = &[
+pub(super) const E5: Row = &[
     (0, 0.01312004499419488),
     (5, -1.2251564463762044),
     (6, -0.4957589496572502),

@@ -98,11 +98,11 @@ fn dip(seen: &[(f64, f64)], i: usize) -> Option<[f64; 3]> {
     let last = seen.len().checked_sub(1).filter(|&last| last >= 2)?;
     let middle = i.clamp(1, last - 1);
     let [l, m, r] = [seen[middle - 1], seen[middle], seen[middle + 1]];
-    let (from, to) = if i == 0 {
+    let (from, to) = if i == 0 && l.1 <= m.1 {
         (l.0, m.0)
-    } else if i == last {
+    } else if i == last && r.1 <= m.1 {
         (m.0, r.0)
-    } else if m.1 <= l.1 && m.1 <= r.1 {
+    } else if i == middle && m.1 <= l.1 && m.1 <= r.1 {
         (l.0, r.0)
     } else {
         return None;
@@ -131,6 +131,85 @@ pub fn first(looks: &Looks, resolution: f64, mut margin: impl FnMut(f64) -> f64)
         }
     }
     None
+}
+
+/// What a step says of the first event, to whoever locates events by steps that end there rather than by a polynomial.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Ahead {
+    /// None within it.
+    Clear,
+    /// One at its end.
+    Here,
+    /// It went past one, which is at about `zero`; `beyond` is a place behind it, with the margin there.
+    Passed { zero: f64, beyond: (f64, f64) },
+    /// The margin may fall to zero at this part of the step and rise again: a step that ends there will tell.
+    Dip(f64),
+    /// It ended before the one that was known to be ahead, which is at about this part of it, beyond its end.
+    Short(f64),
+}
+
+/// Where the first zero on (0, 1] is. `seen`: the margins at the start, between and at the end, in order. `known`: a place behind the
+/// step's end where the margin is known to be negative, from a longer step. `resolution`: as a part of the step.
+pub fn ahead(seen: &[(f64, f64)], known: Option<(f64, f64)>, resolution: f64) -> Ahead {
+    let n = seen.len();
+    for i in 1..n {
+        let (theta, margin) = seen[i];
+        if margin < 0.0 {
+            let before = seen[i - 1];
+            // The nearest of the places around them, so that the steps close in as the secant's do.
+            let around = [i.checked_sub(2).map(|k| seen[k]), known];
+            let around = around.into_iter().flatten();
+            let third = around.min_by(|a, b| (a.0 - theta).abs().total_cmp(&(b.0 - theta).abs()));
+            let zero = crossing(before, seen[i], third);
+            // A step that is one moment has its event at its end, whichever look shows it.
+            return if resolution >= 1.0 || i == n - 1 && theta - zero <= resolution {
+                Ahead::Here
+            } else {
+                let beyond = seen[i];
+                Ahead::Passed { zero, beyond }
+            };
+        }
+        match dip(seen, i - 1) {
+            Some([_, at, _]) if at > LEAST_DIP && at < 1.0 - LEAST_DIP => return Ahead::Dip(at),
+            _ => {}
+        }
+    }
+    match (known, seen) {
+        (Some(beyond), [.., third, end]) => {
+            let zero = crossing(*end, beyond, Some(*third));
+            if zero - end.0 <= resolution {
+                Ahead::Here
+            } else {
+                Ahead::Short(zero)
+            }
+        }
+        _ => Ahead::Clear,
+    }
+}
+
+/// A dip so near to the border of a step is no reason to step there.
+const LEAST_DIP: f64 = 1e-3;
+
+/// The zero between `a` (margin ≥ 0) and `b` (margin < 0) of the parabola through them and a third point.
+fn crossing(a: (f64, f64), b: (f64, f64), third: Option<(f64, f64)>) -> f64 {
+    let width = b.0 - a.0;
+    if a.1 <= 0.0 {
+        // A zero at the step's start has fired already, and says nothing of the next one.
+        return a.0 + 0.5 * width;
+    }
+    let straight = (b.1 - a.1) / width;
+    let bend = third.map_or(0.0, |c| {
+        ((c.1 - b.1) / (c.0 - b.0) - straight) / (c.0 - a.0)
+    });
+    let slope = straight - bend * width;
+    let root = (slope * slope - 4.0 * bend * a.1).sqrt();
+    let at = 2.0 * a.1 / (root - slope);
+    let at = if at > 0.0 && at < width {
+        at
+    } else {
+        -a.1 / straight
+    };
+    a.0 + at
 }
 
 /// The lowest place near the middle of three, if the margin is negative there: two parabolas, through true margins.
@@ -308,5 +387,54 @@ mod tests {
         // Another handle's zero soon after it is found all the same.
         let (found, _) = find(|t| (3.0 * t).min(0.02 - t));
         assert!((found.unwrap() - 0.02).abs() < 2e-15, "{found:?}");
+    }
+
+    /// Locates the first zero by steps that end ever closer to it; returns it and how many steps that took.
+    fn walk(f: impl Fn(f64) -> f64, to: f64) -> (Option<f64>, u32) {
+        let (mut t0, mut aim, mut known) = (0.0, to, None::<(f64, f64)>);
+        for steps in 1..40 {
+            let h: f64 = aim - t0;
+            let at = |part: f64| {
+                (
+                    part,
+                    f(t0 + part * h).max(if part == 0.0 { 0.0 } else { f64::MIN }),
+                )
+            };
+            let seen = [0.0, 0.05, 0.12, 0.28, 0.6, 0.86, 1.0].map(at);
+            let ahead_of = known.map(|(t, m)| ((t - t0) / h, m)).filter(|k| k.0 > 1.0);
+            match ahead(&seen, ahead_of, 1e-13 / h) {
+                Ahead::Clear if aim < to => (t0, aim) = (aim, to),
+                Ahead::Clear => return (None, steps),
+                Ahead::Here => return (Some(aim), steps),
+                Ahead::Passed { zero, beyond } => {
+                    known = Some((t0 + beyond.0 * h, beyond.1));
+                    aim = t0 + zero * h;
+                }
+                Ahead::Dip(part) => aim = t0 + part * h,
+                Ahead::Short(zero) => (t0, aim) = (aim, t0 + zero * h),
+            }
+        }
+        panic!("no end");
+    }
+
+    #[test]
+    fn steps_find_what_polynomials_find() {
+        for zero in [0.001, 0.1, 0.3, 0.47, 0.777, 0.999] {
+            let (found, steps) = walk(|t| (zero - t) * (1.0 + t + (3.0 * t).sin()), 1.0);
+            assert!((found.unwrap() - zero).abs() < 2e-13, "{zero}: {found:?}");
+            assert!(steps <= 8, "{zero}: {steps}");
+        }
+        let (found, _) = walk(|t| (0.2 - t).min(0.4 - 2.5 * t), 1.0);
+        assert!(
+            (found.unwrap() - 0.16).abs() < 2e-13,
+            "the first of two: {found:?}"
+        );
+        let dip = |depth: f64| move |t: f64| (t - 0.45) * (t - 0.45) - depth;
+        let (found, _) = walk(dip(1e-4), 1.0);
+        assert!((found.unwrap() - 0.44).abs() < 1e-9, "{found:?}");
+        assert_eq!(walk(dip(-1e-6), 1.0).0, None);
+        assert_eq!(walk(|t| t * (2.0 - t), 1.0).0, None, "a start on a zero");
+        let (found, _) = walk(|t| (3.0 * t).min(0.02 - t), 1.0);
+        assert!((found.unwrap() - 0.02).abs() < 2e-13, "{found:?}");
     }
 }

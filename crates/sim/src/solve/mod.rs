@@ -1,5 +1,6 @@
 //! Integration methods: one file each, and one line each in [`METHODS`].
 
+pub mod abreast;
 mod auto;
 mod course;
 mod dop853;

@@ -246,7 +246,7 @@ fn tiles_mut(y: &mut [f64]) -> &mut [Tile] {
 }
 
 /// A row, empty for a stage that the method does not have.
-const fn row<P: Pair>(stage: usize) -> Row {
+pub const fn row<P: Pair>(stage: usize) -> Row {
     if stage == P::STAGES {
         P::B
     } else if stage > 0 && stage < P::STAGES {

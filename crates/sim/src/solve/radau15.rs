@@ -29,7 +29,7 @@ use crate::freedoms::rotation;
 #[cfg(target_arch = "x86_64")]
 use crate::lanes::{Avx2, Avx512};
 use crate::lanes::{MOMENTS, Plain8};
-use crate::model::{Model, Registers};
+use crate::model::{Model, Registers, SideBySide};
 use modes::{Mode, Row, modes};
 use stages::{Demand, Guess, Solved, Stages, Step};
 use tableau::C;
@@ -149,6 +149,7 @@ solve!(Avx512, solve_avx512, "avx512f,avx512dq");
 
 struct Run<'m, E: Registers> {
     course: Course<'m>,
+    side: SideBySide<'m>,
     demand: Demand,
     asked: f64,
     /// As [`TRUST`], for samples: errors of what is only looked at do not add up.
@@ -193,6 +194,7 @@ impl<'m, E: Solve> Run<'m, E> {
             asked: settings.tolerance,
             trust: (0.1 * settings.tolerance / tolerance).max(TRUST),
             stages: Stages::new(model),
+            side: model.side_by_side(),
             slope: vec![0.0; size],
             slope_known: false,
             before_s: 1.0,
@@ -280,7 +282,7 @@ impl<'m, E: Solve> Run<'m, E> {
             },
         };
         let step = Step {
-            model: self.course.model,
+            side: &self.side,
             t_s: self.course.t_s,
             y: &self.course.y,
             slope: &self.slope,
@@ -544,7 +546,7 @@ mod tests {
         let model = Model::new(&parse("tumble", scene, &[]).unwrap());
         let spin_after = |steps: u32| {
             let h = 8.0 / f64::from(steps);
-            let mut stages = Stages::<Plain8>::new(&model);
+            let (mut stages, side) = (Stages::<Plain8>::new(&model), model.side_by_side());
             let mut w = model.workspace();
             model.begin_segment(0.0, &mut w);
             w.spread(&mut stages.w);
@@ -560,7 +562,7 @@ mod tests {
                 model.rhs(t, &y, &mut slope, &mut w);
                 let start = y.clone();
                 let step = Step {
-                    model: &model,
+                    side: &side,
                     t_s: t,
                     y: &start,
                     slope: &slope,

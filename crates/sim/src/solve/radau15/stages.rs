@@ -4,7 +4,7 @@ use super::modes::{Mode, WATCHED};
 use super::tableau::{C, HALF, TABLEAU, with_start};
 use crate::freedoms::{by_columns, by_rows, turn};
 use crate::lanes::{Eight, MOMENTS, Moments, Number, Two, f64x2};
-use crate::model::{Model, Registers, Workspace};
+use crate::model::{Model, Octet, Registers, SideBySide, Workspace};
 use std::ops::Range;
 
 /// After so many sweeps an iteration that has not ended will not.
@@ -56,7 +56,7 @@ pub enum Guess {
 
 /// A step to be solved.
 pub struct Step<'a> {
-    pub model: &'a Model,
+    pub side: &'a SideBySide<'a>,
     /// Where it begins.
     pub t_s: f64,
     pub y: &'a [f64],
@@ -208,17 +208,7 @@ impl<E: Registers> Stages<E> {
         let size = model.layout().size();
         let zero = E::splat(0.0);
         Self {
-            w: Workspace {
-                segment_s: 0.0,
-                pair: Vec::new(),
-                rotation: [[zero; 3]; 3],
-                spin: [zero; 3],
-                least_load_n: 0.0,
-                beat: [zero; 2],
-                body_torque: [zero; 3],
-                extra: Vec::new(),
-                extra_rate: Vec::new(),
-            },
+            w: Workspace::blank(),
             y: vec![zero; size],
             f: vec![zero; size],
             parts: vec![zero; size],
@@ -242,6 +232,16 @@ impl<E: Registers> Stages<E> {
             carriers_lead: model.carriers_lead(),
             watch: Vec::new(),
             margin: zero,
+        }
+    }
+
+    #[inline(always)]
+    fn octet(&mut self, t_s: E) -> Octet<'_, E> {
+        Octet {
+            t_s,
+            y: &self.y,
+            dy: &mut self.f,
+            w: &mut self.w,
         }
     }
 
@@ -330,7 +330,7 @@ impl<E: Registers> Stages<E> {
     #[inline(always)]
     pub fn solve_here(&mut self, step: &Step<'_>) -> Solved {
         let &Step {
-            model,
+            side,
             t_s: t0,
             y: y0,
             slope,
@@ -340,12 +340,12 @@ impl<E: Registers> Stages<E> {
             ref found_at,
             demand,
         } = step;
-        let ledger = model.layout().ledger_range();
+        let ledger = side.layout.ledger_range();
         let watched = ledger.start;
-        let phases = model.layout().phase_range();
+        let phases = side.layout.phase_range();
         self.guess(y0, h, slope, guess);
         let t = self.nodes.madd(E::splat(h), E::splat(t0));
-        model.clock_at_eight(t, &mut self.w);
+        side.clock(t, &mut self.w);
         let mut carriers = if !self.carriers_lead {
             Carriers::Feel
         } else if phases.is_empty() {
@@ -360,7 +360,7 @@ impl<E: Registers> Stages<E> {
         // Each function is called at one place: at two it is not inlined, nor are the registers' operations then.
         loop {
             if carriers != Carriers::Solved {
-                model.phases_at_eight(t, &self.y, &mut self.f, &mut self.w);
+                side.phases(&mut [self.octet(t)]);
             }
             if carriers == Carriers::Lead {
                 let change = self.follow(y0, h, phases.clone());
@@ -374,12 +374,12 @@ impl<E: Registers> Stages<E> {
                 continue;
             }
             if carriers != Carriers::Solved {
-                model.shoulders_at_eight(t, &mut self.w);
+                side.shoulders(&mut [self.octet(t)]);
             }
             if carriers == Carriers::Settle {
                 (carriers, last) = (Carriers::Solved, f64::INFINITY);
             }
-            model.load_at_eight(t, &self.y, &mut self.f, &mut self.w);
+            side.load(&mut [self.octet(t)]);
             sweeps += 1;
             if sweeps == 1 {
                 self.prepare(modes, found_at, h);
@@ -411,7 +411,7 @@ impl<E: Registers> Stages<E> {
             nearest = nearest.larger(passed.0[0].larger(passed.0[1]));
         }
         self.margin = -nearest;
-        model.powers_at_eight(&mut self.f, &self.w);
+        side.powers(&mut self.f, &self.w);
         for d in ledger {
             self.y[d] = product(&self.a, &self.f[d]).madd(E::splat(h), E::splat(y0[d]));
         }

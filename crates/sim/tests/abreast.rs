@@ -1,0 +1,158 @@
+//! Runs side by side in the processor's registers are as good as runs by themselves.
+
+use sim::model::Model;
+use sim::run::{Listener, Sample, run_abreast, run_model};
+use sim::scene::{BUILTIN, Scene, parse};
+use sim::solve::{Event, Settings, Stats, Stopped, abreast, method};
+
+#[derive(Default)]
+struct Seen {
+    t_s: Vec<f64>,
+    of: [Vec<f64>; 2],
+    events: usize,
+}
+
+impl Listener for Seen {
+    fn sample(&mut self, s: &Sample) -> bool {
+        self.t_s.push(s.t_s);
+        self.of[0].push(s.pose.roll_pitch_yaw_rad()[0]);
+        self.of[1].push(s.pose.position_m[2]);
+        true
+    }
+    fn event(&mut self, _event: &Event) {
+        self.events += 1;
+    }
+}
+
+fn settings(tolerance: f64) -> Settings {
+    Settings {
+        tolerance,
+        step_s: 1e-3,
+        most_evaluations: 1 << 40,
+    }
+}
+
+fn models(scene: &Scene, seeds: std::ops::Range<u64>) -> Vec<Model> {
+    let with = |seed| {
+        Model::new(&Scene {
+            seed,
+            ..scene.clone()
+        })
+    };
+    seeds.map(with).collect()
+}
+
+fn together(models: &[Model], tolerance: f64) -> Vec<(Seen, Stats, Result<(), Stopped>)> {
+    let mut seen: Vec<Seen> = models.iter().map(|_| Seen::default()).collect();
+    let ended = run_abreast(models, &settings(tolerance), &mut seen);
+    let both = seen.into_iter().zip(ended);
+    both.map(|(seen, (stats, outcome))| (seen, stats, outcome))
+        .collect()
+}
+
+fn alone(model: &Model, tolerance: f64) -> Seen {
+    let mut seen = Seen::default();
+    let dop853 = method("dop853").unwrap();
+    let (_, outcome) = run_model(model, dop853, &settings(tolerance), &mut seen);
+    outcome.unwrap();
+    seen
+}
+
+/// Largest difference of roll and of height, in parts of half the truth's range.
+fn errors(seen: &Seen, truth: &Seen) -> [f64; 2] {
+    assert_eq!(seen.t_s, truth.t_s);
+    [0, 1].map(|a| {
+        let (seen, truth) = (&seen.of[a], &truth.of[a]);
+        let (low, high) = truth
+            .iter()
+            .fold((f64::MAX, f64::MIN), |(l, h), x| (l.min(*x), h.max(*x)));
+        // A motion that is hardly one is held absolutely.
+        let size = if high - low < 1e-3 {
+            0.1
+        } else {
+            0.5 * (high - low)
+        };
+        let differences = seen.iter().zip(truth).map(|(x, y)| (x - y).abs());
+        differences.fold(0.0, f64::max) / size
+    })
+}
+
+#[test]
+fn every_built_in_scene_stays_within_the_tolerance() {
+    let mut tried = 0;
+    for &(name, text) in BUILTIN {
+        let off = ["solver.energy=false".to_owned()];
+        let mut scene = parse(name, text, &off).unwrap();
+        scene.duration_s = scene.duration_s.min(60.0);
+        let seed = scene.seed;
+        let models = models(&scene, seed..seed + 2);
+        if !abreast::suits(&models[0]) {
+            continue;
+        }
+        tried += 1;
+        let truths: Vec<Seen> = models.iter().map(|m| alone(m, 1e-10)).collect();
+        for tolerance in [1e-4, 1e-6] {
+            for ((seen, stats, outcome), truth) in together(&models, tolerance).iter().zip(&truths)
+            {
+                assert_eq!(*outcome, Ok(()));
+                let worst = errors(seen, truth);
+                println!("{name} {tolerance:e}: {worst:?}, {stats:?}");
+                assert!(
+                    worst.iter().all(|e| *e <= 10.0 * tolerance),
+                    "{name} at {tolerance:e}: {worst:?}"
+                );
+                assert!(stats.evaluations > 0);
+            }
+        }
+    }
+    assert!(tried >= 5, "{tried}");
+}
+
+/// What a beat does that changes its tempo and pauses depends on the segment, which each lane has for itself.
+#[test]
+fn tempo_changes_pauses_and_samples_off_the_noise_grid_are_met() {
+    let varied = [
+        "solver.energy=false".to_owned(),
+        "duration_s=20".to_owned(),
+        "log_rate_hz=17".to_owned(),
+        "effects.music.tempo_changes=[{ at_s = 5.03, over_s = 2.0, beat_hz = 2.3 }, { at_s = 12.0, beat_hz = 1.95 }]".to_owned(),
+        "effects.music.pauses=[{ from_s = 8.01, to_s = 9.5 }]".to_owned(),
+    ];
+    let text = sim::scene::builtin("tempo-change").unwrap();
+    let scene = parse("tempo-change", text, &varied).unwrap();
+    let models = models(&scene, 40..58);
+    for (model, (seen, _, outcome)) in models.iter().zip(together(&models, 1e-6)) {
+        assert_eq!(outcome, Ok(()));
+        let truth = alone(model, 1e-10);
+        assert_eq!(seen.events, truth.events);
+        let worst = errors(&seen, &truth);
+        assert!(worst.iter().all(|e| *e <= 1e-5), "{worst:?}");
+    }
+}
+
+/// What stability limits is left to the method that `auto` has for it, and is as good.
+#[test]
+fn a_stiff_scene_is_handed_over() {
+    let stiff = [
+        "solver.energy=false".to_owned(),
+        "duration_s=6".to_owned(),
+        "effects.contact.stiffness_n_per_m=3e7".to_owned(),
+        "effects.contact.damping_n_s_per_m=4e5".to_owned(),
+    ];
+    let music = sim::scene::builtin("music").unwrap();
+    let models = models(&parse("music", music, &stiff).unwrap(), 1..4);
+    for (model, (seen, stats, outcome)) in models.iter().zip(together(&models, 1e-6)) {
+        assert_eq!(outcome, Ok(()));
+        assert!(stats.evaluations < 1_000_000, "{stats:?}");
+        let mut auto = Seen::default();
+        let (by_itself, ended) =
+            run_model(model, method("auto").unwrap(), &settings(1e-6), &mut auto);
+        assert_eq!(ended, Ok(()));
+        let truth = alone(model, 1e-10);
+        let (worst, its) = (errors(&seen, &truth), errors(&auto, &truth));
+        println!("{worst:?} with {stats:?}; by itself {its:?} with {by_itself:?}");
+        for (worst, its) in worst.iter().zip(its) {
+            assert!(*worst <= f64::max(1e-5, 2.0 * its), "{worst:?} {its:?}");
+        }
+    }
+}
