@@ -5,11 +5,12 @@ use crate::statistics::correlation;
 use analyze::inputs::{Inputs, Window};
 use analyze::metrics::metrics_of;
 use sim::model::Model;
-use sim::run::{Listener, Sample, run_model, settings};
+use sim::run::{Listener, Sample, run_abreast, run_model, settings};
 use sim::scene::Scene;
 use sim::sensors::Reading;
-use sim::solve::{Stats, Stopped, method};
+use sim::solve::{Settings, Stats, Stopped, abreast, method};
 use std::convert::Infallible;
+use std::ops::Range;
 use std::sync::atomic::AtomicBool;
 
 /// The metrics that an ensemble keeps of each run.
@@ -64,9 +65,17 @@ impl Columns {
     pub fn new(scene: &Scene) -> Self {
         let n = scene.carriers.count();
         let [gx, gy, gz] = scene.body.gravity_m_per_s2;
+        // What a run of minutes needs; a longer one's columns grow as they must.
+        let samples = (scene.duration_s * scene.log_rate_hz).min(1e4) as usize + 2;
+        let column = || Vec::with_capacity(samples);
         Self {
             inputs: Inputs {
-                normal_n: vec![Vec::new(); n],
+                t_s: column(),
+                height_m: column(),
+                roll_rad: column(),
+                pitch_rad: column(),
+                yaw_rad: column(),
+                normal_n: (0..n).map(|_| column()).collect(),
                 mass_kg: Some(scene.body.mass_kg),
                 gravity_m_per_s2: (gx * gx + gy * gy + gz * gz).sqrt(),
                 ..Inputs::default()
@@ -114,6 +123,41 @@ pub fn observe(
     };
     let (stats, outcome) = run_model(&model, method, &settings, &mut both);
     (both.columns.inputs, stats, outcome)
+}
+
+/// As [`observe`] with method `auto`, of one scene under several seeds: side by side in the processor's registers, as far as the scene is one
+/// for that (else `None`). What a seed gives does not depend on the others.
+pub fn observe_abreast(
+    scene: &Scene,
+    seeds: Range<u64>,
+    most_evaluations: u64,
+) -> Option<Vec<(Inputs, Stats, Result<(), Stopped>)>> {
+    let model = |seed| {
+        let model = Model::new(&Scene {
+            seed,
+            ..scene.clone()
+        });
+        abreast::suits(&model).then_some(model)
+    };
+    let models: Vec<Model> = seeds.map(model).collect::<Option<_>>()?;
+    let settings = Settings {
+        most_evaluations,
+        ..settings(scene)
+    };
+    let mut columns: Vec<Columns> = models.iter().map(|_| Columns::new(scene)).collect();
+    let ended = run_abreast(&models, &settings, &mut columns);
+    let both = columns.into_iter().zip(ended);
+    Some(
+        both.map(|(c, (stats, end))| (c.inputs, stats, end))
+            .collect(),
+    )
+}
+
+impl Listener for Columns {
+    fn sample(&mut self, sample: &Sample) -> bool {
+        self.push(sample);
+        true
+    }
 }
 
 struct Both<'a> {

@@ -10,8 +10,8 @@ pub mod spec;
 pub mod summary;
 pub mod table;
 
-use crate::ensemble::observe;
-use analyze::inputs::Window;
+use crate::ensemble::{observe, observe_abreast};
+use analyze::inputs::{Inputs, Window};
 use analyze::metrics::{Metric, find, metrics_of};
 use design::Points;
 use recording::write::{RecordingWriter, WriterOptions};
@@ -20,7 +20,7 @@ use sim::record::{Recorder, VERSION};
 use sim::run::{Listener, Sample};
 use sim::scene::{Scene, Template};
 use sim::sensors::Reading;
-use sim::solve::Stats;
+use sim::solve::{METHODS, Stats};
 use spec::{DesignKind, Spec, flatten, number};
 use std::ops::Range;
 use std::panic::AssertUnwindSafe;
@@ -42,6 +42,11 @@ pub const FIXED_COLUMNS: &[&str] = &[
 
 /// Work after which a run is given up: a thousand times what a minute of the paper's scenes takes.
 const MOST_EVALUATIONS: u64 = 100_000_000;
+
+/// With fewer seeds than fill the lanes, runs take less time one by one.
+const WORTH_ABREAST: u64 = 16;
+/// More at a time gain little and hold memory: the columns of a minute's run are some 200 kB.
+const MOST_ABREAST: u64 = 128;
 
 /// A study, ready to run: what run `k` is follows from `k` alone.
 pub struct Plan {
@@ -223,21 +228,61 @@ impl Plan {
         self.spec.first_seed + run % self.spec.seeds
     }
 
-    /// Runs one run: its row, which says why where there is no result. A recording goes into `recordings` where one is named.
-    pub fn run(&self, run: u64, recordings: Option<&Path>) -> Vec<Cell> {
-        let outcome = std::panic::catch_unwind(AssertUnwindSafe(|| self.measure(run, recordings)));
-        let (metrics, stats, failed) = outcome.unwrap_or_else(|cause| {
-            let text = cause
-                .downcast_ref::<String>()
-                .map(String::as_str)
-                .or_else(|| cause.downcast_ref::<&str>().copied())
-                .unwrap_or("no message");
-            (
-                Vec::new(),
-                None,
-                Some(format!("the program broke off: {text}")),
-            )
-        });
+    /// How many of `runs` runs a thread of `jobs` is best given at a time: more than one only where seeds can go abreast, and so that all
+    /// threads end together.
+    pub fn batch(&self, runs: u64, jobs: usize) -> u64 {
+        if self.goes_abreast() {
+            let jobs = jobs as u64;
+            let batches = runs.div_ceil(MOST_ABREAST).max(4 * jobs);
+            let batches = batches.next_multiple_of(jobs);
+            runs.div_ceil(batches).max(WORTH_ABREAST)
+        } else {
+            1
+        }
+    }
+
+    fn goes_abreast(&self) -> bool {
+        !self.spec.recordings && self.spec.seeds >= WORTH_ABREAST
+    }
+
+    /// Runs some runs: their rows, which say why where there is no result. A recording goes into `recordings` where one is named.
+    ///
+    /// A row does not depend on which others are computed with it.
+    pub fn run(&self, runs: Range<u64>, recordings: Option<&Path>) -> Vec<Vec<Cell>> {
+        let measure = |runs: Range<u64>| {
+            std::panic::catch_unwind(AssertUnwindSafe(|| self.measure(runs, recordings)))
+        };
+        let mut rows = Vec::new();
+        let mut run = runs.start;
+        while run < runs.end {
+            let point = run..runs.end.min(run + self.spec.seeds - run % self.spec.seeds);
+            run = point.end;
+            if let Ok(found) = measure(point.clone()) {
+                rows.extend(point.zip(found).map(|(run, found)| self.row(run, found)));
+                continue;
+            }
+            // One of them breaks off; the others need not suffer.
+            for run in point {
+                let found = measure(run..run + 1).unwrap_or_else(|cause| {
+                    let text = cause
+                        .downcast_ref::<String>()
+                        .map(String::as_str)
+                        .or_else(|| cause.downcast_ref::<&str>().copied())
+                        .unwrap_or("no message");
+                    vec![Measured::failed(format!("the program broke off: {text}"))]
+                });
+                rows.extend(found.into_iter().map(|found| self.row(run, found)));
+            }
+        }
+        rows
+    }
+
+    fn row(&self, run: u64, found: Measured) -> Vec<Cell> {
+        let Measured {
+            metrics,
+            stats,
+            failed,
+        } = found;
         // OK because all these counts are far below 2^63.
         let whole = |n: u64| Cell::Whole(n as i64);
         let mut row = vec![whole(run), whole(run / self.spec.seeds)];
@@ -271,37 +316,72 @@ impl Plan {
         row
     }
 
-    fn measure(
-        &self,
-        run: u64,
-        recordings: Option<&Path>,
-    ) -> (Vec<Cell>, Option<Stats>, Option<String>) {
-        let scene = match self.scene(run) {
+    fn measure(&self, runs: Range<u64>, recordings: Option<&Path>) -> Vec<Measured> {
+        let scene = match self.scene(runs.start) {
             Ok(scene) => scene,
-            Err(reason) => return (Vec::new(), None, Some(reason)),
+            Err(reason) => return runs.map(|_| Measured::failed(reason.clone())).collect(),
         };
+        // By the plan alone, not by how many happen to be together: a row is to be the same however the runs are shared out.
+        let abreast = self.goes_abreast() && scene.solver.method == METHODS[0].name;
+        let seeds = scene.seed..scene.seed + (runs.end - runs.start);
+        let found = abreast.then(|| observe_abreast(&scene, seeds, MOST_EVALUATIONS));
+        if let Some(found) = found.flatten() {
+            let found = found.into_iter();
+            return found
+                .map(|(inputs, stats, ended)| {
+                    self.weigh(&scene, &inputs, stats, ended.map_err(|e| e.to_string()))
+                })
+                .collect();
+        }
+        let alone = |run: u64| {
+            let seed = self.seed(run);
+            let scene = Scene {
+                seed,
+                ..scene.clone()
+            };
+            self.measure_alone(run, &scene, recordings)
+        };
+        runs.map(alone).collect()
+    }
+
+    fn measure_alone(&self, run: u64, scene: &Scene, recordings: Option<&Path>) -> Measured {
         let model;
         let mut keeper = Keeper(None);
         if let Some(folder) = recordings {
-            model = Model::new(&scene);
+            model = Model::new(scene);
             let path = folder.join(format!("run-{run:09}.mcap"));
             let recorder = RecordingWriter::create(&path, &WriterOptions::default())
                 .and_then(|writer| Recorder::new(&model, writer));
             match recorder {
                 Ok(recorder) => keeper.0 = Some(recorder),
-                Err(error) => return (Vec::new(), None, Some(error.to_string())),
+                Err(error) => return Measured::failed(error.to_string()),
             }
         }
-        let (inputs, stats, outcome) = observe(&scene, Some(MOST_EVALUATIONS), &mut keeper);
+        let (inputs, stats, outcome) = observe(scene, Some(MOST_EVALUATIONS), &mut keeper);
         // The writer knows best why it stopped a run.
         let kept = keeper
             .0
             .map_or(Ok(()), |r| r.finish().map_err(|e| e.to_string()));
-        if let Err(reason) = kept.and(outcome.map_err(|e| e.to_string())) {
-            return (Vec::new(), Some(stats), Some(reason));
+        let ended = kept.and(outcome.map_err(|e| e.to_string()));
+        self.weigh(scene, &inputs, stats, ended)
+    }
+
+    /// The metrics of a run that has ended.
+    fn weigh(
+        &self,
+        scene: &Scene,
+        inputs: &Inputs,
+        stats: Stats,
+        ended: Result<(), String>,
+    ) -> Measured {
+        if let Err(reason) = ended {
+            return Measured {
+                stats: Some(stats),
+                ..Measured::failed(reason)
+            };
         }
         let wanted = |name: &str| self.metrics.iter().any(|m| m.name == name);
-        let found = metrics_of(&inputs, Window::from(scene.analysis_start_s), wanted);
+        let found = metrics_of(inputs, Window::from(scene.analysis_start_s), wanted);
         let cell = |metric: &&Metric| {
             found.get(metric.name).map_or(Cell::Empty, |value| {
                 let real = value.as_f64().map(Cell::Real);
@@ -310,7 +390,28 @@ impl Plan {
                     .unwrap_or(Cell::Empty)
             })
         };
-        (self.metrics.iter().map(cell).collect(), Some(stats), None)
+        Measured {
+            metrics: self.metrics.iter().map(cell).collect(),
+            stats: Some(stats),
+            failed: None,
+        }
+    }
+}
+
+/// What came of a run: its metrics in the order of the plan's, the solver's work, and why there are none.
+struct Measured {
+    metrics: Vec<Cell>,
+    stats: Option<Stats>,
+    failed: Option<String>,
+}
+
+impl Measured {
+    fn failed(reason: String) -> Self {
+        Self {
+            metrics: Vec::new(),
+            stats: None,
+            failed: Some(reason),
+        }
     }
 }
 

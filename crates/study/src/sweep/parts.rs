@@ -11,10 +11,11 @@ use super::Plan;
 use super::shard::Shard;
 use super::summary::{Found, Summary};
 use super::table::{Cell, Notes, Reader, Writer};
-use crate::pool::in_order;
+use crate::pool::{in_order, threads};
 use parquet::errors::ParquetError;
 use sim::record::VERSION;
 use std::io::{BufWriter, Write};
+use std::ops::Range;
 use std::path::{Path, PathBuf};
 use std::sync::atomic::AtomicBool;
 
@@ -162,39 +163,61 @@ impl<'p> Store<'p> {
     ) -> Outcome<Written> {
         let recordings = self.folder.join("recordings");
         let recordings = self.plan.spec.recordings.then_some(&*recordings);
-        let size = self.plan.block_runs();
-        // All blocks but the very last are of one size.
         let runs: u64 = blocks
             .iter()
             .map(|b| self.plan.block(*b))
             .map(|r| r.end - r.start)
             .sum();
+        let batch = self.plan.batch(runs, threads(jobs));
         let mut written = Written::default();
-        let mut rows = Vec::new();
+        let (mut rows, mut due) = (Vec::new(), blocks.iter());
+        let mut block = due.next();
         in_order(
-            runs,
+            runs.div_ceil(batch),
             jobs,
             stop,
             |k| {
-                let block = blocks[(k / size) as usize];
-                self.plan
-                    .run(self.plan.block(block).start + k % size, recordings)
+                let range = k * batch..runs.min((k + 1) * batch);
+                let pieces = self.pieces(blocks, range).into_iter();
+                let rows = pieces.flat_map(|piece| self.plan.run(piece, recordings));
+                rows.collect::<Vec<_>>()
             },
-            |k, row| {
-                rows.push(row);
-                done();
-                let block = blocks[(k / size) as usize];
-                let range = self.plan.block(block);
-                if rows.len() as u64 == range.end - range.start {
-                    written.failed += self.write_part(block, &rows)?;
-                    written.parts += 1;
-                    written.runs += rows.len() as u64;
-                    rows.clear();
+            |_, batch| {
+                for row in batch {
+                    rows.push(row);
+                    done();
+                    let Some(&of) = block else { continue };
+                    let range = self.plan.block(of);
+                    if rows.len() as u64 == range.end - range.start {
+                        written.failed += self.write_part(of, &rows)?;
+                        written.parts += 1;
+                        written.runs += rows.len() as u64;
+                        rows.clear();
+                        block = due.next();
+                    }
                 }
                 Ok::<(), String>(())
             },
         )?;
         Ok(written)
+    }
+
+    /// The runs at some places in the row of all runs of `blocks`, where all blocks but the very last are of one size.
+    fn pieces(&self, blocks: &[u64], places: Range<u64>) -> Vec<Range<u64>> {
+        let size = self.plan.block_runs();
+        let mut pieces: Vec<Range<u64>> = Vec::new();
+        let mut place = places.start;
+        while place < places.end {
+            let block = self.plan.block(blocks[(place / size) as usize]);
+            let first = block.start + place % size;
+            let last = block.end.min(first + (places.end - place));
+            match pieces.last_mut() {
+                Some(before) if before.end == first => before.end = last,
+                _ => pieces.push(first..last),
+            }
+            place += last - first;
+        }
+        pieces
     }
 
     fn write_part(&self, block: u64, rows: &[Vec<Cell>]) -> Outcome<u64> {
