@@ -134,7 +134,7 @@ pub fn run_model(
 /// are several, in less time. What a run gives does not depend on which others there are.
 ///
 /// # Panics
-/// When [`abreast::suits`] says no of one of them, or there are not as many listeners.
+/// When [`abreast::suits`] says no of one of them, when their scenes differ in more than the seed, or when there are not as many listeners.
 pub fn run_abreast<L: Listener>(
     models: &[Model],
     settings: &Settings,

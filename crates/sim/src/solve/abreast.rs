@@ -16,6 +16,7 @@ use super::{Observer, Settings, Stats, Stopped, auto};
 use crate::lanes::{Avx2, Avx512};
 use crate::lanes::{Eight, LANES, MOMENTS, Plain8, Two};
 use crate::model::{Model, Octet, Registers, SideBySide, Workspace};
+use crate::scene::Scene;
 
 const NAME: &str = "dop853";
 const STAGES: usize = Dop853::STAGES;
@@ -66,16 +67,23 @@ pub fn suits(model: &Model) -> bool {
 /// Integrates models of one scene that differ in their seeds alone; `observers` in the same order.
 ///
 /// # Panics
-/// When [`suits`] says no of one of them.
+/// When [`suits`] says no of one of them, when their scenes differ in more than the seed, or when there are not as many observers.
 pub fn run(
     models: &[Model],
     settings: &Settings,
     observers: &mut [&mut dyn Observer],
 ) -> Vec<(Stats, Result<(), Stopped>)> {
-    assert!(models.iter().all(suits) && models.len() == observers.len());
     let Some(first) = models.first() else {
         return Vec::new();
     };
+    assert_eq!(models.len(), observers.len());
+    for model in models {
+        let alike = Scene {
+            seed: first.scene.seed,
+            ..model.scene.clone()
+        };
+        assert!(suits(model) && alike == first.scene, "not one scene");
+    }
     #[cfg(target_arch = "x86_64")]
     {
         if is_x86_feature_detected!("avx512f") && is_x86_feature_detected!("avx512dq") {
@@ -807,7 +815,7 @@ mod tests {
         let brief = ["duration_s=12".to_owned(), "solver.energy=false".to_owned()];
         let scene = parse(name, builtin(name).unwrap(), &brief).unwrap();
         let with = |seed| {
-            Model::new(&crate::scene::Scene {
+            Model::new(&Scene {
                 seed,
                 ..scene.clone()
             })
