@@ -45,8 +45,11 @@ const MOST_EVALUATIONS: u64 = 100_000_000;
 
 /// With fewer seeds than fill the lanes, runs take less time one by one.
 const WORTH_ABREAST: u64 = 16;
-/// More at a time gain little and hold memory: the columns of a minute's run are some 200 kB.
+/// More at a time gain little, and hold memory: the columns of all of them, some 100 bytes a sample.
 const MOST_ABREAST: u64 = 128;
+const SAMPLES_ABREAST: f64 = 250e3;
+/// Runs of more samples are computed one by one.
+const LONGEST_ABREAST: f64 = 20e3;
 
 /// A study, ready to run: what run `k` is follows from `k` alone.
 pub struct Plan {
@@ -321,17 +324,26 @@ impl Plan {
             Ok(scene) => scene,
             Err(reason) => return runs.map(|_| Measured::failed(reason.clone())).collect(),
         };
-        // By the plan alone, not by how many happen to be together: a row is to be the same however the runs are shared out.
-        let abreast = self.goes_abreast() && scene.solver.method == METHODS[0].name;
-        let seeds = scene.seed..scene.seed + (runs.end - runs.start);
-        let found = abreast.then(|| observe_abreast(&scene, seeds, MOST_EVALUATIONS));
-        if let Some(found) = found.flatten() {
-            let found = found.into_iter();
-            return found
-                .map(|(inputs, stats, ended)| {
+        // By plan and scene alone, not by how many happen to be together: a row is to be the same however the runs are shared out.
+        let samples = scene.duration_s * scene.log_rate_hz;
+        let auto = scene.solver.method == METHODS[0].name;
+        if self.goes_abreast() && recordings.is_none() && auto && samples <= LONGEST_ABREAST {
+            let most = SAMPLES_ABREAST / samples.max(1.0);
+            let most = (most as u64).clamp(WORTH_ABREAST, MOST_ABREAST);
+            let mut found = Vec::new();
+            let end = scene.seed + (runs.end - runs.start);
+            for first in (scene.seed..end).step_by(most as usize) {
+                let seeds = first..end.min(first + most);
+                let Some(ended) = observe_abreast(&scene, seeds, MOST_EVALUATIONS) else {
+                    break;
+                };
+                found.extend(ended.into_iter().map(|(inputs, stats, ended)| {
                     self.weigh(&scene, &inputs, stats, ended.map_err(|e| e.to_string()))
-                })
-                .collect();
+                }));
+            }
+            if !found.is_empty() {
+                return found;
+            }
         }
         let alone = |run: u64| {
             let seed = self.seed(run);
