@@ -1,8 +1,9 @@
-//! Runs abreast: eight runs of one scene under different seeds, side by side in the processor's registers.
+//! Runs abreast: runs of one scene under different seeds, eight and eight side by side in the processor's registers.
 //!
 //! The explicit method of order 8 (`super::dop853`), each run in a lane of its own with its own time, step size and contacts. All lanes
 //! take their steps together, so that one evaluation serves eight runs; whether a step is accepted, where it ends and what happens there is
-//! each lane's own affair. No lane feels its neighbours: a run is the same, bit for bit, whoever runs beside it.
+//! each lane's own affair. No lane feels its neighbours: a run is the same, bit for bit, whoever runs beside it. A lane whose run has ended
+//! takes the next one.
 //!
 //! Steps end at samples, and events are located by steps that end there: there is no polynomial to be trusted. What an explicit method should
 //! not do, and what does not go forward, is left to `auto` from where it stands.
