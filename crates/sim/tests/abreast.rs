@@ -130,6 +130,25 @@ fn tempo_changes_pauses_and_samples_off_the_noise_grid_are_met() {
     }
 }
 
+/// A stage that saw a contact open which does not: steps that walk up to it must come to an end.
+#[test]
+fn an_event_that_never_comes_holds_no_run_up() {
+    let brief = ["solver.energy=false".to_owned(), "duration_s=60".to_owned()];
+    let music = sim::scene::builtin("music").unwrap();
+    let scene = parse("music", music, &brief).unwrap();
+    for seed in [3925, 7845] {
+        let models = models(&scene, seed..seed + 1);
+        let (seen, stats, outcome) = together(&models, 1e-6).swap_remove(0);
+        assert_eq!(outcome, Ok(()));
+        assert!(stats.evaluations < 400_000, "{stats:?}");
+        let truth = alone(&models[0], 1e-10);
+        assert_eq!(seen.events, truth.events);
+        let worst = errors(&seen, &truth);
+        println!("seed {seed}: {worst:?} {stats:?}");
+        assert!(worst.iter().all(|e| *e <= 1e-5), "{worst:?}");
+    }
+}
+
 /// What stability limits is left to the method that `auto` has for it, and is as good.
 #[test]
 fn a_stiff_scene_is_handed_over() {

@@ -635,11 +635,13 @@ impl<E: Together> Abreast<E> {
         let mut event = false;
         if least < 0.0 || dips || lane.beyond.is_some() {
             match group.look(l, lane) {
-                Ahead::Clear => {}
+                // What a longer step saw behind an event may turn out to be none when a shorter one gets there.
+                Ahead::Clear => lane.beyond = None,
                 Ahead::Here => event = true,
                 Ahead::Short(zero) => {
-                    lane.aim_s = Some(lane.course.t_s + zero * lane.h_s);
-                    lane.tries += 1;
+                    if lane.again(lane.course.t_s + zero * lane.h_s) == Ended::Given {
+                        return Ended::Given;
+                    }
                 }
                 Ahead::Passed { zero, beyond } => {
                     let (t0, h) = (lane.course.t_s, lane.h_s);
@@ -773,7 +775,7 @@ impl Lane<'_> {
         };
     }
 
-    /// Takes the step again, to another end.
+    /// Aims at another end, for the same step or the next one.
     fn again(&mut self, aim_s: f64) -> Ended {
         self.aim_s = Some(aim_s);
         self.tries += 1;
