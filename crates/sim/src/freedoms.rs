@@ -36,7 +36,7 @@ impl Pose {
         let sin_pitch = 2.0 * (w * y - x * z);
         let level = 1.0 - 2.0 * (y * y + z * z);
         let across = 2.0 * (x * y + w * z);
-        let cos_pitch = level.hypot(across);
+        let cos_pitch = (level * level + across * across).sqrt();
         let pitch = sin_pitch.atan2(cos_pitch);
         if cos_pitch < 1e-9 {
             // ±90°: q = R_z(yaw) R_y(±90°) R_x(roll) depends on roll ∓ yaw only.

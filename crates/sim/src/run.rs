@@ -56,6 +56,8 @@ pub trait Listener {
     fn reading(&mut self, _reading: &Reading<'_>) {}
     /// Called when a contact changes.
     fn event(&mut self, _event: &Event) {}
+    /// Called by [`run_abreast`] when this run has ended, which may be long before all have: what it kept can be let go.
+    fn ended(&mut self, _stats: &Stats, _outcome: &Result<(), Stopped>) {}
 }
 
 impl<F: FnMut(&Sample) -> bool> Listener for F {
@@ -244,5 +246,9 @@ impl Observer for Bridge<'_> {
 
     fn event(&mut self, event: &Event) {
         self.listener.event(event);
+    }
+
+    fn ended(&mut self, stats: &Stats, outcome: &Result<(), Stopped>) {
+        self.listener.ended(stats, outcome);
     }
 }

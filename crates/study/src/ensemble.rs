@@ -9,6 +9,7 @@ use sim::run::{Listener, Sample, run_abreast, run_model, settings};
 use sim::scene::Scene;
 use sim::sensors::Reading;
 use sim::solve::{Settings, Stats, Stopped, abreast, method};
+use std::cell::RefCell;
 use std::convert::Infallible;
 use std::ops::Range;
 use std::sync::atomic::AtomicBool;
@@ -83,6 +84,21 @@ impl Columns {
         }
     }
 
+    /// Forgets all samples, but not what room they took.
+    fn clear(&mut self) {
+        let i = &mut self.inputs;
+        let single = [
+            &mut i.t_s,
+            &mut i.height_m,
+            &mut i.roll_rad,
+            &mut i.pitch_rad,
+            &mut i.yaw_rad,
+            &mut i.beat_phase_rad,
+        ];
+        let several = i.normal_n.iter_mut().chain(&mut i.phase_rad);
+        single.into_iter().chain(several).for_each(Vec::clear);
+    }
+
     /// Adds a sample.
     pub fn push(&mut self, s: &Sample) {
         let i = &mut self.inputs;
@@ -125,13 +141,14 @@ pub fn observe(
     (both.columns.inputs, stats, outcome)
 }
 
-/// As [`observe`] with method `auto`, of one scene under several seeds: side by side in the processor's registers, as far as the scene is one
-/// for that (else `None`). What a seed gives does not depend on the others.
-pub fn observe_abreast(
+/// One scene under several seeds with method `auto`, side by side in the processor's registers, as far as the scene is one for that (else
+/// `None`): what `measure` makes of each run. What a seed gives does not depend on the others.
+pub fn measure_abreast<T>(
     scene: &Scene,
     seeds: Range<u64>,
     most_evaluations: u64,
-) -> Option<Vec<(Inputs, Stats, Result<(), Stopped>)>> {
+    measure: impl Fn(&Inputs, &Stats, &Result<(), Stopped>) -> T,
+) -> Option<Vec<T>> {
     let model = |seed| {
         let model = Model::new(&Scene {
             seed,
@@ -144,19 +161,50 @@ pub fn observe_abreast(
         most_evaluations,
         ..settings(scene)
     };
-    let mut columns: Vec<Columns> = models.iter().map(|_| Columns::new(scene)).collect();
-    let ended = run_abreast(&models, &settings, &mut columns);
-    let both = columns.into_iter().zip(ended);
-    Some(
-        both.map(|(c, (stats, end))| (c.inputs, stats, end))
-            .collect(),
-    )
+    let spare = RefCell::new(Vec::new());
+    let lane = || Lane {
+        scene,
+        spare: &spare,
+        measure: &measure,
+        columns: None,
+        found: None,
+    };
+    let mut lanes: Vec<_> = models.iter().map(|_| lane()).collect();
+    run_abreast(&models, &settings, &mut lanes);
+    lanes.into_iter().map(|lane| lane.found).collect()
 }
 
-impl Listener for Columns {
+/// A run among others, measured as soon as it has ended: as many columns are held as runs are under way, however many there are.
+struct Lane<'a, T, M> {
+    scene: &'a Scene,
+    /// Columns that nobody fills.
+    spare: &'a RefCell<Vec<Columns>>,
+    measure: &'a M,
+    columns: Option<Columns>,
+    found: Option<T>,
+}
+
+impl<T, M> Lane<'_, T, M> {
+    fn columns(&mut self) -> &mut Columns {
+        let spare = || self.spare.borrow_mut().pop();
+        self.columns
+            .get_or_insert_with(|| spare().unwrap_or_else(|| Columns::new(self.scene)))
+    }
+}
+
+impl<T, M: Fn(&Inputs, &Stats, &Result<(), Stopped>) -> T> Listener for Lane<'_, T, M> {
     fn sample(&mut self, sample: &Sample) -> bool {
-        self.push(sample);
+        self.columns().push(sample);
         true
+    }
+
+    fn ended(&mut self, stats: &Stats, outcome: &Result<(), Stopped>) {
+        self.columns();
+        if let Some(mut columns) = self.columns.take() {
+            self.found = Some((self.measure)(&columns.inputs, stats, outcome));
+            columns.clear();
+            self.spare.borrow_mut().push(columns);
+        }
     }
 }
 

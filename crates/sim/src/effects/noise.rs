@@ -64,7 +64,8 @@ struct Grid {
 impl Grid {
     /// The cell that begins at or before `t_s`; a time that is a grid point but for rounding belongs to the cell it begins.
     fn cell(&self, t_s: f64) -> u64 {
-        let nearest = (t_s * self.grid_hz).round();
+        // As `round` for what is not negative, without a call.
+        let nearest = (t_s * self.grid_hz + 0.5) as u64 as f64;
         let cell = if nearest / self.grid_hz <= t_s {
             nearest
         } else {

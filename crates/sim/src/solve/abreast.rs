@@ -9,7 +9,7 @@
 //! not do, and what does not go forward, is left to `auto` from where it stands.
 
 use super::course::{Course, SAME_MOMENT_S};
-use super::dop853::{Dop853, E3, E5};
+use super::dop853::{Dop853, E3, E5, FROM_E3};
 use super::events::{Ahead, ahead};
 use super::pair::{Pair as _, Row, row};
 use super::{Observer, Settings, Stats, Stopped, auto};
@@ -22,8 +22,10 @@ use crate::scene::Scene;
 const NAME: &str = "dop853";
 const STAGES: usize = Dop853::STAGES;
 /// As `super::pair::Pair::SHARE`.
-const SHARE: f64 = 4e-3;
+const SHARE: f64 = 8e-3;
 const SAFETY: f64 = 0.9;
+/// What is left to a stop is taken in equal steps, up to so many times what the error asks for.
+const STRETCH: f64 = 1.04;
 const SHRINK: f64 = 0.2;
 const GROW: f64 = 6.0;
 /// The error of a step counts as at least this when the next one is chosen.
@@ -249,9 +251,10 @@ struct Group<E: Registers> {
     range: [E; 2],
     /// Not negative where the margin may fall and rise again.
     valley: E,
-    /// The error of the step in units of the tolerance, and its 32nd root.
+    /// The error of the step in units of the tolerance, its 32nd root, and the factor for the next step but for the error before.
     error: E,
     root: E,
+    factor: E,
     /// 1 for the lanes that are to move on, −1 for the others.
     moves: E,
 }
@@ -295,6 +298,7 @@ impl<E: Together> Group<E> {
             valley: zero,
             error: zero,
             root: zero,
+            factor: zero,
             moves: zero,
         }
     }
@@ -338,22 +342,24 @@ impl<E: Together> Group<E> {
     }
 
     /// Looks for the first event of a lane's step.
-    fn look(&self, l: usize, lane: &Lane<'_>) -> Ahead {
+    fn look(&self, l: usize, lane: &Lane<'_>, dips: bool) -> Ahead {
         let seen = IN_ORDER.map(|i| (TIMES[i], -self.short[i].as_array()[l]));
         let (t0, h) = (lane.course.t_s, lane.h_s);
         let known = lane.beyond.map(|(t, margin)| ((t - t0) / h, margin));
         let known = known.filter(|(theta, _)| *theta > 1.0);
-        ahead(&seen, known, RESOLUTION_S / h)
+        ahead(&seen, known, dips, RESOLUTION_S / h)
     }
 
     /// What depends on time alone, of all stages: these evaluations do not wait for each other.
     #[inline(always)]
     fn begin_step(&mut self, side: &SideBySide<'_>) {
         self.range = [self.short[0]; 2];
-        for (beat, c) in self.beats.iter_mut().zip(const { TIMES }).skip(1) {
-            side.clock(self.h_s.madd(E::splat(c), self.t_s), &mut self.w);
+        // The last stage is at the end, as the state after the step is.
+        for (beat, c) in self.beats[1..STAGES].iter_mut().zip(&TIMES[1..]) {
+            side.clock(self.h_s.madd(E::splat(*c), self.t_s), &mut self.w);
             *beat = self.w.beat;
         }
+        self.beats[STAGES] = self.beats[STAGES - 1];
     }
 
     /// The state of stage `I`, from the earlier stages.
@@ -439,15 +445,19 @@ impl<E: Together> Group<E> {
             five = a.madd(a, five);
             three = b.madd(b, three);
         }
-        // |e₅|²/√(|e₅|² + 0.01 |e₃|²): see `super::dop853`.
-        let below = three.madd(E::splat(0.01), five) * self.k.len() as f64;
-        let error = self.h_s * five / (below.sqrt() * tolerance);
-        self.error = below.if_positive(error, below);
+        // As in `super::dop853`.
+        let count = self.k.len() as f64;
+        let below = three.madd(E::splat(0.01), five) * count;
+        let combined = self.h_s * five / (below.sqrt() * tolerance);
+        let combined = below.if_positive(combined, below);
+        let from_e3 = self.h_s * self.h_s * three * (FROM_E3 * SHARE / (count * tolerance));
+        self.error = combined.larger(from_e3);
         let mut root = self.error.larger(E::splat(LEAST_ERROR));
         for _ in 0..5 {
             root = root.sqrt();
         }
         self.root = root;
+        self.factor = E::splat(SAFETY) / (root * root * root);
     }
 }
 
@@ -480,7 +490,10 @@ impl<E: Together> Abreast<E> {
                     let Some(run) = waiting.next() else { break };
                     match self.enter(l, run, &models[run], observers[run]) {
                         Ok(entered) => *lane = Some(entered),
-                        Err(ended) => done[run] = Some(ended),
+                        Err(ended) => {
+                            observers[run].ended(&ended.0, &ended.1);
+                            done[run] = Some(ended);
+                        }
                     }
                 }
             }
@@ -533,6 +546,7 @@ impl<E: Together> Abreast<E> {
                     self.groups[l / MOMENTS].read(l % MOMENTS, &mut course.y);
                     ended = auto::go(course, &self.settings, &mut *observers[run]);
                 }
+                observers[run].ended(&ended.0, &ended.1);
                 done[run] = Some(ended);
             }
         }
@@ -634,7 +648,7 @@ impl<E: Together> Abreast<E> {
         let dips = least < NEAR * most && group.valley.as_array()[l] >= 0.0;
         let mut event = false;
         if least < 0.0 || dips || lane.beyond.is_some() {
-            match group.look(l, lane) {
+            match group.look(l, lane, dips) {
                 // What a longer step saw behind an event may turn out to be none when a shorter one gets there.
                 Ahead::Clear => lane.beyond = None,
                 Ahead::Here => event = true,
@@ -656,9 +670,8 @@ impl<E: Together> Abreast<E> {
             (lane.aim_s, lane.beyond, lane.tries) = (None, None, 0);
         }
         let h = lane.h_s;
-        let factor = (SAFETY / root.powi(4)).clamp(SHRINK, GROW);
         if let Some(resting) = lane.switched.take() {
-            lane.after_switch[resting] = h * factor;
+            lane.after_switch[resting] = h * (SAFETY / root.powi(4)).clamp(SHRINK, GROW);
         }
         // A PI controller: Hairer, Nørsett, Wanner, Solving ODEs I (1993), IV.2, its exponents rounded to 32nds.
         let most = if lane.rejected_before || event || aimed {
@@ -666,7 +679,7 @@ impl<E: Together> Abreast<E> {
         } else {
             GROW
         };
-        let factor = SAFETY * lane.error_before / root.powi(3);
+        let factor = group.factor.as_array()[l] * lane.error_before;
         let next = h * factor.clamp(SHRINK, most);
         lane.h_next_s = if h < lane.h_next_s {
             lane.h_next_s.max(next)
@@ -768,10 +781,11 @@ impl Lane<'_> {
                 let h = (aim_s - t0).max(0.5 * RESOLUTION_S);
                 (h, t0 + h, false)
             }
-            // A remainder of a whole step or little more is taken in one; one of up to two steps in two equal halves.
-            _ if left <= h * 1.01 => (left, stop_s, true),
-            _ if left < 2.0 * h => (0.5 * left, t0 + 0.5 * left, false),
-            _ => (h, t0 + h, false),
+            _ if left <= h * STRETCH => (left, stop_s, true),
+            _ => {
+                let h = left / ((left / (h * STRETCH)) as u64 + 1) as f64;
+                (h, t0 + h, false)
+            }
         };
     }
 

@@ -149,8 +149,9 @@ pub enum Ahead {
 }
 
 /// Where the first zero on (0, 1] is. `seen`: the margins at the start, between and at the end, in order. `known`: a place behind the
-/// step's end where the margin is known to be negative, from a longer step. `resolution`: as a part of the step.
-pub fn ahead(seen: &[(f64, f64)], known: Option<(f64, f64)>, resolution: f64) -> Ahead {
+/// step's end where the margin is known to be negative, from a longer step. `dips`: whether the margin may fall to zero and rise again.
+/// `resolution`: as a part of the step.
+pub fn ahead(seen: &[(f64, f64)], known: Option<(f64, f64)>, dips: bool, resolution: f64) -> Ahead {
     let n = seen.len();
     for i in 1..n {
         let (theta, margin) = seen[i];
@@ -169,7 +170,7 @@ pub fn ahead(seen: &[(f64, f64)], known: Option<(f64, f64)>, resolution: f64) ->
                 Ahead::Passed { zero, beyond }
             };
         }
-        match dip(seen, i - 1) {
+        match dips.then(|| dip(seen, i - 1)).flatten() {
             Some([_, at, _]) if at > LEAST_DIP && at < 1.0 - LEAST_DIP => return Ahead::Dip(at),
             _ => {}
         }
@@ -402,7 +403,7 @@ mod tests {
             };
             let seen = [0.0, 0.05, 0.12, 0.28, 0.6, 0.86, 1.0].map(at);
             let ahead_of = known.map(|(t, m)| ((t - t0) / h, m)).filter(|k| k.0 > 1.0);
-            match ahead(&seen, ahead_of, 1e-13 / h) {
+            match ahead(&seen, ahead_of, true, 1e-13 / h) {
                 Ahead::Clear if aim < to => (t0, aim) = (aim, to),
                 Ahead::Clear => return (None, steps),
                 Ahead::Here => return (Some(aim), steps),

@@ -37,6 +37,8 @@ pub trait Observer {
     fn tick(&mut self, _clock: usize, _tick: u64, _t_s: f64, _y: &[f64], _w: &mut Workspace) {}
     /// Something happened between samples.
     fn event(&mut self, _event: &Event) {}
+    /// A run that went side by side with others has ended.
+    fn ended(&mut self, _stats: &Stats, _outcome: &Result<(), Stopped>) {}
 }
 
 /// Work done by a run.

@@ -10,7 +10,7 @@ pub mod spec;
 pub mod summary;
 pub mod table;
 
-use crate::ensemble::{observe, observe_abreast};
+use crate::ensemble::{measure_abreast, observe};
 use analyze::inputs::{Inputs, Window};
 use analyze::metrics::{Metric, find, metrics_of};
 use design::Points;
@@ -20,7 +20,7 @@ use sim::record::{Recorder, VERSION};
 use sim::run::{Listener, Sample};
 use sim::scene::{Scene, Template};
 use sim::sensors::Reading;
-use sim::solve::{METHODS, Stats};
+use sim::solve::{METHODS, Stats, Stopped};
 use spec::{DesignKind, Spec, flatten, number};
 use std::ops::Range;
 use std::panic::AssertUnwindSafe;
@@ -45,9 +45,8 @@ const MOST_EVALUATIONS: u64 = 100_000_000;
 
 /// With fewer seeds than fill the lanes, runs take less time one by one.
 const WORTH_ABREAST: u64 = 16;
-/// More at a time gain little, and hold memory: the columns of all of them, some 100 bytes a sample.
-const MOST_ABREAST: u64 = 128;
-const SAMPLES_ABREAST: f64 = 250e3;
+/// More at a time gain little: when the last ones of a batch end, lanes stand empty.
+const MOST_ABREAST: u64 = 512;
 /// Runs of more samples are computed one by one.
 const LONGEST_ABREAST: f64 = 20e3;
 
@@ -328,20 +327,12 @@ impl Plan {
         let samples = scene.duration_s * scene.log_rate_hz;
         let auto = scene.solver.method == METHODS[0].name;
         if self.goes_abreast() && recordings.is_none() && auto && samples <= LONGEST_ABREAST {
-            let most = SAMPLES_ABREAST / samples.max(1.0);
-            let most = (most as u64).clamp(WORTH_ABREAST, MOST_ABREAST);
-            let mut found = Vec::new();
-            let end = scene.seed + (runs.end - runs.start);
-            for first in (scene.seed..end).step_by(most as usize) {
-                let seeds = first..end.min(first + most);
-                let Some(ended) = observe_abreast(&scene, seeds, MOST_EVALUATIONS) else {
-                    break;
-                };
-                found.extend(ended.into_iter().map(|(inputs, stats, ended)| {
-                    self.weigh(&scene, &inputs, stats, ended.map_err(|e| e.to_string()))
-                }));
-            }
-            if !found.is_empty() {
+            let seeds = scene.seed..scene.seed + (runs.end - runs.start);
+            let weigh = |inputs: &Inputs, stats: &Stats, outcome: &Result<(), Stopped>| {
+                let outcome = outcome.clone().map_err(|e| e.to_string());
+                self.weigh(&scene, inputs, *stats, outcome)
+            };
+            if let Some(found) = measure_abreast(&scene, seeds, MOST_EVALUATIONS, weigh) {
                 return found;
             }
         }
