@@ -47,8 +47,22 @@ impl Pose {
                 0.0,
             ];
         }
-        let roll = (2.0 * (w * x + y * z)).atan2(1.0 - 2.0 * (x * x + y * y));
-        [roll, pitch, across.atan2(level)]
+        [self.level_roll_rad(), pitch, across.atan2(level)]
+    }
+
+    /// The first of [`Self::roll_pitch_yaw_rad`] alone, rad.
+    pub fn roll_rad(&self) -> f64 {
+        let [x, y, z, w] = self.orientation;
+        // Near ±90° of pitch roll takes yaw's turn too.
+        if (w * y - x * z).abs() > 0.499 {
+            return self.roll_pitch_yaw_rad()[0];
+        }
+        self.level_roll_rad()
+    }
+
+    fn level_roll_rad(&self) -> f64 {
+        let [x, y, z, w] = self.orientation;
+        (2.0 * (w * x + y * z)).atan2(1.0 - 2.0 * (x * x + y * y))
     }
 }
 
@@ -609,7 +623,9 @@ mod tests {
     fn angles_turn_back_into_the_same_rotation() {
         for (roll, pitch, yaw) in [(0.3, -0.2, 1.0), (3.0, 1.5, -3.0), (-1.0, -1.57, 2.0)] {
             let q = UnitQuaternion::from_euler_angles(roll, pitch, yaw);
-            let angles = pose([q.i, q.j, q.k, q.w]).roll_pitch_yaw_rad();
+            let pose = pose([q.i, q.j, q.k, q.w]);
+            let angles = pose.roll_pitch_yaw_rad();
+            assert_eq!(pose.roll_rad(), angles[0]);
             for (a, b) in angles.into_iter().zip([roll, pitch, yaw]) {
                 assert!((a - b).abs() < 1e-9, "{angles:?}");
             }
@@ -621,7 +637,9 @@ mod tests {
         for pitch in [std::f64::consts::FRAC_PI_2, -std::f64::consts::FRAC_PI_2] {
             for (roll, yaw) in [(0.4, 0.0), (0.4, 1.1), (-2.0, 0.7)] {
                 let q = UnitQuaternion::from_euler_angles(roll, pitch, yaw);
-                let [r, p, y] = pose([q.i, q.j, q.k, q.w]).roll_pitch_yaw_rad();
+                let pose = pose([q.i, q.j, q.k, q.w]);
+                let [r, p, y] = pose.roll_pitch_yaw_rad();
+                assert_eq!(pose.roll_rad(), r);
                 let back = UnitQuaternion::from_euler_angles(r, p, y);
                 assert!(
                     q.angle_to(&back) < 1e-8,

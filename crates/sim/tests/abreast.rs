@@ -10,6 +10,7 @@ struct Seen {
     t_s: Vec<f64>,
     of: [Vec<f64>; 2],
     events: usize,
+    event_s: Vec<f64>,
 }
 
 impl Listener for Seen {
@@ -19,8 +20,9 @@ impl Listener for Seen {
         self.of[1].push(s.pose.position_m[2]);
         true
     }
-    fn event(&mut self, _event: &Event) {
+    fn event(&mut self, event: &Event) {
         self.events += 1;
+        self.event_s.push(event.t_s);
     }
 }
 
@@ -151,6 +153,22 @@ fn a_turn_of_the_friction_between_two_stages_is_felt() {
                 "seed {seed}: {by_itself:?}, abreast {abreast:?}"
             );
         }
+    }
+}
+
+/// A fall onto the shoulder, which every method solves exactly: the moment of contact is.
+#[test]
+fn events_are_located_to_a_picosecond() {
+    let off = ["solver.energy=false".to_owned()];
+    let drop = sim::scene::builtin("one-handle-drop").unwrap();
+    let scene = parse("one-handle-drop", drop, &off).unwrap();
+    let models = models(&scene, 1..2);
+    let truth = alone(&models[0], 1e-12);
+    for tolerance in [1e-3, 1e-4, 1e-5, 1e-6, 1e-7, 1e-8, 1e-9] {
+        let (seen, ..) = together(&models, tolerance).swap_remove(0);
+        let late_s = seen.event_s[0] - truth.event_s[0];
+        println!("{tolerance:e}: {late_s:e} s");
+        assert!(late_s.abs() <= 1e-12, "{tolerance:e}: {late_s:e} s");
     }
 }
 

@@ -3,7 +3,7 @@
 use crate::pool::in_order;
 use crate::statistics::correlation;
 use analyze::inputs::{Inputs, Window};
-use analyze::metrics::metrics_of;
+use analyze::metrics::{Metric, Need, metrics_of};
 use sim::model::Model;
 use sim::run::{Listener, Sample, run_abreast, run_model, settings};
 use sim::scene::Scene;
@@ -59,6 +59,8 @@ impl Run {
 pub struct Columns {
     /// What `analyze` takes.
     pub inputs: Inputs,
+    /// Nobody asks for tilt and heading.
+    only_roll: bool,
 }
 
 impl Columns {
@@ -81,6 +83,16 @@ impl Columns {
                 gravity_m_per_s2: (gx * gx + gy * gy + gz * gz).sqrt(),
                 ..Inputs::default()
             },
+            only_roll: false,
+        }
+    }
+
+    /// The same for these metrics alone.
+    fn for_metrics(scene: &Scene, metrics: &[&Metric]) -> Self {
+        let tilted = |m: &&Metric| m.needs.contains(&Need::Pitch) || m.needs.contains(&Need::Yaw);
+        Self {
+            only_roll: !metrics.iter().any(tilted),
+            ..Self::new(scene)
         }
     }
 
@@ -102,12 +114,16 @@ impl Columns {
     /// Adds a sample.
     pub fn push(&mut self, s: &Sample) {
         let i = &mut self.inputs;
-        let [roll, pitch, yaw] = s.pose.roll_pitch_yaw_rad();
         i.t_s.push(s.t_s);
         i.height_m.push(s.pose.position_m[2]);
-        i.roll_rad.push(roll);
-        i.pitch_rad.push(pitch);
-        i.yaw_rad.push(yaw);
+        if self.only_roll {
+            i.roll_rad.push(s.pose.roll_rad());
+        } else {
+            let [roll, pitch, yaw] = s.pose.roll_pitch_yaw_rad();
+            i.roll_rad.push(roll);
+            i.pitch_rad.push(pitch);
+            i.yaw_rad.push(yaw);
+        }
         for (column, n) in i.normal_n.iter_mut().zip(&s.normal_n) {
             column.push(*n);
         }
@@ -142,10 +158,11 @@ pub fn observe(
 }
 
 /// One scene under several seeds with method `auto`, side by side in the processor's registers, as far as the scene is one for that (else
-/// `None`): what `measure` makes of each run. What a seed gives does not depend on the others.
+/// `None`): what `measure` makes of the columns of each run that `metrics` need. What a seed gives does not depend on the others.
 pub fn measure_abreast<T>(
     scene: &Scene,
     seeds: Range<u64>,
+    metrics: &[&Metric],
     most_evaluations: u64,
     measure: impl Fn(&Inputs, &Stats, &Result<(), Stopped>) -> T,
 ) -> Option<Vec<T>> {
@@ -164,6 +181,7 @@ pub fn measure_abreast<T>(
     let spare = RefCell::new(Vec::new());
     let lane = || Lane {
         scene,
+        metrics,
         spare: &spare,
         measure: &measure,
         columns: None,
@@ -177,6 +195,7 @@ pub fn measure_abreast<T>(
 /// A run among others, measured as soon as it has ended: as many columns are held as runs are under way, however many there are.
 struct Lane<'a, T, M> {
     scene: &'a Scene,
+    metrics: &'a [&'a Metric],
     /// Columns that nobody fills.
     spare: &'a RefCell<Vec<Columns>>,
     measure: &'a M,
@@ -187,8 +206,9 @@ struct Lane<'a, T, M> {
 impl<T, M> Lane<'_, T, M> {
     fn columns(&mut self) -> &mut Columns {
         let spare = || self.spare.borrow_mut().pop();
-        self.columns
-            .get_or_insert_with(|| spare().unwrap_or_else(|| Columns::new(self.scene)))
+        self.columns.get_or_insert_with(|| {
+            spare().unwrap_or_else(|| Columns::for_metrics(self.scene, self.metrics))
+        })
     }
 }
 

@@ -39,6 +39,10 @@ const TURNED: f64 = 0.03;
 const SMALLEST_STEP_S: f64 = 1e-13;
 /// So exactly an event is located, s.
 const RESOLUTION_S: f64 = 0.5 * SAME_MOMENT_S;
+/// An event so near to the end of a step, in s and as a part of the step, is met by going along the slope there: half the square of that
+/// part is below any rounding. As small the margin must be beside the largest one in the step, or the event is none.
+const NEXT_TO_S: f64 = 2e-9;
+const NEXT_TO: f64 = 1e-6;
 /// A lane that has not met its event after so many steps gives up.
 const MOST_TRIES: u32 = 80;
 /// So many evaluations, and so many more for each second of motion, and stability rather than accuracy limits the steps.
@@ -166,6 +170,8 @@ struct Lane<'m> {
     h_next_s: f64,
     /// Where the step is to end that is to meet an event, s.
     aim_s: Option<f64>,
+    /// How far beyond the step's end it was found instead, s.
+    beyond_end_s: f64,
     /// A moment behind that event, with the margin there.
     beyond: Option<(f64, f64)>,
     tries: u32,
@@ -582,6 +588,7 @@ impl<E: Together> Abreast<E> {
             weighed: (0, [f64::INFINITY; 4]),
             h_next_s: 0.0,
             aim_s: None,
+            beyond_end_s: 0.0,
             beyond: None,
             tries: 0,
             error_before: LEAST_ROOT_BEFORE,
@@ -652,6 +659,11 @@ impl<E: Together> Abreast<E> {
                 // What a longer step saw behind an event may turn out to be none when a shorter one gets there.
                 Ahead::Clear => lane.beyond = None,
                 Ahead::Here => event = true,
+                Ahead::Short(zero) | Ahead::Passed { zero, .. }
+                    if lane.next_to_end(zero, -group.short[STAGES].as_array()[l], most) =>
+                {
+                    event = true;
+                }
                 Ahead::Short(zero) => {
                     if lane.again(lane.course.t_s + zero * lane.h_s) == Ended::Given {
                         return Ended::Given;
@@ -689,6 +701,7 @@ impl<E: Together> Abreast<E> {
         lane.error_before = root.max(LEAST_ROOT_BEFORE);
         lane.rejected_before = false;
         group.moves.as_mut_array()[l] = 1.0;
+        lane.end_s += lane.beyond_end_s;
         lane.course.t_s = lane.end_s;
         if event {
             Ended::Event
@@ -712,6 +725,12 @@ impl<E: Together> Abreast<E> {
         let (group, in_group) = (&mut self.groups[l / MOMENTS], l % MOMENTS);
         group.read(in_group, &mut lane.course.y);
         let course = &mut lane.course;
+        let further_s = std::mem::take(&mut lane.beyond_end_s);
+        if further_s != 0.0 {
+            for (y, k) in course.y.iter_mut().zip(&group.k) {
+                *y += further_s * k[0].as_array()[in_group];
+            }
+        }
         let switched = t_s >= course.stop_s() - SAME_MOMENT_S;
         if course.sample_due(t_s).is_some() {
             // The last stage was here.
@@ -787,6 +806,18 @@ impl Lane<'_> {
                 (h, t0 + h, false)
             }
         };
+    }
+
+    /// Whether an event at a part `zero` of the step is so near to its end that nothing has to be solved in between.
+    fn next_to_end(&mut self, zero: f64, margin_n: f64, most_n: f64) -> bool {
+        let further_s = (zero - 1.0) * self.h_s;
+        let near = (zero - 1.0).abs() <= NEXT_TO && further_s.abs() <= NEXT_TO_S;
+        let end_s = self.end_s + further_s;
+        let is = near && margin_n.abs() <= 10.0 * NEXT_TO * most_n && end_s < self.stop_s;
+        if is {
+            self.beyond_end_s = further_s;
+        }
+        is
     }
 
     /// Aims at another end, for the same step or the next one.

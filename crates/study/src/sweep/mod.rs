@@ -332,7 +332,9 @@ impl Plan {
                 let outcome = outcome.clone().map_err(|e| e.to_string());
                 self.weigh(&scene, inputs, *stats, outcome)
             };
-            if let Some(found) = measure_abreast(&scene, seeds, MOST_EVALUATIONS, weigh) {
+            let metrics = &self.metrics;
+            let found = measure_abreast(&scene, seeds, metrics, MOST_EVALUATIONS, weigh);
+            if let Some(found) = found {
                 return found;
             }
         }
