@@ -30,18 +30,35 @@ fn rows_are_the_same_however_the_runs_are_shared_out() {
         let (first, last) = (piece.start as usize, piece.end as usize);
         assert_eq!(plan.run(piece, None), all[first..last]);
     }
-    // Whole batches for every thread, and no more than memory is for.
-    for (runs, jobs) in [(40, 1), (1200, 2), (1_000_000, 7)] {
-        let batch = plan.batch(runs, jobs);
-        assert!((16..=512).contains(&batch), "{batch}");
+}
+
+#[test]
+fn shares_are_all_runs_once_in_whole_lanes() {
+    let many = plan(20);
+    for (runs, jobs) in [(1, 1), (40, 1), (1200, 2), (5000, 2), (100_003, 7)] {
+        let shares = many.shares(runs, jobs);
+        let mut next = 0;
+        for k in 0..shares.count() {
+            let share = shares.get(k);
+            assert_eq!(share.start, next);
+            assert!(share.end > next);
+            next = share.end;
+            let whole = (next - share.start).is_multiple_of(16);
+            assert!(next == runs || whole, "{share:?} of {runs}");
+        }
+        assert_eq!(next, runs);
+        // What the last one leaves the other threads to wait for.
+        let last = shares.get(shares.count() - 1);
+        assert!(last.end - last.start <= 32, "{last:?} of {runs}");
     }
+    let one_by_one = plan(2).shares(1000, 2);
+    assert_eq!((one_by_one.count(), one_by_one.get(999)), (1000, 999..1000));
 }
 
 /// Seeds side by side are as exact as seeds by themselves, which a study of few seeds takes.
 #[test]
 fn many_seeds_give_what_few_give_within_the_tolerance() {
     let (many, few) = (plan(20), plan(2));
-    assert_eq!(few.batch(1000, 2), 1);
     let column = |plan: &Plan, name: &str| {
         let mut columns = plan.columns().iter();
         columns.position(|c| c.name == name).unwrap()

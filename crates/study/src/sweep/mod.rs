@@ -43,10 +43,11 @@ pub const FIXED_COLUMNS: &[&str] = &[
 /// Work after which a run is given up: a thousand times what a minute of the paper's scenes takes.
 const MOST_EVALUATIONS: u64 = 100_000_000;
 
-/// With fewer seeds than fill the lanes, runs take less time one by one.
+/// So many lanes there are. With fewer seeds runs take less time one by one.
 const WORTH_ABREAST: u64 = 16;
-/// More at a time gain little: when the last ones of a batch end, lanes stand empty.
+/// With few at a time lanes stand empty while the last of them end; from here on that is hardly felt.
 const MOST_ABREAST: u64 = 512;
+const LEAST_ABREAST: u64 = 32;
 /// Runs of more samples are computed one by one.
 const LONGEST_ABREAST: f64 = 20e3;
 
@@ -230,16 +231,31 @@ impl Plan {
         self.spec.first_seed + run % self.spec.seeds
     }
 
-    /// How many of `runs` runs a thread of `jobs` is best given at a time: more than one only where seeds can go abreast, and so that all
-    /// threads end together.
-    pub fn batch(&self, runs: u64, jobs: usize) -> u64 {
-        if self.goes_abreast() {
-            let jobs = jobs as u64;
-            let batches = runs.div_ceil(MOST_ABREAST).max(4 * jobs);
-            let batches = batches.next_multiple_of(jobs);
-            runs.div_ceil(batches).max(WORTH_ABREAST)
-        } else {
-            1
+    /// How `runs` runs are best given to `jobs` threads: one at a time, or, where seeds can go abreast, as many as fill the lanes several
+    /// times, and fewer towards the end, so that all threads end together.
+    pub fn shares(&self, runs: u64, jobs: usize) -> Shares {
+        if !self.goes_abreast() {
+            return Shares {
+                size: 1,
+                whole: runs,
+                rest: Vec::new(),
+            };
+        }
+        let threads = jobs as u64;
+        let whole = runs.saturating_sub(2 * threads * MOST_ABREAST) / MOST_ABREAST;
+        let mut rest = Vec::new();
+        let mut first = whole * MOST_ABREAST;
+        while first < runs {
+            let share = (runs - first) / (2 * threads);
+            let share = share.clamp(LEAST_ABREAST, MOST_ABREAST);
+            let last = runs.min(first + share.next_multiple_of(WORTH_ABREAST));
+            rest.push(first..last);
+            first = last;
+        }
+        Shares {
+            size: MOST_ABREAST,
+            whole,
+            rest,
         }
     }
 
@@ -399,6 +415,31 @@ impl Plan {
             metrics: self.metrics.iter().map(cell).collect(),
             stats: Some(stats),
             failed: None,
+        }
+    }
+}
+
+/// Runs in the order in which threads are given them: shares of one size, then smaller ones.
+pub struct Shares {
+    size: u64,
+    whole: u64,
+    rest: Vec<Range<u64>>,
+}
+
+impl Shares {
+    /// How many.
+    pub fn count(&self) -> u64 {
+        self.whole + self.rest.len() as u64
+    }
+
+    /// The runs of share `k`.
+    ///
+    /// # Panics
+    /// When there are not so many.
+    pub fn get(&self, k: u64) -> Range<u64> {
+        match k.checked_sub(self.whole) {
+            Some(place) => self.rest[place as usize].clone(),
+            None => k * self.size..(k + 1) * self.size,
         }
     }
 }

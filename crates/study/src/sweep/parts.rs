@@ -168,17 +168,16 @@ impl<'p> Store<'p> {
             .map(|b| self.plan.block(*b))
             .map(|r| r.end - r.start)
             .sum();
-        let batch = self.plan.batch(runs, threads(jobs));
+        let shares = self.plan.shares(runs, threads(jobs));
         let mut written = Written::default();
         let (mut rows, mut due) = (Vec::new(), blocks.iter());
         let mut block = due.next();
         in_order(
-            runs.div_ceil(batch),
+            shares.count(),
             jobs,
             stop,
             |k| {
-                let range = k * batch..runs.min((k + 1) * batch);
-                let pieces = self.pieces(blocks, range).into_iter();
+                let pieces = self.pieces(blocks, shares.get(k)).into_iter();
                 let rows = pieces.flat_map(|piece| self.plan.run(piece, recordings));
                 rows.collect::<Vec<_>>()
             },
