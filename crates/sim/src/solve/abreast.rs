@@ -8,24 +8,30 @@
 //! Steps end at samples, and events are located by steps that end there: there is no polynomial to be trusted. What an explicit method should
 //! not do, and what does not go forward, is left to `auto` from where it stands.
 
+mod group;
+mod lane;
+
 use super::course::{Course, SAME_MOMENT_S};
-use super::dop853::{Dop853, E3, E5, FROM_E3};
-use super::events::{Ahead, ahead};
-use super::pair::{Pair as _, Row, row};
+use super::dop853::Dop853;
+use super::events::Ahead;
+use super::pair::Pair as _;
 use super::{Observer, Settings, Stats, Stopped, auto};
 #[cfg(target_arch = "x86_64")]
 use crate::lanes::{Avx2, Avx512};
-use crate::lanes::{Eight, LANES, MOMENTS, Plain8, Two};
-use crate::model::{Model, Octet, Registers, SideBySide, Workspace};
+use crate::lanes::{MOMENTS, Plain8};
+use crate::model::{Model, Registers, SideBySide};
 use crate::scene::Scene;
+use group::Group;
+use lane::{Ended, Lane};
 
 const NAME: &str = "dop853";
 const STAGES: usize = Dop853::STAGES;
 /// As `super::pair::Pair::SHARE`.
 const SHARE: f64 = 8e-3;
 const SAFETY: f64 = 0.9;
-/// What is left to a stop is taken in equal steps, up to so many times what the error asks for.
+/// What is left to a stop is taken in equal steps, up to so many times what the error asks for, if they are few.
 const STRETCH: f64 = 1.04;
+const FEW: f64 = 16.0;
 const SHRINK: f64 = 0.2;
 const GROW: f64 = 6.0;
 /// The error of a step counts as at least this when the next one is chosen.
@@ -50,18 +56,6 @@ const PATIENCE: u64 = 20_000;
 const PATIENCE_PER_S: f64 = 8_000.0;
 /// Below this part of the largest margin the least one is a reason to look for events: as in `super::events`.
 const NEAR: f64 = 0.5;
-
-/// The stages in the order of their times; of two at the end the one that is exact there.
-const IN_ORDER: [usize; 12] = [0, 1, 2, 3, 6, 4, 7, 5, 9, 8, 10, STAGES];
-const TIMES: [f64; STAGES + 1] = {
-    let mut times = [1.0; STAGES + 1];
-    let mut i = 0;
-    while i < STAGES {
-        times[i] = Dop853::C[i];
-        i += 1;
-    }
-    times
-};
 
 /// Groups of eight lanes that are evaluated together: see [`Octet`].
 const GROUPS: usize = 2;
@@ -154,40 +148,6 @@ together!(
     "avx512f,avx512dq"
 );
 
-/// One run under way in a lane.
-struct Lane<'m> {
-    course: Course<'m>,
-    /// Which run it is.
-    run: usize,
-    /// Where the step under way begins and ends, s, and whether it ends at a moment that none may cross.
-    h_s: f64,
-    end_s: f64,
-    stops: bool,
-    /// The next such moment: a sample, or one that the course knows of.
-    stop_s: f64,
-    /// How many handles rested, and the attitude, where the units were found.
-    weighed: (usize, [f64; 4]),
-    h_next_s: f64,
-    /// Where the step is to end that is to meet an event, s.
-    aim_s: Option<f64>,
-    /// How far beyond the step's end it was found instead, s.
-    beyond_end_s: f64,
-    /// A moment behind that event, with the margin there.
-    beyond: Option<(f64, f64)>,
-    tries: u32,
-    /// The 32nd root of the error of the step before.
-    error_before: f64,
-    rejected_before: bool,
-    /// What a first step after a switch could have been, the last time that as many handles rested; see `super::pair`.
-    after_switch: [f64; 3],
-    switched: Option<usize>,
-}
-
-#[inline(always)]
-fn smaller<E: Registers>(a: E, b: E) -> E {
-    -(-a).larger(-b)
-}
-
 #[inline(always)]
 fn evaluate_here<E: Together>(
     groups: &mut [Group<E>; GROUPS],
@@ -230,241 +190,6 @@ struct Abreast<E: Registers> {
     groups: [Group<E>; GROUPS],
     units: Vec<f64>,
     column: Vec<f64>,
-}
-
-/// Eight lanes, state by state.
-struct Group<E: Registers> {
-    w: Workspace<Eight<E>>,
-    /// Where the step begins, and its size.
-    t_s: E,
-    h_s: E,
-    y: Vec<E>,
-    /// The state at the stage under way; in the end that at the end of the step.
-    y1: Vec<E>,
-    slope: Vec<E>,
-    /// The slopes at the stages and at the end, by state.
-    k: Vec<[E; STAGES + 1]>,
-    /// 1/unit of each state, and how far the unit grows with it.
-    weight: Vec<E>,
-    relative: Vec<E>,
-    /// What makes a margin of N*: factor and summand, both with the sign turned.
-    watch: Vec<(Two<E>, Two<E>)>,
-    /// What [`Workspace::beat`] is at the stages and at the end.
-    beats: [[E; 2]; STAGES + 1],
-    /// Minus the margins at the start (where it is not negative: a zero there has fired already), at the stages and at the end.
-    short: [E; STAGES + 1],
-    /// Minus the least and minus the largest of them.
-    range: [E; 2],
-    /// Not negative where the margin may fall and rise again.
-    valley: E,
-    /// The error of the step in units of the tolerance, its 32nd root, and the factor for the next step but for the error before.
-    error: E,
-    root: E,
-    factor: E,
-    /// 1 for the lanes that are to move on, −1 for the others.
-    moves: E,
-}
-
-/// Σ a_j k_j over a row that is known when the program is compiled.
-#[inline(always)]
-fn sum<E: Registers>(row: Row, k: &[E; STAGES + 1]) -> E {
-    let mut out = k[row[0].0] * row[0].1;
-    for &(j, a) in &row[1..] {
-        out = k[j].madd(E::splat(a), out);
-    }
-    out
-}
-
-impl<E: Together> Group<E> {
-    fn new(model: &Model) -> Self {
-        let zero = E::splat(0.0);
-        let (size, body) = (model.layout().size(), model.layout().body);
-        let mut weight = vec![zero; size];
-        // Phases are held absolutely, the body relatively too: as in `super::pair`.
-        weight[body..].fill(E::splat(1.0));
-        let mut one = model.workspace();
-        one.least_load_n = f64::NEG_INFINITY;
-        let mut w = Workspace::blank();
-        one.spread(&mut w);
-        let never = Two([E::splat(f64::NEG_INFINITY); 2]);
-        Self {
-            watch: vec![(Two([zero; 2]), never); w.pair.len()],
-            w,
-            t_s: zero,
-            h_s: zero,
-            y: vec![zero; size],
-            y1: vec![zero; size],
-            slope: vec![zero; size],
-            k: vec![[zero; STAGES + 1]; size],
-            weight,
-            relative: vec![zero; size],
-            beats: [[zero; 2]; STAGES + 1],
-            short: [zero; STAGES + 1],
-            range: [zero; 2],
-            valley: zero,
-            error: zero,
-            root: zero,
-            factor: zero,
-            moves: zero,
-        }
-    }
-
-    /// Writes a lane's state and its segment.
-    fn write(&mut self, l: usize, course: &Course<'_>) {
-        for (y, from) in self.y.iter_mut().zip(&course.y) {
-            y.as_mut_array()[l] = *from;
-        }
-        self.w.segment_s.as_mut_array()[l] = course.w.segment_s;
-        for (p, pair) in course.w.pair.iter().enumerate() {
-            let to = &mut self.w.pair[p];
-            for i in 0..LANES {
-                to.constant_rate.0[i].as_mut_array()[l] = pair.constant_rate.as_array()[i];
-                to.contact_gain.0[i].as_mut_array()[l] = pair.contact_gain.as_array()[i];
-                to.contact_floor.0[i].as_mut_array()[l] = pair.contact_floor.as_array()[i];
-            }
-        }
-        for ((factor, summand), (sense, never)) in self.watch.iter_mut().zip(course.watch()) {
-            for i in 0..LANES {
-                factor.0[i].as_mut_array()[l] = -sense.as_array()[i];
-                summand.0[i].as_mut_array()[l] = -never.as_array()[i];
-            }
-        }
-    }
-
-    /// Writes a lane's units.
-    fn weigh(&mut self, l: usize, course: &Course<'_>, units: &mut [f64]) {
-        course.model.units(&course.y, &course.w, units);
-        for (d, unit) in units.iter().enumerate() {
-            self.weight[d].as_mut_array()[l] = 1.0 / unit;
-            self.relative[d].as_mut_array()[l] = 1.0 / unit;
-        }
-    }
-
-    /// Reads a lane's state.
-    fn read(&self, l: usize, y: &mut [f64]) {
-        for (to, y) in y.iter_mut().zip(&self.y) {
-            *to = y.as_array()[l];
-        }
-    }
-
-    /// Looks for the first event of a lane's step.
-    fn look(&self, l: usize, lane: &Lane<'_>, dips: bool) -> Ahead {
-        let seen = IN_ORDER.map(|i| (TIMES[i], -self.short[i].as_array()[l]));
-        let (t0, h) = (lane.course.t_s, lane.h_s);
-        let known = lane.beyond.map(|(t, margin)| ((t - t0) / h, margin));
-        let known = known.filter(|(theta, _)| *theta > 1.0);
-        ahead(&seen, known, dips, RESOLUTION_S / h)
-    }
-
-    /// What depends on time alone, of all stages: these evaluations do not wait for each other.
-    #[inline(always)]
-    fn begin_step(&mut self, side: &SideBySide<'_>) {
-        self.range = [self.short[0]; 2];
-        // The last stage is at the end, as the state after the step is.
-        for (beat, c) in self.beats[1..STAGES].iter_mut().zip(&TIMES[1..]) {
-            side.clock(self.h_s.madd(E::splat(*c), self.t_s), &mut self.w);
-            *beat = self.w.beat;
-        }
-        self.beats[STAGES] = self.beats[STAGES - 1];
-    }
-
-    /// The state of stage `I`, from the earlier stages.
-    #[inline(always)]
-    fn combine<const I: usize>(&mut self) {
-        for ((k, y), out) in self.k.iter().zip(&self.y).zip(&mut self.y1) {
-            *out = self.h_s.madd(sum::<E>(const { row::<Dop853>(I) }, k), *y);
-        }
-    }
-
-    /// That state, to be evaluated.
-    #[inline(always)]
-    fn octet(&mut self, stage: usize) -> Octet<'_, E> {
-        self.w.beat = self.beats[stage];
-        Octet {
-            t_s: self.h_s.madd(E::splat(TIMES[stage]), self.t_s),
-            y: &self.y1,
-            dy: &mut self.slope,
-            w: &mut self.w,
-        }
-    }
-
-    /// Keeps its slope and its margin.
-    #[inline(always)]
-    fn keep(&mut self, stage: usize) {
-        for (k, slope) in self.k.iter_mut().zip(&self.slope) {
-            k[stage] = *slope;
-        }
-        let mut short = E::splat(f64::NEG_INFINITY);
-        for (p, (factor, summand)) in self.w.pair.iter().zip(&self.watch) {
-            for i in 0..LANES {
-                short = short.larger(p.unclamped.0[i].madd(factor.0[i], summand.0[i]));
-            }
-        }
-        self.short[stage] = short;
-        let [least, most] = &mut self.range;
-        *most = smaller(*most, short);
-        *least = least.larger(short);
-    }
-
-    #[inline(always)]
-    fn move_on_here(&mut self) {
-        for ((k, y), y1) in self.k.iter_mut().zip(&mut self.y).zip(&self.y1) {
-            *y = self.moves.if_positive(*y1, *y);
-            k[0] = self.moves.if_positive(k[STAGES], k[0]);
-        }
-        let short = smaller(self.short[STAGES], E::splat(0.0));
-        self.short[0] = self.moves.if_positive(short, self.short[0]);
-    }
-
-    /// Where the margins may fall and rise again: at a stage, or, by the parabola through three of them, behind the first or before the
-    /// last.
-    #[inline(always)]
-    fn survey(&mut self) {
-        let mut rises = [E::splat(0.0); IN_ORDER.len() - 1];
-        for (i, rise) in rises.iter_mut().enumerate() {
-            let (from, to) = (IN_ORDER[i], IN_ORDER[i + 1]);
-            let per_step = 1.0 / (TIMES[to] - TIMES[from]);
-            *rise = (self.short[from] - self.short[to]) * per_step;
-        }
-        let [first, second, .., before, last] = rises;
-        let [t0, t1, t2, .., t3, t4, t5] = IN_ORDER;
-        let part = (TIMES[t1] - TIMES[t0]) / (TIMES[t2] - TIMES[t0]);
-        let start = smaller(first, (second - first) * part - first);
-        let part = (TIMES[t5] - TIMES[t4]) / (TIMES[t5] - TIMES[t3]);
-        let end = smaller(-last, (last - before) * part + last);
-        let mut valley = start.larger(end);
-        for i in 1..rises.len() {
-            valley = valley.larger(smaller(-rises[i - 1], rises[i]));
-        }
-        self.valley = valley;
-    }
-
-    /// The error of the step.
-    #[inline(always)]
-    fn estimate(&mut self, tolerance: f64) {
-        let (mut five, mut three) = (E::splat(0.0), E::splat(0.0));
-        for (d, k) in self.k.iter().enumerate() {
-            let (y0, y1) = (self.y[d].abs(), self.y1[d].abs());
-            let unit = self.relative[d].madd(y0.larger(y1), E::splat(1.0));
-            let w = self.weight[d] / unit;
-            let (a, b) = (sum::<E>(E5, k) * w, sum::<E>(E3, k) * w);
-            five = a.madd(a, five);
-            three = b.madd(b, three);
-        }
-        // As in `super::dop853`.
-        let count = self.k.len() as f64;
-        let below = three.madd(E::splat(0.01), five) * count;
-        let combined = self.h_s * five / (below.sqrt() * tolerance);
-        let combined = below.if_positive(combined, below);
-        let from_e3 = self.h_s * self.h_s * three * (FROM_E3 * SHARE / (count * tolerance));
-        self.error = combined.larger(from_e3);
-        let mut root = self.error.larger(E::splat(LEAST_ERROR));
-        for _ in 0..5 {
-            root = root.sqrt();
-        }
-        self.root = root;
-        self.factor = E::splat(SAFETY) / (root * root * root);
-    }
 }
 
 impl<E: Together> Abreast<E> {
@@ -768,86 +493,10 @@ impl<E: Together> Abreast<E> {
     }
 }
 
-impl Lane<'_> {
-    /// Gives the states their units, if contacts or the attitude have changed.
-    fn weigh<E: Together>(&mut self, group: &mut Group<E>, l: usize, units: &mut [f64]) {
-        let attitude = &self.course.y[self.course.model.freedoms().attitude()];
-        let same = |(now, then): (&f64, &f64)| (now - then).abs() <= TURNED;
-        let resting = self.course.resting_handles();
-        if self.weighed.0 != resting || !attitude.iter().zip(&self.weighed.1).all(same) {
-            self.weighed.0 = resting;
-            self.weighed.1[..attitude.len()].copy_from_slice(attitude);
-            group.weigh(l, &self.course, units);
-        }
-    }
-
-    /// Looks up where the next steps have to end.
-    fn look_up_stop(&mut self) {
-        let stop_s = self.course.stop_s();
-        self.stop_s = self
-            .course
-            .sample_due(stop_s)
-            .map_or(stop_s, |due| stop_s.min(due));
-    }
-
-    /// Chooses the next step.
-    fn plan(&mut self) {
-        let (t0, stop_s) = (self.course.t_s, self.stop_s);
-        let left = stop_s - t0;
-        let h = self.h_next_s;
-        (self.h_s, self.end_s, self.stops) = match self.aim_s {
-            Some(aim_s) if aim_s < stop_s => {
-                let h = (aim_s - t0).max(0.5 * RESOLUTION_S);
-                (h, t0 + h, false)
-            }
-            _ if left <= h * STRETCH => (left, stop_s, true),
-            _ => {
-                let h = left / ((left / (h * STRETCH)) as u64 + 1) as f64;
-                (h, t0 + h, false)
-            }
-        };
-    }
-
-    /// Whether an event at a part `zero` of the step is so near to its end that nothing has to be solved in between.
-    fn next_to_end(&mut self, zero: f64, margin_n: f64, most_n: f64) -> bool {
-        let further_s = (zero - 1.0) * self.h_s;
-        let near = (zero - 1.0).abs() <= NEXT_TO && further_s.abs() <= NEXT_TO_S;
-        let end_s = self.end_s + further_s;
-        let is = near && margin_n.abs() <= 10.0 * NEXT_TO * most_n && end_s < self.stop_s;
-        if is {
-            self.beyond_end_s = further_s;
-        }
-        is
-    }
-
-    /// Aims at another end, for the same step or the next one.
-    fn again(&mut self, aim_s: f64) -> Ended {
-        self.aim_s = Some(aim_s);
-        self.tries += 1;
-        if self.tries > MOST_TRIES {
-            Ended::Given
-        } else {
-            Ended::Under
-        }
-    }
-}
-
-/// How a lane's step ended.
-#[derive(Clone, Copy, Debug, PartialEq)]
-enum Ended {
-    /// There is nothing to be done before the next.
-    Under,
-    /// At a moment at which somebody looks or something jumps.
-    Stop,
-    /// At an event.
-    Event,
-    /// It is not for this method.
-    Given,
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::model::Workspace;
     use crate::scene::{builtin, parse};
 
     struct Last(Vec<f64>);

@@ -1,0 +1,116 @@
+//! A run under way in a lane: where its steps end, and what has become of them.
+
+use super::group::Group;
+use super::{FEW, MOST_TRIES, NEXT_TO, NEXT_TO_S, RESOLUTION_S, STRETCH, TURNED, Together};
+use crate::solve::course::Course;
+
+/// One run under way in a lane.
+pub(super) struct Lane<'m> {
+    pub course: Course<'m>,
+    /// Which run it is.
+    pub run: usize,
+    /// How long the step under way is and where it ends, s, and whether that is a moment that none may cross.
+    pub h_s: f64,
+    pub end_s: f64,
+    pub stops: bool,
+    /// The next such moment: a sample, or one that the course knows of.
+    pub stop_s: f64,
+    /// How many handles rested, and the attitude, where the units were found.
+    pub weighed: (usize, [f64; 4]),
+    pub h_next_s: f64,
+    /// Where the step is to end that is to meet an event, s.
+    pub aim_s: Option<f64>,
+    /// How far beyond the step's end it was found instead, s.
+    pub beyond_end_s: f64,
+    /// A moment behind that event, with the margin there.
+    pub beyond: Option<(f64, f64)>,
+    pub tries: u32,
+    /// The 32nd root of the error of the step before.
+    pub error_before: f64,
+    pub rejected_before: bool,
+    /// What a first step after a switch could have been, the last time that as many handles rested; see `super::pair`.
+    pub after_switch: [f64; 3],
+    pub switched: Option<usize>,
+}
+
+impl Lane<'_> {
+    /// Gives the states their units, if contacts or the attitude have changed.
+    pub fn weigh<E: Together>(&mut self, group: &mut Group<E>, l: usize, units: &mut [f64]) {
+        let attitude = &self.course.y[self.course.model.freedoms().attitude()];
+        let same = |(now, then): (&f64, &f64)| (now - then).abs() <= TURNED;
+        let resting = self.course.resting_handles();
+        if self.weighed.0 != resting || !attitude.iter().zip(&self.weighed.1).all(same) {
+            self.weighed.0 = resting;
+            self.weighed.1[..attitude.len()].copy_from_slice(attitude);
+            group.weigh(l, &self.course, units);
+        }
+    }
+
+    /// Looks up where the next steps have to end.
+    pub fn look_up_stop(&mut self) {
+        let stop_s = self.course.stop_s();
+        self.stop_s = self
+            .course
+            .sample_due(stop_s)
+            .map_or(stop_s, |due| stop_s.min(due));
+    }
+
+    /// Chooses the next step.
+    pub fn plan(&mut self) {
+        let (t0, stop_s) = (self.course.t_s, self.stop_s);
+        let left = stop_s - t0;
+        let h = self.h_next_s;
+        (self.h_s, self.end_s, self.stops) = match self.aim_s {
+            Some(aim_s) if aim_s < stop_s => {
+                let h = (aim_s - t0).max(0.5 * RESOLUTION_S);
+                (h, t0 + h, false)
+            }
+            _ if left <= h * STRETCH => (left, stop_s, true),
+            _ => {
+                let steps = left / (h * STRETCH);
+                let h = if steps < FEW {
+                    left / f64::from(steps as i32 + 1)
+                } else {
+                    h
+                };
+                (h, t0 + h, false)
+            }
+        };
+    }
+
+    /// Whether an event at a part `zero` of the step is so near to its end that nothing has to be solved in between.
+    pub fn next_to_end(&mut self, zero: f64, margin_n: f64, most_n: f64) -> bool {
+        let further_s = (zero - 1.0) * self.h_s;
+        let near = (zero - 1.0).abs() <= NEXT_TO && further_s.abs() <= NEXT_TO_S;
+        let end_s = self.end_s + further_s;
+        let is = near && margin_n.abs() <= 10.0 * NEXT_TO * most_n && end_s < self.stop_s;
+        if is {
+            self.beyond_end_s = further_s;
+        }
+        is
+    }
+
+    /// Aims at another end, for the same step or the next one.
+    pub fn again(&mut self, aim_s: f64) -> Ended {
+        self.aim_s = Some(aim_s);
+        self.tries += 1;
+        if self.tries > MOST_TRIES {
+            Ended::Given
+        } else {
+            Ended::Under
+        }
+    }
+}
+
+/// How a lane's step ended.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) enum Ended {
+    /// There is nothing to be done before the next.
+    Under,
+    /// At a moment at which somebody looks or something jumps.
+    Stop,
+    /// At an event.
+    Event,
+    /// It is not for this method.
+    Given,
+}
