@@ -38,6 +38,17 @@ enum Contact {
     Clamped,
 }
 
+/// What a handle did of late.
+#[derive(Clone, Debug)]
+struct Recent {
+    /// Its last event, s, and how many came before it at nearly the same moment.
+    event_s: f64,
+    count: u32,
+    /// When it was clamped last, and for how long, s.
+    clamped_s: f64,
+    clamped_for_s: f64,
+}
+
 /// Ticks at k/rate, k = 0, 1, … up to the end of the run.
 struct Ticker {
     rate_hz: f64,
@@ -92,8 +103,7 @@ pub struct Course<'m> {
     /// What makes a margin of N*, by pairs: ±1 and 0, or 0 and ∞ for a handle without events.
     watch: Vec<(f64x2, f64x2)>,
     locate: bool,
-    /// Last event of each handle and how many came at nearly the same moment.
-    recent: Vec<(f64, u32)>,
+    recent: Vec<Recent>,
     most_evaluations: u64,
     /// Whether the workspace holds the forces at the present moment, under the present contacts.
     fresh: bool,
@@ -103,6 +113,10 @@ pub struct Course<'m> {
 const CHATTER: u32 = 6;
 /// Changes of one handle that are no further apart than this are of the same moment, s.
 const CHATTER_S: f64 = 1e-9;
+/// So long it is then clamped; twice as long as the last time, up to the longest, if it has been off the edge for less than so many times as long.
+const CLAMPED_S: f64 = 2.0 * CHATTER_S;
+const LONGEST_CLAMPED_S: f64 = 1e-5;
+const BACK_AT_ONCE: f64 = 32.0;
 
 impl<'m> Course<'m> {
     pub fn new(model: &'m Model, method: &'static str, settings: &Settings, locate: bool) -> Self {
@@ -130,7 +144,15 @@ impl<'m> Course<'m> {
             touching: vec![false; n],
             watch: vec![(f64x2::ZERO, f64x2::splat(f64::INFINITY)); pairs(n)],
             locate,
-            recent: vec![(f64::NEG_INFINITY, 0); n],
+            recent: vec![
+                Recent {
+                    event_s: f64::NEG_INFINITY,
+                    count: 0,
+                    clamped_s: f64::NEG_INFINITY,
+                    clamped_for_s: CLAMPED_S,
+                };
+                n
+            ],
             most_evaluations: settings.most_evaluations,
             fresh: false,
         };
@@ -325,7 +347,7 @@ impl<'m> Course<'m> {
         for i in 0..self.contacts.len() {
             let free = self.w.of(i, |p| p.unclamped);
             let height_m = self.w.of(i, |p| p.base[2].abs() + p.gap[2].abs());
-            let near = if self.t_s - self.recent[i].0 < CHATTER_S {
+            let near = if self.t_s - self.recent[i].event_s < CHATTER_S {
                 edge
             } else {
                 edge + self.model.contact_rounding_n(i, height_m)
@@ -335,21 +357,27 @@ impl<'m> Course<'m> {
                 Contact::Open if -free <= near => (EventKind::ContactClosed, Contact::Closed),
                 _ => continue,
             };
-            let (last_s, count) = self.recent[i];
-            let count = if self.t_s - last_s < CHATTER_S {
-                count + 1
+            let t_s = self.t_s;
+            let recent = &mut self.recent[i];
+            recent.count = if t_s - recent.event_s < CHATTER_S {
+                recent.count + 1
             } else {
                 0
             };
-            self.recent[i] = (self.t_s, count);
-            self.set_contact(
-                i,
-                if count >= CHATTER {
-                    Contact::Clamped
+            recent.event_s = t_s;
+            let next = if recent.count >= CHATTER {
+                let back_s = t_s - recent.clamped_s;
+                recent.clamped_for_s = if back_s < BACK_AT_ONCE * recent.clamped_for_s {
+                    (2.0 * recent.clamped_for_s).min(LONGEST_CLAMPED_S)
                 } else {
-                    next
-                },
-            );
+                    CLAMPED_S
+                };
+                recent.clamped_s = t_s;
+                Contact::Clamped
+            } else {
+                next
+            };
+            self.set_contact(i, next);
             // What rounding leaves on the wrong side of the zero is the zero of the new segment.
             let (sense, zero) = &mut self.watch[i / LANES];
             let short = (sense.as_array()[i % LANES] * free).min(0.0);
@@ -402,7 +430,13 @@ impl<'m> Course<'m> {
         self.model.forces(self.t_s, &self.y, &mut self.w);
         self.stats.evaluations += 1;
         for i in 0..self.contacts.len() {
-            if self.contacts[i] == Contact::Clamped && self.t_s - self.recent[i].0 >= CHATTER_S {
+            let Recent {
+                event_s,
+                clamped_for_s,
+                ..
+            } = self.recent[i];
+            let long_s = 0.5 * clamped_for_s;
+            if self.contacts[i] == Contact::Clamped && self.t_s - event_s >= long_s {
                 let contact = Self::standing(self.w.of(i, |p| p.unclamped));
                 self.set_contact(i, contact);
             }
@@ -422,7 +456,7 @@ impl<'m> Course<'m> {
     fn set_contact(&mut self, i: usize, contact: Contact) {
         self.contacts[i] = contact;
         if contact == Contact::Clamped {
-            self.edge_s = self.t_s + 2.0 * CHATTER_S;
+            self.edge_s = self.t_s + self.recent[i].clamped_for_s;
         }
         let (gain, floor) = match contact {
             Contact::Closed => (1.0, f64::NEG_INFINITY),
