@@ -105,6 +105,7 @@ pub struct Model {
     /// The same of the straps, per newton of load: τ/L (s/m), 1/L (1/m).
     straps: [f64; 2],
     watches_contact: bool,
+    has_friction: bool,
     /// Whether there are so many carriers that they are treated block by block.
     in_blocks: bool,
     sensor_clocks: Vec<Clock>,
@@ -158,6 +159,7 @@ impl Model {
             straps: [0.0; 2],
             extra: Vec::new(),
             watches_contact: false,
+            has_friction: false,
             in_blocks: false,
             sensor_clocks: Vec::new(),
             imus: Vec::new(),
@@ -260,6 +262,11 @@ impl Model {
         self.contact_exponent = exponent;
         self.contact_stiffness = stiffness.collect();
         self.watches_contact = !bilateral;
+    }
+
+    /// Says that a force turns with the sense of a motion.
+    pub(crate) fn expect_friction(&mut self) {
+        self.has_friction = true;
     }
 
     /// Whether a contact can pull: for effects that come after it in the table.
@@ -382,6 +389,11 @@ impl Model {
     /// The music's beat.
     pub fn beat(&self) -> Option<&Beat> {
         self.beat.as_ref()
+    }
+
+    /// Whether a force turns with the sense of a motion, faster than the motion itself changes.
+    pub fn has_friction(&self) -> bool {
+        self.has_friction
     }
 
     /// Whether contacts can open and close.

@@ -93,6 +93,7 @@ impl Friction {
     }
 
     pub(super) fn build(&self, scene: &Scene, model: &mut Model) {
+        model.expect_friction();
         if self.law == Law::Bristle {
             let n = scene.carriers.count();
             let names =

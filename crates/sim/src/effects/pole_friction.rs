@@ -50,6 +50,7 @@ impl PoleFriction {
             bilateral,
             rate2: self.regularising_rate_rad_per_s.powi(2),
         };
+        model.expect_friction();
         model.add(Stage::Body, AsWhole(law.clone()));
         model.add_account("pole_friction", law);
     }

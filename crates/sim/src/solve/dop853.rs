@@ -27,7 +27,7 @@ pub(super) const E5: Row = &[
     (10, 0.08192320648511571),
     (11, -0.022355307863886294),
 ];
-/// (h e₃)² times this counts as an error too, before the part that one step may have of the tolerance. Where a force turns within a
+/// Where there is friction, (h e₃)² times this counts as an error too, before the part that one step may have of the tolerance. Where a force turns within a
 /// step, as friction does with the sense of the motion, e₅ passes zero for some places of the turn while e₃ and the true error are
 /// large, and the authors' combination dies with e₅. A square is of order 8 as well, so smooth steps do not feel it. The number is
 /// from measurement: 512 seeds of `music`, docs/accuracy.md.
@@ -235,16 +235,20 @@ impl Pair for Dop853 {
         [sum::<F>(E5, k), sum::<F>(E3, k)]
     }
 
-    /// |e₅|²/√(|e₅|² + 0.01 |e₃|²), the authors' combination, of order 8; or what |e₃|² says, if that is more: see [`FROM_E3`].
+    /// |e₅|²/√(|e₅|² + 0.01 |e₃|²), the authors' combination, of order 8; or, with friction, what |e₃|² says, if that is more: see [`FROM_E3`].
     #[inline(always)]
-    fn error(h: f64, [five, three]: [f64; 2], count: f64) -> f64 {
+    fn error(h: f64, [five, three]: [f64; 2], count: f64, friction: bool) -> f64 {
         let below = (five + 0.01 * three) * count;
         let combined = if below > 0.0 {
             h * five / below.sqrt()
         } else {
             below
         };
-        combined.max(FROM_E3 * Self::SHARE * h * h * three / count)
+        if friction {
+            combined.max(FROM_E3 * Self::SHARE * h * h * three / count)
+        } else {
+            combined
+        }
     }
 
     #[inline(always)]

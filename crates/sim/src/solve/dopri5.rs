@@ -73,7 +73,7 @@ impl Pair for Dopri5 {
     }
 
     #[inline(always)]
-    fn error(h: f64, squares: [f64; 2], count: f64) -> f64 {
+    fn error(h: f64, squares: [f64; 2], count: f64, _friction: bool) -> f64 {
         h * (squares[0] / count).sqrt()
     }
 

@@ -118,8 +118,9 @@ pub trait Pair {
 
     /// Two error estimates of a tile, per unit of h.
     fn errors<F: Arithmetic>(k: &Slopes) -> [Tile; 2];
-    /// The error of a step of size h from the sums of squares of both estimates over `count` states, in units of the tolerance.
-    fn error(h: f64, squares: [f64; 2], count: f64) -> f64;
+    /// The error of a step of size h from the sums of squares of both estimates over `count` states, in units of the tolerance;
+    /// `friction`: whether a force may turn within the step.
+    fn error(h: f64, squares: [f64; 2], count: f64, friction: bool) -> f64;
     /// Prepares the dense polynomial of a tile.
     fn dense<F: Arithmetic>(h: f64, y0: &Tile, y1: &Tile, k: &Slopes, out: &mut Polynomial);
     /// Evaluates it at `theta` in 0…1.
@@ -553,7 +554,8 @@ impl<'m, P: Pair, const EVENTS: bool> Run<'m, P, EVENTS> {
                 *square += tile.into_iter().sum::<f64>();
             }
         }
-        P::error(h, squares, self.watched as f64) / self.tolerance
+        let friction = self.course.model.has_friction();
+        P::error(h, squares, self.watched as f64, friction) / self.tolerance
     }
 
     /// Hands over what lies within an accepted step and moves to its end, or to the first event.

@@ -35,6 +35,8 @@ pub(super) struct Group<E: Registers> {
     /// 1/unit of each state, and how far the unit grows with it.
     pub weight: Vec<E>,
     pub relative: Vec<E>,
+    /// What the square of an error of order 3 counts as: see [`FROM_E3`].
+    from_e3: f64,
     /// What makes a margin of N*: factor and summand, both with the sign turned.
     pub watch: Vec<(Two<E>, Two<E>)>,
     /// What [`Workspace::beat`] is at the stages and at the end.
@@ -86,6 +88,11 @@ impl<E: Together> Group<E> {
             k: vec![[zero; STAGES + 1]; size],
             weight,
             relative: vec![zero; size],
+            from_e3: if model.has_friction() {
+                FROM_E3 * SHARE
+            } else {
+                0.0
+            },
             beats: [[zero; 2]; STAGES + 1],
             short: [zero; STAGES + 1],
             range: [zero; 2],
@@ -244,7 +251,7 @@ impl<E: Together> Group<E> {
         let below = three.madd(E::splat(0.01), five) * count;
         let combined = self.h_s * five / (below.sqrt() * tolerance);
         let combined = below.if_positive(combined, below);
-        let from_e3 = self.h_s * self.h_s * three * (FROM_E3 * SHARE / (count * tolerance));
+        let from_e3 = self.h_s * self.h_s * three * (self.from_e3 / (count * tolerance));
         self.error = combined.larger(from_e3);
         let mut root = self.error.larger(E::splat(LEAST_ERROR));
         for _ in 0..5 {
