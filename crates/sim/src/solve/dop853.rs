@@ -27,10 +27,10 @@ pub(super) const E5: Row = &[
     (10, 0.08192320648511571),
     (11, -0.022355307863886294),
 ];
-/// Where there is friction, (h e₃)² times this counts as an error too, before the part that one step may have of the tolerance. Where a force turns within a
-/// step, as friction does with the sense of the motion, e₅ passes zero for some places of the turn while e₃ and the true error are
-/// large, and the authors' combination dies with e₅. A square is of order 8 as well, so smooth steps do not feel it. The number is
-/// from measurement: 512 seeds of `music`, docs/accuracy.md.
+/// Where there is friction, (h e₃)² times this counts as an error too, before the part that one step may have of the tolerance. Where a
+/// force turns within a step, as friction does with the sense of the motion, e₅ passes zero for some places of the turn while e₃ and the
+/// true error are large, and the authors' combination dies with e₅. A square is of order 8 as well. The number is from measurement: 512
+/// seeds of `music`, docs/accuracy.md.
 pub(super) const FROM_E3: f64 = 1e5;
 const D: &[Row] = &[
     &[
