@@ -4,12 +4,15 @@
 //! Errors are the larger of roll's and height's over the whole run, against `dop853` at 1e-11, in tolerances times half the range of the
 //! motion (of 0.1 where it hardly moves): ten of them are promised.
 
+#[path = "../tests/common/promise.rs"]
+mod promise;
+
 use sim::model::Model;
 use sim::run::{Listener, Sample, run_abreast, run_model};
 use sim::scene::{Scene, load};
 use sim::solve::{Settings, Stats, Stopped, abreast, method};
-use std::sync::Mutex;
-use std::sync::atomic::{AtomicUsize, Ordering};
+use std::fmt::Debug;
+use std::str::FromStr;
 
 /// Roll, rad, and height, m, at every sample.
 #[derive(Default)]
@@ -17,8 +20,7 @@ struct Seen(Vec<[f64; 2]>);
 
 impl Listener for Seen {
     fn sample(&mut self, sample: &Sample) -> bool {
-        let roll_rad = sample.pose.roll_pitch_yaw_rad()[0];
-        self.0.push([roll_rad, sample.pose.position_m[2]]);
+        self.0.push(promise::look(sample));
         true
     }
 }
@@ -40,26 +42,21 @@ fn whole((stats, outcome): (Stats, Result<(), Stopped>)) -> Stats {
 
 /// Every model by itself, on all processors.
 fn alone(models: &[Model], name: &str, tolerance: f64) -> Vec<Run> {
-    let next = AtomicUsize::new(0);
-    let done: Mutex<Vec<(usize, Run)>> = Mutex::default();
-    let work = || {
-        while let Some((i, model)) = at(models, &next) {
-            let mut seen = Seen::default();
-            let named = method(name).expect("a method of the table");
-            let stats = whole(run_model(model, named, &settings(tolerance), &mut seen));
-            done.lock().expect("no panic").push((i, (seen, stats)));
-        }
+    let named = method(name).expect("a method of the table");
+    let run = |model: &Model| {
+        let mut seen = Seen::default();
+        let stats = whole(run_model(model, named, &settings(tolerance), &mut seen));
+        (seen, stats)
     };
     let cores = std::thread::available_parallelism().map_or(1, |n| n.get());
-    std::thread::scope(|scope| (0..cores).for_each(|_| drop(scope.spawn(work))));
-    let mut done = done.into_inner().expect("no panic");
-    done.sort_by_key(|(i, _)| *i);
-    done.into_iter().map(|(_, run)| run).collect()
-}
-
-fn at<'m>(models: &'m [Model], next: &AtomicUsize) -> Option<(usize, &'m Model)> {
-    let i = next.fetch_add(1, Ordering::Relaxed);
-    models.get(i).map(|model| (i, model))
+    std::thread::scope(|scope| {
+        let parts = models.chunks(models.len().div_ceil(cores));
+        let parts: Vec<_> = parts
+            .map(|part| scope.spawn(move || part.iter().map(run).collect::<Vec<Run>>()))
+            .collect();
+        let joined = parts.into_iter().map(|part| part.join().expect("no panic"));
+        joined.flatten().collect()
+    })
 }
 
 fn together(models: &[Model], tolerance: f64) -> Vec<Run> {
@@ -68,25 +65,14 @@ fn together(models: &[Model], tolerance: f64) -> Vec<Run> {
     seen.into_iter().zip(ended.into_iter().map(whole)).collect()
 }
 
-/// The larger of the errors of roll and height, in tolerances times half the range of the truth.
-fn error(seen: &Seen, truth: &Seen, tolerance: f64) -> f64 {
-    let of = |a: usize| {
-        let values = truth.0.iter().map(|x| x[a]);
-        let (low, high) = values.fold((f64::MAX, f64::MIN), |(l, h), x| (l.min(x), h.max(x)));
-        let size = if high - low < 1e-3 {
-            0.1
-        } else {
-            0.5 * (high - low)
-        };
-        let both = seen.0.iter().zip(&truth.0);
-        both.map(|(x, y)| (x[a] - y[a]).abs()).fold(0.0, f64::max) / (size * tolerance)
-    };
-    of(0).max(of(1))
-}
-
 fn tell(name: &str, runs: &[Run], truth: &[Run], tolerance: f64) {
     let both = runs.iter().zip(truth);
-    let mut errors: Vec<f64> = both.map(|(r, t)| error(&r.0, &t.0, tolerance)).collect();
+    let mut errors: Vec<f64> = both
+        .map(|(run, truth)| {
+            let [roll, height] = promise::errors(&run.0.0, &truth.0.0);
+            roll.max(height) / tolerance
+        })
+        .collect();
     errors.sort_by(f64::total_cmp);
     let part = |q: f64| errors[(q * (errors.len() - 1) as f64).round() as usize];
     let beyond = errors.iter().filter(|e| **e > 10.0).count();
@@ -101,16 +87,21 @@ fn tell(name: &str, runs: &[Run], truth: &[Run], tolerance: f64) {
     );
 }
 
+/// What was said in the i-th place.
+fn said<T: FromStr<Err: Debug>>(i: usize, default: &str) -> T {
+    let given = std::env::args().nth(i);
+    let text = given.as_deref().unwrap_or(default);
+    text.parse()
+        .expect("a scene, two whole numbers and a number")
+}
+
 fn main() {
-    let given: Vec<String> = std::env::args().skip(1).collect();
-    let said = |i: usize, default: &str| given.get(i).map_or(default, |s| s).to_owned();
-    let name = said(0, "music");
-    let number = |i, default| -> f64 { said(i, default).parse().expect("a number") };
-    let (first, count, tolerance) = (number(1, "1001"), number(2, "64"), number(3, "1e-6"));
+    let name: String = said(1, "music");
+    let (first, count, tolerance): (u64, u64, f64) =
+        (said(2, "1001"), said(3, "64"), said(4, "1e-6"));
     let off = ["solver.energy=false".to_owned()];
     let scene = load(&name, &off).unwrap_or_else(|problem| panic!("{problem}"));
-    let seeds = first as u64..(first + count) as u64;
-    let models: Vec<Model> = seeds
+    let models: Vec<Model> = (first..first + count)
         .map(|seed| {
             Model::new(&Scene {
                 seed,

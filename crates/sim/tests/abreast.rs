@@ -1,5 +1,8 @@
 //! Runs side by side in the processor's registers are as good as runs by themselves.
 
+#[path = "common/promise.rs"]
+mod promise;
+
 use sim::model::Model;
 use sim::run::{Listener, Sample, run_abreast, run_model};
 use sim::scene::{BUILTIN, Scene, parse};
@@ -8,7 +11,7 @@ use sim::solve::{Event, Settings, Stats, Stopped, abreast, method};
 #[derive(Default)]
 struct Seen {
     t_s: Vec<f64>,
-    of: [Vec<f64>; 2],
+    looks: Vec<[f64; 2]>,
     events: usize,
     event_s: Vec<f64>,
 }
@@ -16,8 +19,7 @@ struct Seen {
 impl Listener for Seen {
     fn sample(&mut self, s: &Sample) -> bool {
         self.t_s.push(s.t_s);
-        self.of[0].push(s.pose.roll_pitch_yaw_rad()[0]);
-        self.of[1].push(s.pose.position_m[2]);
+        self.looks.push(promise::look(s));
         true
     }
     fn event(&mut self, event: &Event) {
@@ -60,23 +62,9 @@ fn alone(model: &Model, tolerance: f64) -> Seen {
     seen
 }
 
-/// Largest difference of roll and of height, in parts of half the truth's range.
 fn errors(seen: &Seen, truth: &Seen) -> [f64; 2] {
     assert_eq!(seen.t_s, truth.t_s);
-    [0, 1].map(|a| {
-        let (seen, truth) = (&seen.of[a], &truth.of[a]);
-        let (low, high) = truth
-            .iter()
-            .fold((f64::MAX, f64::MIN), |(l, h), x| (l.min(*x), h.max(*x)));
-        // A motion that is hardly one is held absolutely.
-        let size = if high - low < 1e-3 {
-            0.1
-        } else {
-            0.5 * (high - low)
-        };
-        let differences = seen.iter().zip(truth).map(|(x, y)| (x - y).abs());
-        differences.fold(0.0, f64::max) / size
-    })
+    promise::errors(&seen.looks, &truth.looks)
 }
 
 #[test]

@@ -2,13 +2,14 @@
 //! relative to the motion's own size, the growth of errors by the scene itself included (`music` grows a difference in the first roll
 //! 460 times, `tumble` 70 times).
 
+#[path = "common/promise.rs"]
+mod promise;
+
+use promise::{errors, look};
 use sim::model::Model;
 use sim::run::{Sample, run_model};
 use sim::scene::{BUILTIN, builtin, parse};
 use sim::solve::{Settings, method};
-
-/// Below this a motion is rest, and errors are absolute: the units of `Freedoms::scales`, m and rad.
-const REST: f64 = 0.1;
 
 fn course(model: &Model, name: &str, tolerance: f64) -> Vec<[f64; 2]> {
     let mut all = Vec::new();
@@ -22,7 +23,7 @@ fn course(model: &Model, name: &str, tolerance: f64) -> Vec<[f64; 2]> {
         method(name).unwrap(),
         &settings,
         &mut |s: &Sample| {
-            all.push([s.pose.roll_pitch_yaw_rad()[0], s.pose.position_m[2]]);
+            all.push(look(s));
             true
         },
     );
@@ -44,26 +45,10 @@ fn the_tolerance_means_what_it_says_on_every_built_in_scene() {
         scene.solver.energy = false;
         let model = Model::new(&scene);
         let truth = course(&model, "dop853", 1e-10);
-        // Half its range. A motion that is hardly one is held absolutely.
-        let size = [0, 1].map(|a| {
-            let (low, high) = truth
-                .iter()
-                .fold((f64::MAX, f64::MIN), |(l, h), x| (l.min(x[a]), h.max(x[a])));
-            if high - low < 1e-3 {
-                REST
-            } else {
-                0.5 * (high - low)
-            }
-        });
         for tolerance in [1e-4, 1e-6, 1e-8] {
             let seen = course(&model, "auto", tolerance);
-            for (a, what) in ["roll", "height"].into_iter().enumerate() {
-                let worst = seen
-                    .iter()
-                    .zip(&truth)
-                    .map(|(x, y)| (x[a] - y[a]).abs())
-                    .fold(0.0, f64::max)
-                    / size[a];
+            let worst = errors(&seen, &truth);
+            for (what, worst) in ["roll", "height"].into_iter().zip(worst) {
                 println!("{name} {seed:?} {tolerance:e}: {what} {worst:.1e}");
                 if worst > 10.0 * tolerance {
                     missed.push(format!(

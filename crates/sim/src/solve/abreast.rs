@@ -57,7 +57,7 @@ const PATIENCE_PER_S: f64 = 8_000.0;
 /// Below this part of the largest margin the least one is a reason to look for events: as in `super::events`.
 const NEAR: f64 = 0.5;
 
-/// Groups of eight lanes that are evaluated together: see [`Octet`].
+/// Groups of eight lanes that are evaluated together: see [`crate::model::Octet`].
 const GROUPS: usize = 2;
 
 /// Whether runs of a model can go abreast: its right-hand side is written for eight, and nothing but the log looks at it.

@@ -430,13 +430,9 @@ impl<'m> Course<'m> {
         self.model.forces(self.t_s, &self.y, &mut self.w);
         self.stats.evaluations += 1;
         for i in 0..self.contacts.len() {
-            let Recent {
-                event_s,
-                clamped_for_s,
-                ..
-            } = self.recent[i];
-            let long_s = 0.5 * clamped_for_s;
-            if self.contacts[i] == Contact::Clamped && self.t_s - event_s >= long_s {
+            let recent = &self.recent[i];
+            let long_enough = self.t_s - recent.event_s >= 0.5 * recent.clamped_for_s;
+            if self.contacts[i] == Contact::Clamped && long_enough {
                 let contact = Self::standing(self.w.of(i, |p| p.unclamped));
                 self.set_contact(i, contact);
             }
