@@ -108,9 +108,16 @@ pub trait Freedoms: Send + Sync {
     }
     /// What counts as one unit of each state in an error norm.
     fn scales(&self) -> &[f64];
-    /// −∂v̇/∂v of each velocity, 1/s, that vertical dampers of `damping` (N·s/m) at the handles make where `contact_gain` lets them act.
+    /// −∂v̇/∂v of each velocity, 1/s, that dampers at the handles (N·s/m, sideways and vertical) make where `contact_gain` lets them act.
     /// Zero where it is not worth knowing.
-    fn damping_per_s(&self, _y: &[f64], _pairs: &[Pair], _damping: &[f64x2], _rates: &mut [f64]) {}
+    fn damping_per_s(
+        &self,
+        _y: &[f64],
+        _pairs: &[Pair],
+        _damping: [&[f64x2]; 2],
+        _rates: &mut [f64],
+    ) {
+    }
 }
 
 /// Coordinates written for any number of moments.
@@ -494,19 +501,30 @@ impl Freedoms for Six {
         ]
     }
 
-    fn damping_per_s(&self, y: &[f64], pairs: &[Pair], damping: &[f64x2], rates: &mut [f64]) {
+    fn damping_per_s(
+        &self,
+        y: &[f64],
+        pairs: &[Pair],
+        [sideways, vertical]: [&[f64x2]; 2],
+        rates: &mut [f64],
+    ) {
         let up = rotation(&y[3..7])[2].map(f64x2::splat);
-        let (mut straight, mut turning) = (f64x2::ZERO, [f64x2::ZERO; 3]);
-        for ((p, h), damping) in pairs.iter().zip(&self.handle).zip(damping) {
-            let damping = *damping * p.contact_gain;
-            straight += damping;
+        let (mut across, mut along) = (f64x2::ZERO, f64x2::ZERO);
+        let mut turning = [f64x2::ZERO; 3];
+        let handles = pairs.iter().zip(&self.handle);
+        for (((p, h), sideways), vertical) in handles.zip(sideways).zip(vertical) {
+            let (sideways, vertical) = (*sideways * p.contact_gain, *vertical * p.contact_gain);
+            across += sideways;
+            along += vertical;
             for a in 0..3 {
                 let (b, c) = ((a + 1) % 3, (a + 2) % 3);
                 let lever = h[b] * up[c] - h[c] * up[b];
-                turning[a] += damping * lever * lever;
+                let (whole, upright) = (h[b] * h[b] + h[c] * h[c], lever * lever);
+                turning[a] += vertical * upright + sideways * (whole - upright);
             }
         }
-        rates[9] = sum(straight) * self.inverse_mass;
+        rates[7..9].fill(sum(across) * self.inverse_mass);
+        rates[9] = sum(along) * self.inverse_mass;
         for a in 0..3 {
             rates[10 + a] = sum(turning[a]) * self.inverse_inertia.moments[a];
         }

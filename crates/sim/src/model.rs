@@ -72,6 +72,8 @@ impl Layout {
 
 /// The unit of a coordinate of the body, m or rad.
 const COORDINATE: f64 = 0.1;
+/// No velocity's error counts as decaying more slowly than this, 1/s.
+const SLOWEST_PER_S: f64 = 0.5;
 /// So much of an acceleration, m/s² or rad/s², one unit of a velocity may make where it is more than its scale.
 const LOOSEST: f64 = 2400.0;
 
@@ -100,6 +102,8 @@ pub struct Model {
     contact_stiffness: Vec<f64>,
     contact_exponent: f64,
     contact_damping: Vec<f64x2>,
+    /// N·s/m of every carrier's hold and straps, sideways, under an equal share of the load.
+    side_damping: Vec<f64x2>,
     /// Damping and stiffness of every carrier's hold, both ways.
     sideways: [Vec<f64x2>; 2],
     /// The same of the straps, per newton of load: τ/L (s/m), 1/L (1/m).
@@ -155,6 +159,7 @@ impl Model {
             contact_stiffness: Vec::new(),
             contact_exponent: 1.0,
             contact_damping: Vec::new(),
+            side_damping: Vec::new(),
             sideways: Default::default(),
             straps: [0.0; 2],
             extra: Vec::new(),
@@ -169,6 +174,12 @@ impl Model {
             model.building = effect.name;
             (effect.build)(scene, &mut model);
         }
+        let share_n = model.body.mass_kg * model.body.gravity_m_per_s2.norm() / n.max(1) as f64;
+        let [hold, _] = &model.sideways;
+        let held = |p: usize| hold.get(p).copied().unwrap_or(f64x2::ZERO);
+        model.side_damping = (0..pairs(n))
+            .map(|p| held(p) + f64x2::splat(model.straps[0] * share_n))
+            .collect();
         if !scene.solver.energy {
             model.accounts.clear();
         }
@@ -341,23 +352,28 @@ impl Model {
         &*self.freedoms
     }
 
-    /// What counts as one unit of each of the body's states in an error norm: [`Freedoms::scales`], and more for a velocity that the
-    /// contacts damp away before its error has moved anything.
+    /// What counts as one unit of each of the body's states in an error norm: [`Freedoms::scales`], and for a velocity, where contacts damp,
+    /// what is made of it before it is forgotten.
     ///
-    /// An error of a velocity that decays at rate λ moves its coordinate by 1/λ of it. Its unit is that of the coordinate times λ where that
-    /// is more than its scale. But forces show it undiminished, and a force that errs opens contacts that are closed: it is no more than
-    /// so much that it is worth 2400 m/s² or rad/s², so nothing is loosened for stiff contacts.
+    /// An error of a velocity that decays at rate λ moves its coordinate by 1/λ of it: its unit is that of the coordinate times λ. One that
+    /// hardly decays, as roll's on a pole, is not forgotten, and where the music makes roll grow it grows too: it counts as if it
+    /// decayed at 0.5/s. But forces show an error of any velocity undiminished, and a force that errs opens contacts that are closed: the
+    /// unit is no more than so much that it is worth 2400 m/s² or rad/s², so nothing is loosened for stiff contacts.
     pub fn units(&self, y: &[f64], w: &Workspace, units: &mut [f64]) {
-        units.fill(0.0);
-        if !self.contact_damping.is_empty() {
-            self.freedoms
-                .damping_per_s(y, &w.pair, &self.contact_damping, units);
+        let scales = self.freedoms.scales();
+        units.copy_from_slice(scales);
+        if self.contact_damping.is_empty() {
+            return;
         }
-        for (unit, &scale) in units.iter_mut().zip(self.freedoms.scales()) {
+        units.fill(0.0);
+        let damping = [&self.side_damping[..], &self.contact_damping];
+        self.freedoms.damping_per_s(y, &w.pair, damping, units);
+        let positions = self.freedoms.positions();
+        units[..positions].copy_from_slice(&scales[..positions]);
+        for (unit, &scale) in units.iter_mut().zip(scales).skip(positions) {
             let damping_per_s = *unit;
-            *unit = (COORDINATE * damping_per_s)
-                .min(LOOSEST / damping_per_s)
-                .max(scale);
+            let most = (LOOSEST / damping_per_s).max(scale);
+            *unit = (COORDINATE * damping_per_s).clamp(COORDINATE * SLOWEST_PER_S, most);
         }
     }
 

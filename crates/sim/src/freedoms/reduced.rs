@@ -147,7 +147,7 @@ impl Freedoms for Pinned {
     fn scales(&self) -> &[f64] {
         self.six.scales()
     }
-    fn damping_per_s(&self, y: &[f64], pairs: &[Pair], damping: &[f64x2], rates: &mut [f64]) {
+    fn damping_per_s(&self, y: &[f64], pairs: &[Pair], damping: [&[f64x2]; 2], rates: &mut [f64]) {
         self.six.damping_per_s(y, pairs, damping, rates);
     }
 }
@@ -345,7 +345,13 @@ impl<T: Turning> Freedoms for Reduced<T> {
         &self.rails.scales
     }
 
-    fn damping_per_s(&self, y: &[f64], pairs: &[Pair], damping: &[f64x2], rates: &mut [f64]) {
+    fn damping_per_s(
+        &self,
+        y: &[f64],
+        pairs: &[Pair],
+        [_, damping]: [&[f64x2]; 2],
+        rates: &mut [f64],
+    ) {
         let rails = &self.rails;
         if let Some(height) = rails.place[2] {
             let acting = pairs.iter().zip(damping).map(|(p, d)| *d * p.contact_gain);

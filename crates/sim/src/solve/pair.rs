@@ -330,8 +330,9 @@ impl<'m, P: Pair, const EVENTS: bool> Run<'m, P, EVENTS> {
         let mut h_next = self.first_step();
         // What a first step after a switch could have been, the last time that as many handles rested: the jump excites what the step
         // before it has not met.
-        let mut after_switch = [f64::INFINITY; 3];
-        let mut switched: Option<usize> = None;
+        // And after an event, where another law begins.
+        let mut first_s = [[f64::INFINITY; 3]; 2];
+        let mut first: Option<(usize, usize)> = None;
         let mut ln_error_before = LEAST_ERROR.ln();
         let mut rejected_before = false;
         while !self.course.finished() {
@@ -388,8 +389,8 @@ impl<'m, P: Pair, const EVENTS: bool> Run<'m, P, EVENTS> {
                 }
             };
             let e = error.max(1e-10);
-            if let Some(resting) = switched.take() {
-                after_switch[resting] = h * (SAFETY * e.powf(-P::EXPONENT)).clamp(SHRINK, GROW);
+            if let Some((event, resting)) = first.take() {
+                first_s[event][resting] = h * (SAFETY * e.powf(-P::EXPONENT)).clamp(SHRINK, GROW);
             }
             let ln_error = e.ln();
             let factor = SAFETY * (P::EXPONENT * (0.2 * ln_error_before - 0.8 * ln_error)).exp();
@@ -412,11 +413,10 @@ impl<'m, P: Pair, const EVENTS: bool> Run<'m, P, EVENTS> {
             if moved != Moved::On && !self.course.finished() {
                 self.begin();
                 self.stiff_in_row = 0;
-                if moved == Moved::Switched {
-                    let resting = self.course.resting_handles().min(2);
-                    h_next = h_next.min(after_switch[resting]);
-                    switched = Some(resting);
-                }
+                let event = usize::from(moved == Moved::Event);
+                let resting = self.course.resting_handles().min(2);
+                h_next = h_next.min(first_s[event][resting]);
+                first = Some((event, resting));
             }
             if self.stiff_in_row > MANY {
                 let (t_s, evaluations) = self.row_began;
