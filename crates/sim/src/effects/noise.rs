@@ -64,21 +64,21 @@ struct Grid {
 impl Grid {
     /// The cell that begins at or before `t_s`; a time that is a grid point but for rounding belongs to the cell it begins.
     fn cell(&self, t_s: f64) -> u64 {
-        // As `round` for what is not negative, without a call.
-        let nearest = (t_s * self.grid_hz + 0.5) as u64 as f64;
+        // As `round` for what is not negative, without a call; signed, for which the processor has an instruction.
+        let nearest = (t_s * self.grid_hz + 0.5) as i64 as f64;
         let cell = if nearest / self.grid_hz <= t_s {
             nearest
         } else {
             nearest - 1.0
         };
         // OK because times are never negative and the number of cells is far below 2^53.
-        cell.max(0.0) as u64
+        cell.max(0.0) as i64 as u64
     }
 }
 
 impl Switch for Grid {
     fn next_s(&self, after_s: f64) -> f64 {
-        (self.cell(after_s) + 1) as f64 / self.grid_hz
+        (self.cell(after_s) as i64 + 1) as f64 / self.grid_hz
     }
 
     fn begin(&self, t_s: f64, w: &mut Workspace) {

@@ -28,7 +28,7 @@ const NAME: &str = "dop853";
 const STAGES: usize = Dop853::STAGES;
 /// As `super::pair::Pair::SHARE`.
 const SHARE: f64 = 8e-3;
-const SAFETY: f64 = 0.9;
+const SAFETY: f64 = 0.95;
 /// What is left to a stop is taken in equal steps, up to so many times what the error asks for, if they are few.
 const STRETCH: f64 = 1.04;
 const FEW: f64 = 16.0;
@@ -36,19 +36,19 @@ const SHRINK: f64 = 0.2;
 const GROW: f64 = 6.0;
 /// The error of a step counts as at least this when the next one is chosen.
 const LEAST_ERROR: f64 = 1e-10;
-/// The 32nd root of 1e-4, which the error of the step before counts as at least.
-const LEAST_ROOT_BEFORE: f64 = 0.75;
 /// Below this a step's error estimate is rounding.
 const FINEST: f64 = 3e-15;
 /// The units are found anew when a number of the attitude has changed by so much.
-const TURNED: f64 = 0.03;
+const TURNED: f64 = 0.1;
 const SMALLEST_STEP_S: f64 = 1e-13;
 /// So exactly an event is located, s.
 const RESOLUTION_S: f64 = 0.5 * SAME_MOMENT_S;
 /// An event so near to the end of a step, in s and as a part of the step, is met by going along the slope there: half the square of that
-/// part is below any rounding. As small the margin must be beside the largest one in the step, or the event is none.
+/// part is below any rounding.
 const NEXT_TO_S: f64 = 2e-9;
 const NEXT_TO: f64 = 1e-6;
+/// So many secants meet one that is not much further, or it is not what it seemed.
+const MOST_SECANTS: u32 = 6;
 /// A lane that has not met its event after so many steps gives up.
 const MOST_TRIES: u32 = 80;
 /// So many evaluations, and so many more for each second of motion, and stability rather than accuracy limits the steps.
@@ -56,9 +56,6 @@ const PATIENCE: u64 = 20_000;
 const PATIENCE_PER_S: f64 = 8_000.0;
 /// Below this part of the largest margin the least one is a reason to look for events: as in `super::events`.
 const NEAR: f64 = 0.5;
-
-/// Groups of eight lanes that are evaluated together: see [`crate::model::Octet`].
-const GROUPS: usize = 2;
 
 /// Whether runs of a model can go abreast: its right-hand side is written for eight, and nothing but the log looks at it.
 pub fn suits(model: &Model) -> bool {
@@ -100,9 +97,9 @@ pub fn run(
 /// What all lanes do at once, in code for a kind of registers.
 trait Together: Registers {
     /// A step of every lane from `y` into `y1`, and its error.
-    fn step(groups: &mut [Group<Self>; GROUPS], side: &SideBySide<'_>, tolerance: f64);
+    fn step(group: &mut Group<Self>, side: &SideBySide<'_>, tolerance: f64);
     /// The slopes at a stage of it, whose state is known: not to be inlined, for twelve copies would fill the cache of instructions.
-    fn evaluate(groups: &mut [Group<Self>; GROUPS], side: &SideBySide<'_>, stage: usize);
+    fn evaluate(group: &mut Group<Self>, side: &SideBySide<'_>, stage: usize);
     /// Takes over the step in the lanes that are to move on.
     fn move_on(group: &mut Group<Self>);
 }
@@ -110,13 +107,13 @@ trait Together: Registers {
 macro_rules! together {
     ($type:ident, $step:ident, $evaluate:ident, $move_on:ident $(, $features:literal)?) => {
         $(#[cfg(target_arch = "x86_64")] #[target_feature(enable = $features)])?
-        fn $step(groups: &mut [Group<$type>; GROUPS], side: &SideBySide<'_>, tolerance: f64) {
-            step_here(groups, side, tolerance);
+        fn $step(group: &mut Group<$type>, side: &SideBySide<'_>, tolerance: f64) {
+            step_here(group, side, tolerance);
         }
         $(#[cfg(target_arch = "x86_64")] #[target_feature(enable = $features)])?
         #[inline(never)]
-        fn $evaluate(groups: &mut [Group<$type>; GROUPS], side: &SideBySide<'_>, stage: usize) {
-            evaluate_here(groups, side, stage);
+        fn $evaluate(group: &mut Group<$type>, side: &SideBySide<'_>, stage: usize) {
+            evaluate_here(group, side, stage);
         }
         $(#[cfg(target_arch = "x86_64")] #[target_feature(enable = $features)])?
         fn $move_on(group: &mut Group<$type>) {
@@ -126,11 +123,11 @@ macro_rules! together {
         $(#[cfg(target_arch = "x86_64")] #[doc = $features])?
         #[allow(unsafe_code, unused_unsafe)]
         impl Together for $type {
-            fn step(groups: &mut [Group<Self>; GROUPS], side: &SideBySide<'_>, tolerance: f64) {
-                unsafe { $step(groups, side, tolerance) }
+            fn step(group: &mut Group<Self>, side: &SideBySide<'_>, tolerance: f64) {
+                unsafe { $step(group, side, tolerance) }
             }
-            fn evaluate(groups: &mut [Group<Self>; GROUPS], side: &SideBySide<'_>, stage: usize) {
-                unsafe { $evaluate(groups, side, stage) }
+            fn evaluate(group: &mut Group<Self>, side: &SideBySide<'_>, stage: usize) {
+                unsafe { $evaluate(group, side, stage) }
             }
             fn move_on(group: &mut Group<Self>) {
                 unsafe { $move_on(group) }
@@ -149,58 +146,52 @@ together!(
 );
 
 #[inline(always)]
-fn evaluate_here<E: Together>(
-    groups: &mut [Group<E>; GROUPS],
-    side: &SideBySide<'_>,
-    stage: usize,
-) {
-    let [a, b] = groups;
-    let mut octets = [a.octet(stage), b.octet(stage)];
+fn evaluate_here<E: Together>(group: &mut Group<E>, side: &SideBySide<'_>, stage: usize) {
+    let mut octets = [group.octet(stage)];
     side.phases(&mut octets);
     side.shoulders(&mut octets);
     side.load(&mut octets);
-    a.keep(stage);
-    b.keep(stage);
+    group.keep(stage);
 }
 
 #[inline(always)]
-fn step_here<E: Together>(groups: &mut [Group<E>; GROUPS], side: &SideBySide<'_>, tolerance: f64) {
-    for group in groups.iter_mut() {
-        group.begin_step(side);
-    }
+fn step_here<E: Together>(group: &mut Group<E>, side: &SideBySide<'_>, tolerance: f64) {
+    group.begin_step(side);
     macro_rules! stages {
         ($($i:literal)*) => {$(
-            for group in groups.iter_mut() {
-                group.combine::<$i>();
-            }
-            E::evaluate(groups, side, $i);
+            group.combine::<$i>();
+            E::evaluate(group, side, $i);
         )*};
     }
     stages!(1 2 3 4 5 6 7 8 9 10 11 12);
-    for group in groups.iter_mut() {
-        group.survey();
-        group.estimate(tolerance);
-    }
+    group.survey();
+    group.estimate(tolerance);
 }
 
 /// All lanes.
 struct Abreast<E: Registers> {
     settings: Settings,
     tolerance: f64,
-    groups: [Group<E>; GROUPS],
+    /// Its cubic root: see [`Lane::meets`].
+    near: f64,
+    group: Group<E>,
     units: Vec<f64>,
     column: Vec<f64>,
+    at: Vec<f64>,
 }
 
 impl<E: Together> Abreast<E> {
     fn new(model: &Model, settings: &Settings) -> Self {
         let layout = model.layout();
+        let tolerance = (settings.tolerance * SHARE).max(FINEST);
         Self {
             settings: settings.clone(),
-            tolerance: (settings.tolerance * SHARE).max(FINEST),
-            groups: std::array::from_fn(|_| Group::new(model)),
+            tolerance,
+            near: tolerance.cbrt(),
+            group: Group::new(model),
             units: vec![0.0; layout.body],
             column: vec![0.0; layout.size()],
+            at: vec![0.0; layout.size()],
         }
     }
 
@@ -214,7 +205,7 @@ impl<E: Together> Abreast<E> {
         let mut waiting = 0..models.len();
         // What the seeds change is in the lanes: any of the models will do.
         let side = models[0].side_by_side();
-        let mut lanes: [Option<Lane<'m>>; GROUPS * MOMENTS] = std::array::from_fn(|_| None);
+        let mut lanes: [Option<Lane<'m>>; MOMENTS] = std::array::from_fn(|_| None);
         loop {
             for (l, lane) in lanes.iter_mut().enumerate() {
                 while lane.is_none() {
@@ -237,21 +228,18 @@ impl<E: Together> Abreast<E> {
                     lane.plan();
                     (t_s, h_s) = (lane.course.t_s, lane.h_s);
                 }
-                let group = &mut self.groups[l / MOMENTS];
-                group.t_s.as_mut_array()[l % MOMENTS] = t_s;
-                group.h_s.as_mut_array()[l % MOMENTS] = h_s;
+                self.group.t_s.as_mut_array()[l] = t_s;
+                self.group.h_s.as_mut_array()[l] = h_s;
             }
-            E::step(&mut self.groups, &side, self.tolerance);
-            for group in &mut self.groups {
-                group.moves = E::splat(-1.0);
-            }
-            let mut stopping = [None; GROUPS * MOMENTS];
+            E::step(&mut self.group, &side, self.tolerance);
+            self.group.moves = E::splat(-1.0);
+            let mut stopping = [None; MOMENTS];
             for (l, lane) in lanes.iter_mut().enumerate() {
                 if let Some(lane) = lane {
                     stopping[l] = Some(self.judge(l, lane));
                 }
             }
-            self.groups.iter_mut().for_each(E::move_on);
+            E::move_on(&mut self.group);
             for (l, slot) in lanes.iter_mut().enumerate() {
                 let (Some(lane), Some(end)) = (slot.as_mut(), stopping[l]) else {
                     continue;
@@ -274,7 +262,7 @@ impl<E: Together> Abreast<E> {
                 let mut ended = (lane.course.stats, outcome);
                 if ended.1.is_ok() && !lane.course.finished() {
                     let mut course = lane.course;
-                    self.groups[l / MOMENTS].read(l % MOMENTS, &mut course.y);
+                    self.group.read(l, &mut course.y);
                     ended = auto::go(course, &self.settings, &mut *observers[run]);
                 }
                 observers[run].ended(&ended.0, &ended.1);
@@ -315,21 +303,21 @@ impl<E: Together> Abreast<E> {
             aim_s: None,
             beyond_end_s: 0.0,
             beyond: None,
+            short_before: false,
             tries: 0,
-            error_before: LEAST_ROOT_BEFORE,
             rejected_before: false,
-            after_switch: [f64::INFINITY; 3],
-            switched: None,
+            first_s: [[f64::INFINITY; 3]; 2],
+            first: None,
         };
         self.begin(l, &mut lane);
         // A tenth of the time in which the state would change by one unit, at tolerance 1; the error refines it.
         let mut squares = 0.0;
-        let (group, l) = (&self.groups[l / MOMENTS], l % MOMENTS);
+        let group = &self.group;
         for (d, y) in group.y.iter().enumerate() {
             let weight = group.weight[d].as_array()[l];
             let relative = group.relative[d].as_array()[l];
             let unit = (1.0 + relative * y.as_array()[l].abs()) / weight;
-            squares += (group.k[d][0].as_array()[l] / unit).powi(2);
+            squares += (group.k[0][d].as_array()[l] / unit).powi(2);
         }
         let speed = (squares / group.y.len() as f64).sqrt();
         let h = 0.1 * self.tolerance.powf(0.125) / speed.max(1e-3);
@@ -345,9 +333,9 @@ impl<E: Together> Abreast<E> {
         let course = &mut lane.course;
         course.slope(&mut self.column);
         let margin_n = course.margin_n();
-        let (group, l) = (&mut self.groups[l / MOMENTS], l % MOMENTS);
-        for (k, slope) in group.k.iter_mut().zip(&self.column) {
-            k[0].as_mut_array()[l] = *slope;
+        let group = &mut self.group;
+        for (k, slope) in group.k[0].iter_mut().zip(&self.column) {
+            k.as_mut_array()[l] = *slope;
         }
         group.short[0].as_mut_array()[l] = -margin_n.max(0.0);
         group.write(l, course);
@@ -358,14 +346,14 @@ impl<E: Together> Abreast<E> {
     fn judge(&mut self, l: usize, lane: &mut Lane<'_>) -> Ended {
         let stats = &mut lane.course.stats;
         stats.evaluations += STAGES as u64;
-        let (group, l) = (&mut self.groups[l / MOMENTS], l % MOMENTS);
+        let (group, at, column) = (&mut self.group, &mut self.at[..], &mut self.column[..]);
         let (error, root) = (group.error.as_array()[l], group.root.as_array()[l]);
         if !(error <= 1.0) {
             stats.rejected += 1;
             lane.rejected_before = true;
             (lane.aim_s, lane.beyond) = (None, None);
             let factor = if error.is_finite() {
-                (SAFETY / root.powi(4)).clamp(SHRINK, 1.0)
+                (SAFETY / root).clamp(SHRINK, 1.0)
             } else {
                 SHRINK
             };
@@ -385,18 +373,23 @@ impl<E: Together> Abreast<E> {
                 Ahead::Clear => lane.beyond = None,
                 Ahead::Here => event = true,
                 Ahead::Short(zero) | Ahead::Passed { zero, .. }
-                    if lane.next_to_end(zero, -group.short[STAGES].as_array()[l], most) =>
+                    if lane.meets(zero, most, self.near, (group, l), [at, column]) =>
                 {
                     event = true;
                 }
                 Ahead::Short(zero) => {
-                    if lane.again(lane.course.t_s + zero * lane.h_s) == Ended::Given {
+                    // What was seen behind may be an early stage of a long step, far off: a step that ends there tells.
+                    let behind_s = lane.beyond.filter(|_| lane.short_before).map(|b| b.0);
+                    lane.short_before = true;
+                    let zero_s = lane.course.t_s + zero * lane.h_s;
+                    if lane.again(behind_s.unwrap_or(zero_s)) == Ended::Given {
                         return Ended::Given;
                     }
                 }
                 Ahead::Passed { zero, beyond } => {
                     let (t0, h) = (lane.course.t_s, lane.h_s);
                     lane.beyond = Some((t0 + beyond.0 * h, beyond.1));
+                    lane.short_before = false;
                     return lane.again(t0 + zero * h);
                 }
                 Ahead::Dip(at) => return lane.again(lane.course.t_s + at * lane.h_s),
@@ -407,23 +400,23 @@ impl<E: Together> Abreast<E> {
             (lane.aim_s, lane.beyond, lane.tries) = (None, None, 0);
         }
         let h = lane.h_s;
-        if let Some(resting) = lane.switched.take() {
-            lane.after_switch[resting] = h * (SAFETY / root.powi(4)).clamp(SHRINK, GROW);
+        let factor = SAFETY / root;
+        if let Some((event, resting)) = lane.first.take()
+            && !aimed
+        {
+            lane.first_s[event][resting] = h * factor.clamp(SHRINK, GROW);
         }
-        // A PI controller: Hairer, Nørsett, Wanner, Solving ODEs I (1993), IV.2, its exponents rounded to 32nds.
         let most = if lane.rejected_before || event || aimed {
             1.0
         } else {
             GROW
         };
-        let factor = group.factor.as_array()[l] * lane.error_before;
         let next = h * factor.clamp(SHRINK, most);
         lane.h_next_s = if h < lane.h_next_s {
             lane.h_next_s.max(next)
         } else {
             next
         };
-        lane.error_before = root.max(LEAST_ROOT_BEFORE);
         lane.rejected_before = false;
         group.moves.as_mut_array()[l] = 1.0;
         lane.end_s += lane.beyond_end_s;
@@ -447,19 +440,16 @@ impl<E: Together> Abreast<E> {
         observer: &mut dyn Observer,
     ) -> Result<bool, Stopped> {
         let t_s = lane.end_s;
-        let (group, in_group) = (&mut self.groups[l / MOMENTS], l % MOMENTS);
-        group.read(in_group, &mut lane.course.y);
-        let course = &mut lane.course;
-        let further_s = std::mem::take(&mut lane.beyond_end_s);
-        if further_s != 0.0 {
-            for (y, k) in course.y.iter_mut().zip(&group.k) {
-                *y += further_s * k[0].as_array()[in_group];
-            }
+        let group = &mut self.group;
+        // Else the state is that at the event.
+        if std::mem::take(&mut lane.beyond_end_s) == 0.0 {
+            group.read(l, &mut lane.course.y);
         }
+        let course = &mut lane.course;
         let switched = t_s >= course.stop_s() - SAME_MOMENT_S;
         if course.sample_due(t_s).is_some() {
             // The last stage was here.
-            group.w.pick(in_group, &mut course.w);
+            group.w.pick(l, &mut course.w);
             self.column.copy_from_slice(&course.y);
         }
         while course.sample_due(t_s).is_some() {
@@ -478,15 +468,15 @@ impl<E: Together> Abreast<E> {
         if event || switched {
             self.begin(l, lane);
         } else {
-            group.write(in_group, &lane.course);
-            lane.weigh(group, in_group, &mut self.units);
+            group.write(l, &lane.course);
+            lane.weigh(group, l, &mut self.units);
         }
         lane.look_up_stop();
         let course = &lane.course;
-        if switched && !event {
-            let resting = course.resting_handles().min(2);
-            lane.h_next_s = lane.h_next_s.min(lane.after_switch[resting]);
-            lane.switched = Some(resting);
+        if event || switched {
+            let which = (usize::from(event), course.resting_handles().min(2));
+            lane.h_next_s = lane.h_next_s.min(lane.first_s[which.0][which.1]);
+            lane.first = Some(which);
         }
         let patience = PATIENCE + (PATIENCE_PER_S * course.t_s) as u64;
         Ok(course.stats.evaluations > patience)

@@ -44,10 +44,10 @@ pub const FIXED_COLUMNS: &[&str] = &[
 const MOST_EVALUATIONS: u64 = 100_000_000;
 
 /// So many lanes there are. With fewer seeds runs take less time one by one.
-const WORTH_ABREAST: u64 = 16;
+const WORTH_ABREAST: u64 = 8;
 /// With few at a time lanes stand empty while the last of them end; from here on that is hardly felt.
 const MOST_ABREAST: u64 = 512;
-const LEAST_ABREAST: u64 = 32;
+const LEAST_ABREAST: u64 = 16;
 /// Runs of more samples are computed one by one.
 const LONGEST_ABREAST: f64 = 20e3;
 
@@ -242,11 +242,11 @@ impl Plan {
             };
         }
         let threads = jobs as u64;
-        let whole = runs.saturating_sub(2 * threads * MOST_ABREAST) / MOST_ABREAST;
+        let whole = runs.saturating_sub((threads + 1) * MOST_ABREAST) / MOST_ABREAST;
         let mut rest = Vec::new();
         let mut first = whole * MOST_ABREAST;
         while first < runs {
-            let share = (runs - first) / (2 * threads);
+            let share = (runs - first) / (threads + 1);
             let share = share.clamp(LEAST_ABREAST, MOST_ABREAST);
             let last = runs.min(first + share.next_multiple_of(WORTH_ABREAST));
             rest.push(first..last);

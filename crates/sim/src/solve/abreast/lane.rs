@@ -1,7 +1,10 @@
 //! A run under way in a lane: where its steps end, and what has become of them.
 
 use super::group::Group;
-use super::{FEW, MOST_TRIES, NEXT_TO, NEXT_TO_S, RESOLUTION_S, STRETCH, TURNED, Together};
+use super::{
+    FEW, MOST_SECANTS, MOST_TRIES, NEXT_TO, NEXT_TO_S, RESOLUTION_S, STAGES, STRETCH, TURNED,
+    Together,
+};
 use crate::solve::course::Course;
 
 /// One run under way in a lane.
@@ -20,17 +23,18 @@ pub(super) struct Lane<'m> {
     pub h_next_s: f64,
     /// Where the step is to end that is to meet an event, s.
     pub aim_s: Option<f64>,
-    /// How far beyond the step's end it was found instead, s.
+    /// How far beyond the step's end it was found instead, s; then the state there is in `course.y`.
     pub beyond_end_s: f64,
     /// A moment behind that event, with the margin there.
     pub beyond: Option<(f64, f64)>,
+    /// Whether a step has ended short of the event since.
+    pub short_before: bool,
     pub tries: u32,
-    /// The 32nd root of the error of the step before.
-    pub error_before: f64,
     pub rejected_before: bool,
-    /// What a first step after a switch could have been, the last time that as many handles rested; see `super::pair`.
-    pub after_switch: [f64; 3],
-    pub switched: Option<usize>,
+    /// What a first step after a switch, or after an event, could have been, the last time that as many handles rested; see
+    /// `super::pair`. And which of them the step under way will tell.
+    pub first_s: [[f64; 3]; 2],
+    pub first: Option<(usize, usize)>,
 }
 
 impl Lane<'_> {
@@ -78,16 +82,55 @@ impl Lane<'_> {
         };
     }
 
-    /// Whether an event at a part `zero` of the step is so near to its end that nothing has to be solved in between.
-    pub fn next_to_end(&mut self, zero: f64, margin_n: f64, most_n: f64) -> bool {
-        let further_s = (zero - 1.0) * self.h_s;
-        let near = (zero - 1.0).abs() <= NEXT_TO && further_s.abs() <= NEXT_TO_S;
-        let end_s = self.end_s + further_s;
-        let is = near && margin_n.abs() <= 10.0 * NEXT_TO * most_n && end_s < self.stop_s;
-        if is {
-            self.beyond_end_s = further_s;
+    /// Whether an event at a part `zero` of the step, whose margins were `most_n` at most, is so near to its end that no step has to be
+    /// solved in between. If so the state there is in `course.y`.
+    ///
+    /// The rest of the way, δ, goes along the slopes at its two ends, which errs by (δ/h)³ of what the step changed, or along the first alone
+    /// where (δ/h)² is as small; `near` is the largest δ/h. The place is a zero of the secant through the margins there.
+    pub fn meets<E: Together>(
+        &mut self,
+        zero: f64,
+        most_n: f64,
+        near: f64,
+        (group, l): (&Group<E>, usize),
+        [at, slope]: [&mut [f64]; 2],
+    ) -> bool {
+        let nearest_s = near * self.h_s;
+        let margin_n = -group.short[STAGES].as_array()[l];
+        let mut further_s = (zero - 1.0) * self.h_s;
+        if further_s.abs() > nearest_s || margin_n.abs() > 10.0 * near * most_n {
+            return false;
         }
-        is
+        let end_slope = group.end_slope();
+        for (slope, k) in slope.iter_mut().zip(end_slope) {
+            *slope = k.as_array()[l];
+        }
+        let alone = further_s.abs() <= NEXT_TO_S.min(NEXT_TO * self.h_s);
+        for tried in 0..MOST_SECANTS {
+            let t_s = self.end_s + further_s;
+            if further_s.abs() > nearest_s || t_s >= self.stop_s {
+                return false;
+            }
+            for (d, at) in at.iter_mut().enumerate() {
+                let mean = 0.5 * (end_slope[d].as_array()[l] + slope[d]);
+                *at = group.y1[d].as_array()[l] + further_s * mean;
+            }
+            let next_s = if alone {
+                further_s
+            } else {
+                self.course.rhs(t_s, at, slope);
+                let here_n = self.course.margin_n();
+                further_s * margin_n / (margin_n - here_n)
+            };
+            let straight = (further_s / self.h_s).powi(2) <= near.powi(3);
+            if (next_s - further_s).abs() <= RESOLUTION_S && (tried > 0 || straight) {
+                self.course.y.copy_from_slice(at);
+                self.beyond_end_s = further_s;
+                return true;
+            }
+            further_s = next_s;
+        }
+        false
     }
 
     /// Aims at another end, for the same step or the next one.
