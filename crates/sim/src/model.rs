@@ -72,8 +72,6 @@ impl Layout {
 
 /// The unit of a coordinate of the body, m or rad.
 const COORDINATE: f64 = 0.1;
-/// No velocity's error counts as decaying more slowly than this, 1/s.
-const SLOWEST_PER_S: f64 = 0.5;
 /// So much of an acceleration, m/s² or rad/s², one unit of a velocity may make where it is more than its scale.
 const LOOSEST: f64 = 2400.0;
 
@@ -357,9 +355,9 @@ impl Model {
     ///
     /// An error of a velocity that decays at rate λ moves its coordinate by 1/λ of it: its unit is that of the coordinate times λ. One that
     /// hardly decays, as roll's on a pole, is not forgotten, and where the music makes roll grow it grows too: it counts as if it
-    /// decayed at 0.5/s. But forces show an error of any velocity undiminished, and a force that errs opens contacts that are closed: the
+    /// decayed at `slowest_per_s`. But forces show an error of any velocity undiminished, and a force that errs opens contacts that are closed: the
     /// unit is no more than so much that it is worth 2400 m/s² or rad/s², so nothing is loosened for stiff contacts.
-    pub fn units(&self, y: &[f64], w: &Workspace, units: &mut [f64]) {
+    pub fn units(&self, y: &[f64], w: &Workspace, slowest_per_s: f64, units: &mut [f64]) {
         let scales = self.freedoms.scales();
         units.copy_from_slice(scales);
         if self.contact_damping.is_empty() {
@@ -373,7 +371,7 @@ impl Model {
         for (unit, &scale) in units.iter_mut().zip(scales).skip(positions) {
             let damping_per_s = *unit;
             let most = (LOOSEST / damping_per_s).max(scale);
-            *unit = (COORDINATE * damping_per_s).clamp(COORDINATE * SLOWEST_PER_S, most);
+            *unit = (COORDINATE * damping_per_s).clamp(COORDINATE * slowest_per_s, most);
         }
     }
 

@@ -28,6 +28,8 @@ const NAME: &str = "dop853";
 const STAGES: usize = Dop853::STAGES;
 /// As `super::pair::Pair::SHARE`.
 const SHARE: f64 = 8e-3;
+/// As `super::SLOWEST_PER_S`, but of many runs the worst count.
+const SLOWEST_PER_S: f64 = 0.5;
 const SAFETY: f64 = 0.95;
 /// What is left to a stop is taken in equal steps, up to so many times what the error asks for, if they are few.
 const STRETCH: f64 = 1.04;

@@ -18,6 +18,9 @@ pub use course::{Event, EventKind};
 
 use crate::model::{Model, Workspace};
 
+/// No velocity's error counts as decaying more slowly than this, 1/s: see [`Model::units`].
+const SLOWEST_PER_S: f64 = 2.0;
+
 /// What a method is told.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Settings {

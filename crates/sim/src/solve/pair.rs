@@ -14,7 +14,7 @@
 
 use super::course::{Course, SAME_MOMENT_S};
 use super::events::{self, Looks};
-use super::{Observer, Settings, Stats, Stopped};
+use super::{Observer, SLOWEST_PER_S, Settings, Stats, Stopped};
 use crate::energy::unit_j;
 use crate::model::Model;
 
@@ -456,7 +456,8 @@ impl<'m, P: Pair, const EVENTS: bool> Run<'m, P, EVENTS> {
     #[inline(always)]
     fn weigh(&mut self) {
         let course = &self.course;
-        course.model.units(&course.y, &course.w, &mut self.units);
+        let model = course.model;
+        model.units(&course.y, &course.w, SLOWEST_PER_S, &mut self.units);
         for (d, unit) in self.units.iter().enumerate() {
             self.weight.as_flattened_mut()[d] = 1.0 / unit;
             self.relative.as_flattened_mut()[d] = 1.0 / unit;

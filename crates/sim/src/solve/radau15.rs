@@ -23,7 +23,7 @@ mod tableau;
 
 use super::course::{Course, SAME_MOMENT_S};
 use super::events::{self, Looks};
-use super::{Observer, Settings, Stats, Stopped, dop853, pair};
+use super::{Observer, SLOWEST_PER_S, Settings, Stats, Stopped, dop853, pair};
 use crate::energy::unit_j;
 use crate::freedoms::rotation;
 #[cfg(target_arch = "x86_64")]
@@ -245,7 +245,7 @@ impl<'m, E: Solve> Run<'m, E> {
             self.margin_n = course.margin_n();
         }
         let (model, y) = (course.model, &course.y);
-        model.units(y, &course.w, &mut self.units);
+        model.units(y, &course.w, SLOWEST_PER_S, &mut self.units);
         let watched = model.layout().ledger_range().start;
         for (d, scale) in self.stages.scale.iter_mut().enumerate() {
             *scale = if d < self.units.len() {

@@ -1,6 +1,6 @@
 //! Eight lanes in the registers, state by state: what all of them do at once.
 
-use super::{LEAST_ERROR, Lane, RESOLUTION_S, SHARE, STAGES, Together};
+use super::{LEAST_ERROR, Lane, RESOLUTION_S, SHARE, SLOWEST_PER_S, STAGES, Together};
 use crate::lanes::{Eight, LANES, Two};
 use crate::model::{Model, Octet, Registers, SideBySide, Workspace};
 use crate::solve::course::Course;
@@ -148,7 +148,8 @@ impl<E: Together> Group<E> {
 
     /// Writes a lane's units.
     pub fn weigh(&mut self, l: usize, course: &Course<'_>, units: &mut [f64]) {
-        course.model.units(&course.y, &course.w, units);
+        let model = course.model;
+        model.units(&course.y, &course.w, SLOWEST_PER_S, units);
         for (d, unit) in units.iter().enumerate() {
             self.weight[d].as_mut_array()[l] = 1.0 / unit;
             self.relative[d].as_mut_array()[l] = 1.0 / unit;
