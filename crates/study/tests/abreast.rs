@@ -43,13 +43,13 @@ fn shares_are_all_runs_once_in_whole_lanes() {
             assert_eq!(share.start, next);
             assert!(share.end > next);
             next = share.end;
-            let whole = (next - share.start).is_multiple_of(16);
+            let whole = (next - share.start).is_multiple_of(8);
             assert!(next == runs || whole, "{share:?} of {runs}");
         }
         assert_eq!(next, runs);
         // What the last one leaves the other threads to wait for.
         let last = shares.get(shares.count() - 1);
-        assert!(last.end - last.start <= 32, "{last:?} of {runs}");
+        assert!(last.end - last.start <= 16, "{last:?} of {runs}");
     }
     let one_by_one = plan(2).shares(1000, 2);
     assert_eq!((one_by_one.count(), one_by_one.get(999)), (1000, 999..1000));
