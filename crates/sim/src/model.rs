@@ -363,11 +363,10 @@ impl Model {
         if self.contact_damping.is_empty() {
             return;
         }
-        units.fill(0.0);
+        let positions = self.freedoms.positions();
+        units[positions..].fill(0.0);
         let damping = [&self.side_damping[..], &self.contact_damping];
         self.freedoms.damping_per_s(y, &w.pair, damping, units);
-        let positions = self.freedoms.positions();
-        units[..positions].copy_from_slice(&scales[..positions]);
         for (unit, &scale) in units.iter_mut().zip(scales).skip(positions) {
             let damping_per_s = *unit;
             let most = (LOOSEST / damping_per_s).max(scale);

@@ -5,7 +5,7 @@
 //! each lane's own affair. No lane feels its neighbours: a run is the same, bit for bit, whoever runs beside it. A lane whose run has ended
 //! takes the next one.
 //!
-//! Steps end at samples, and events are located by steps that end there: there is no polynomial to be trusted. What an explicit method should
+//! Steps end at samples, and events are located by steps that end next to them (`Lane::meets`): there is no polynomial to be trusted. What an explicit method should
 //! not do, and what does not go forward, is left to `auto` from where it stands.
 
 mod group;
@@ -24,6 +24,8 @@ use crate::scene::Scene;
 use group::Group;
 use lane::{Ended, Lane};
 
+/// How many runs go side by side.
+pub const RUNS: usize = MOMENTS;
 const NAME: &str = "dop853";
 const STAGES: usize = Dop853::STAGES;
 /// As `super::pair::Pair::SHARE`.
@@ -207,7 +209,7 @@ impl<E: Together> Abreast<E> {
         let mut waiting = 0..models.len();
         // What the seeds change is in the lanes: any of the models will do.
         let side = models[0].side_by_side();
-        let mut lanes: [Option<Lane<'m>>; MOMENTS] = std::array::from_fn(|_| None);
+        let mut lanes: [Option<Lane<'m>>; RUNS] = std::array::from_fn(|_| None);
         loop {
             for (l, lane) in lanes.iter_mut().enumerate() {
                 while lane.is_none() {
@@ -235,7 +237,7 @@ impl<E: Together> Abreast<E> {
             }
             E::step(&mut self.group, &side, self.tolerance);
             self.group.moves = E::splat(-1.0);
-            let mut stopping = [None; MOMENTS];
+            let mut stopping = [None; RUNS];
             for (l, lane) in lanes.iter_mut().enumerate() {
                 if let Some(lane) = lane {
                     stopping[l] = Some(self.judge(l, lane));

@@ -24,7 +24,7 @@ const SLOWEST_PER_S: f64 = 2.0;
 /// What a method is told.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Settings {
-    /// Tolerance of an adaptive method; 1 means one unit of [`crate::freedoms::Freedoms::scales`].
+    /// Tolerance of an adaptive method; 1 means one unit of [`Model::units`].
     pub tolerance: f64,
     /// Step of a fixed-step method, s.
     pub step_s: f64,

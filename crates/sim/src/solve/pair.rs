@@ -329,8 +329,7 @@ impl<'m, P: Pair, const EVENTS: bool> Run<'m, P, EVENTS> {
         self.begin();
         let mut h_next = self.first_step();
         // What a first step after a switch could have been, the last time that as many handles rested: the jump excites what the step
-        // before it has not met.
-        // And after an event, where another law begins.
+        // before it has not met. And what it could have been after an event, where another law begins.
         let mut first_s = [[f64::INFINITY; 3]; 2];
         let mut first: Option<(usize, usize)> = None;
         let mut ln_error_before = LEAST_ERROR.ln();

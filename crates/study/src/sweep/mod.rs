@@ -20,7 +20,7 @@ use sim::record::{Recorder, VERSION};
 use sim::run::{Listener, Sample};
 use sim::scene::{Scene, Template};
 use sim::sensors::Reading;
-use sim::solve::{METHODS, Stats, Stopped};
+use sim::solve::{METHODS, Stats, Stopped, abreast};
 use spec::{DesignKind, Spec, flatten, number};
 use std::ops::Range;
 use std::panic::AssertUnwindSafe;
@@ -43,8 +43,8 @@ pub const FIXED_COLUMNS: &[&str] = &[
 /// Work after which a run is given up: a thousand times what a minute of the paper's scenes takes.
 const MOST_EVALUATIONS: u64 = 100_000_000;
 
-/// So many lanes there are. With fewer seeds runs take less time one by one.
-const WORTH_ABREAST: u64 = 8;
+/// With fewer seeds than lanes runs take less time one by one.
+const WORTH_ABREAST: u64 = abreast::RUNS as u64;
 /// With few at a time lanes stand empty while the last of them end; from here on that is hardly felt.
 const MOST_ABREAST: u64 = 512;
 const LEAST_ABREAST: u64 = 16;
