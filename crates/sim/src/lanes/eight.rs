@@ -18,6 +18,8 @@ pub trait Wide: Number {
     fn as_mut_array(&mut self) -> &mut [f64; MOMENTS];
     /// The last four before the first four.
     fn swapped(self) -> Self;
+    /// The sum of each.
+    fn sums(of: [Self; MOMENTS]) -> Self;
     /// The bits of 2^n for a whole number n within ±1022 that 1.5·2⁵² has been added to.
     #[doc(hidden)]
     fn power_of_two(shifted: Self) -> Self;
@@ -235,6 +237,13 @@ impl Wide for Plain8 {
         Plain8(std::array::from_fn(|l| self.0[(l + 4) % MOMENTS]))
     }
     #[inline(always)]
+    fn sums(of: [Self; MOMENTS]) -> Self {
+        Plain8(std::array::from_fn(|k| {
+            let x = of[k].0;
+            ((x[0] + x[1]) + (x[2] + x[3])) + ((x[4] + x[5]) + (x[6] + x[7]))
+        }))
+    }
+    #[inline(always)]
     fn power_of_two(shifted: Self) -> Self {
         Plain8(
             shifted
@@ -362,6 +371,30 @@ mod x86 {
         #[inline(always)]
         fn swapped(self) -> Self {
             Avx512(unsafe { _mm512_shuffle_f64x2::<0b01_00_11_10>(self.0, self.0) })
+        }
+        #[inline(always)]
+        fn sums(of: [Self; MOMENTS]) -> Self {
+            // A closure would be a call.
+            #[inline(always)]
+            fn pairs(a: Avx512, b: Avx512) -> __m512d {
+                unsafe {
+                    let (even, odd) = (_mm512_unpacklo_pd(a.0, b.0), _mm512_unpackhi_pd(a.0, b.0));
+                    _mm512_add_pd(even, odd)
+                }
+            }
+            // Of quarters, which the first of two has before the second's; then of halves.
+            #[inline(always)]
+            fn neighbours(a: __m512d, b: __m512d) -> __m512d {
+                unsafe {
+                    let even = _mm512_shuffle_f64x2::<0x88>(a, b);
+                    let odd = _mm512_shuffle_f64x2::<0xdd>(a, b);
+                    _mm512_add_pd(even, odd)
+                }
+            }
+            let [a, b, c, d, e, f, g, h] = of;
+            let left = neighbours(pairs(a, b), pairs(c, d));
+            let right = neighbours(pairs(e, f), pairs(g, h));
+            Avx512(neighbours(left, right))
         }
         #[inline(always)]
         fn power_of_two(shifted: Self) -> Self {
@@ -506,6 +539,35 @@ mod x86 {
         #[inline(always)]
         fn swapped(self) -> Self {
             Avx2([self.0[1], self.0[0]])
+        }
+        #[inline(always)]
+        fn sums(of: [Self; MOMENTS]) -> Self {
+            // A closure would be a call.
+            #[inline(always)]
+            fn four(a: __m256d, b: __m256d, c: __m256d, d: __m256d) -> __m256d {
+                unsafe {
+                    let (left, right) = (_mm256_hadd_pd(a, b), _mm256_hadd_pd(c, d));
+                    _mm256_add_pd(
+                        _mm256_permute2f128_pd::<0x20>(left, right),
+                        _mm256_permute2f128_pd::<0x31>(left, right),
+                    )
+                }
+            }
+            let [a, b, c, d, e, f, g, h] = of;
+            let first = [
+                four(a.0[0], b.0[0], c.0[0], d.0[0]),
+                four(a.0[1], b.0[1], c.0[1], d.0[1]),
+            ];
+            let second = [
+                four(e.0[0], f.0[0], g.0[0], h.0[0]),
+                four(e.0[1], f.0[1], g.0[1], h.0[1]),
+            ];
+            unsafe {
+                Avx2([
+                    _mm256_add_pd(first[0], first[1]),
+                    _mm256_add_pd(second[0], second[1]),
+                ])
+            }
         }
         #[inline(always)]
         fn power_of_two(shifted: Self) -> Self {

@@ -10,6 +10,8 @@ pub struct Looks {
     count: usize,
     least: f64,
     most: f64,
+    /// Whether they came in the order of their times.
+    ordered: bool,
     spoilt: bool,
 }
 
@@ -26,13 +28,15 @@ impl Looks {
             count: 0,
             least: f64::INFINITY,
             most: 0.0,
+            ordered: true,
             spoilt: false,
         }
     }
 
     #[inline(always)]
     pub fn clear(&mut self) {
-        (self.count, self.least, self.most, self.spoilt) = (0, f64::INFINITY, 0.0, false);
+        (self.count, self.least, self.most) = (0, f64::INFINITY, 0.0);
+        (self.ordered, self.spoilt) = (true, false);
     }
 
     /// The margin at the start of the step. A start on a zero may be a hair behind it.
@@ -47,9 +51,14 @@ impl Looks {
         self.seen[(self.count + MOST - 1) % MOST].1
     }
 
+    fn latest_at(&self) -> f64 {
+        self.seen[(self.count + MOST - 1) % MOST].0
+    }
+
     /// A margin at `theta` of the step.
     #[inline(always)]
     pub fn note(&mut self, theta: f64, margin: f64) {
+        self.ordered &= self.count == 0 || self.latest_at() < theta;
         self.seen[self.count % MOST] = (theta, margin);
         self.count += 1;
         self.least = self.least.min(margin);
@@ -68,6 +77,15 @@ impl Looks {
         (0..n).any(|i| dip(&seen[..n], i).is_some())
     }
 
+    /// Between which looks the margin falls below zero, unless it may have done so before: for looks as accurate as any that follow.
+    pub fn crossing(&self) -> Option<[(f64, f64); 2]> {
+        let (seen, n) = self.sorted();
+        let beyond = seen[..n].iter().position(|s| s.1 < 0.0)?;
+        // A start on a zero may be a hair off it, and so may the first look be.
+        let clear = beyond > 1 && (0..beyond).all(|i| dip(&seen[..n], i).is_none());
+        clear.then(|| [seen[beyond - 1], seen[beyond]])
+    }
+
     /// Says that the stages of the step have been overwritten.
     pub fn spoil(&mut self) {
         self.spoilt = true;
@@ -79,6 +97,9 @@ impl Looks {
 
     /// In the order of their times; of two at one time, the one noted last, which is the more accurate.
     fn sorted(&self) -> ([(f64, f64); MOST], usize) {
+        if self.ordered && self.count <= MOST {
+            return (self.seen, self.count);
+        }
         let (mut seen, mut n) = (self.seen, 0);
         for &look in &self.seen[..self.count.min(MOST)] {
             let at = seen[..n].partition_point(|s| s.0 < look.0);
@@ -251,14 +272,63 @@ fn back_from(
     for &(theta, _) in before.iter().rev() {
         let here = (theta, margin(theta));
         if here.1 > 0.0 {
-            return between(here, b, resolution, margin);
+            return between(here, b, straight(here.1, b.1), resolution, margin);
         }
         if theta > 0.0 {
             b = here;
         }
     }
     // A zero at the step's start has fired already: the step begins on its far side.
-    between((0.0, 0.0), b, resolution, margin)
+    between((0.0, 0.0), b, straight(0.0, b.1), resolution, margin)
+}
+
+/// A look-alike's zero is found to this part of the way between two looks.
+const ALIKE: f64 = 1e-6;
+/// So much, at most, the slope of a margin changes over the way between two looks, in parts of itself.
+const BENT: f64 = 100.0;
+/// Secants that have not found a zero by then will not.
+const MOST_SECANTS: usize = 8;
+
+/// The first zero of `margin`, to `resolution`, where looks that are as true as `margin` say between which two of them it is; `like` is
+/// nearly the margin, and cheap: from its zero on with its slope there, then by secants.
+pub fn where_alike(
+    [mut a, mut b]: [(f64, f64); 2],
+    like: impl Fn(f64) -> f64,
+    resolution: f64,
+    mut margin: impl FnMut(f64) -> f64,
+) -> f64 {
+    let width = b.0 - a.0;
+    let (mut here, mut slope) = (b, (b.1 - a.1) / width);
+    let mut theta = b.0 - b.1 / slope;
+    for _ in 0..MOST_SECANTS {
+        if !(a.0 < theta && theta < b.0) || (theta - here.0).abs() <= ALIKE * width {
+            break;
+        }
+        let next = (theta, like(theta));
+        slope = (next.1 - here.1) / (next.0 - here.0);
+        here = next;
+        theta -= here.1 / slope;
+    }
+    let (mut before, mut last) = (None, f64::INFINITY);
+    for _ in 0..MOST_SECANTS {
+        if !(a.0 < theta && theta < b.0) {
+            break;
+        }
+        let here = (theta, margin(theta));
+        if let Some((there, value)) = before.replace(here) {
+            slope = (here.1 - value) / (here.0 - there);
+        }
+        theta -= here.1 / slope;
+        let moved = (theta - here.0).abs();
+        // A secant errs by the product of the last two steps, in parts of the way in which the slope changes by itself.
+        if moved <= resolution || BENT * moved * moved.max(last) <= resolution * width {
+            return theta;
+        }
+        let side = if here.1 > 0.0 { &mut a } else { &mut b };
+        *side = here;
+        last = moved;
+    }
+    between(a, b, straight(a.1, b.1), resolution, margin)
 }
 
 /// Where and how low the parabola through three points is lowest, within them.
@@ -269,20 +339,27 @@ fn lowest(l: (f64, f64), m: (f64, f64), r: (f64, f64)) -> Option<(f64, f64)> {
     (bend > 0.0).then_some((at, l.1 + (at - l.0) * (left + bend * (at - m.0))))
 }
 
-/// The zero between `a` (margin > 0) and `b` (margin ≤ 0). Chandrupatla's method (1997): inverse quadratic where the margin is
-/// straight enough for it to be safe, bisection elsewhere; never slower than bisection by more than a factor of two.
+/// Where a straight line through two margins is zero, as a part of the way. The margin at the start may be zero, which says nothing about
+/// where the next zero is.
+fn straight(a: f64, b: f64) -> f64 {
+    if a > 0.0 { a / (a - b) } else { 0.5 }
+}
+
+/// The zero between `a` (margin > 0) and `b` (margin ≤ 0), which may be at `guess` of the way. Chandrupatla's method (1997): inverse quadratic
+/// where the margin is straight enough for it to be safe, bisection elsewhere; never slower than bisection by more than a factor of
+/// two. It ends early as secants do: [`where_alike`].
 fn between(
     mut a: (f64, f64),
     mut b: (f64, f64),
+    mut guess: f64,
     resolution: f64,
     mut margin: impl FnMut(f64) -> f64,
 ) -> f64 {
     if b.1 == 0.0 {
         return b.0;
     }
-    // The margin at the start may be zero, which says nothing about where the next zero is.
-    let mut guess = if a.1 > 0.0 { a.1 / (a.1 - b.1) } else { 0.5 };
     a.1 = a.1.max(f64::MIN_POSITIVE);
+    let whole = (b.0 - a.0).abs();
     loop {
         let width = (b.0 - a.0).abs();
         let least = (resolution / width).min(0.5);
@@ -296,6 +373,7 @@ fn between(
             c = b;
             b = a;
         }
+        let moved = (theta - a.0).abs();
         a = (theta, f);
         let best = if f.abs() < b.1.abs() { a } else { b };
         if f == 0.0 || (b.0 - a.0).abs() <= 2.0 * resolution {
@@ -303,7 +381,8 @@ fn between(
         }
         let xi = (a.0 - b.0) / (c.0 - b.0);
         let phi = (a.1 - b.1) / (c.1 - b.1);
-        guess = if phi * phi < xi && (1.0 - phi) * (1.0 - phi) < 1.0 - xi {
+        let safe = phi * phi < xi && (1.0 - phi) * (1.0 - phi) < 1.0 - xi;
+        guess = if safe {
             a.1 / (b.1 - a.1) * c.1 / (b.1 - c.1)
                 + (c.0 - a.0) / (b.0 - a.0) * a.1 / (c.1 - a.1) * b.1 / (c.1 - b.1)
         } else {
@@ -311,6 +390,10 @@ fn between(
         };
         if !guess.is_finite() {
             guess = 0.5;
+        }
+        let next = guess * (b.0 - a.0);
+        if safe && BENT * next.abs() * moved.max(next.abs()) <= resolution * whole {
+            return a.0 + next;
         }
     }
 }
@@ -348,6 +431,33 @@ mod tests {
             assert!((found.unwrap() - zero).abs() < 2e-15, "{found:?}");
             assert!(calls <= 8, "{calls}");
         }
+    }
+
+    /// With a look-alike that is off by so much of the margin, or has a kink beside it.
+    #[test]
+    fn a_look_alike_leads_to_the_same_zero() {
+        for zero in [0.05, 0.3, 0.47, 0.777] {
+            let margin = |t: f64| (zero - t) * (1.0 + t + (3.0 * t).sin());
+            let likes: [&dyn Fn(f64) -> f64; 3] = [
+                &|t| margin(t) + 1e-7 * (20.0 * t).sin(),
+                &|t| margin(t) + 1e-3,
+                &|t| margin(t).min(0.3 * margin(t)),
+            ];
+            for (like, most) in likes.into_iter().zip([3, 5, 7]) {
+                let mut calls = 0;
+                let looks = [0.0, 0.9].map(|t| (t, margin(t)));
+                let found = where_alike(looks, like, 1e-15, |t| {
+                    calls += 1;
+                    margin(t)
+                });
+                assert!((found - zero).abs() < 2e-15, "{zero}: {found}");
+                assert!(calls <= most, "{zero}: {calls} of {most}");
+            }
+        }
+        // Neither a zero that is not there nor a flat one keeps it for ever.
+        let flat = |t: f64| if t < 0.5 { 1e-300 } else { -1.0 };
+        let found = where_alike([(0.0, 1e-300), (1.0, -1.0)], flat, 1e-15, flat);
+        assert!((found - 0.5).abs() < 2e-15, "{found}");
     }
 
     #[test]

@@ -45,10 +45,13 @@ const FILLS: f64 = 10.0;
 const STRETCH: f64 = 1.3;
 /// Below this a step's error estimate is rounding.
 const FINEST: f64 = 1e-14;
-const EXPONENT: f64 = 1.0 / 12.0;
-const SAFETY: f64 = 0.9;
+/// Of the error estimate.
+const ORDER: i32 = 12;
+const SAFETY: f64 = 0.93;
 const SHRINK: f64 = 0.2;
 const GROW: f64 = 4.0;
+/// No two jumps are alike: a first step after one may be so much of what it could have been the last time.
+const CAUTION: f64 = 0.9;
 const SMALLEST_STEP_S: f64 = 1e-13;
 /// Where a step may end at an event, its polynomial may err by so much of what a step may err: this estimate is hardly more than the error.
 const TRUST: f64 = 0.5;
@@ -56,8 +59,10 @@ const TRUST: f64 = 0.5;
 const ROUGHLY: f64 = 1e-4;
 /// So much of its unit an energy of the ledger counts in the error.
 const LEDGER: f64 = 0.5;
-/// The modes are computed anew when a number of the attitude has changed by so much.
+/// Modes and units hold until a number of the attitude has changed by so much.
 const TURNED: f64 = 0.03;
+/// So many sets of them are remembered.
+const KNOWN: usize = 16;
 /// A step whose iteration does not converge counts as much as so many that do, and this many more than those are too many: another
 /// method is better.
 const FAILED: u32 = 8;
@@ -85,6 +90,17 @@ pub fn run(
         Err(stopped) => Err(stopped),
     };
     (course.stats, outcome)
+}
+
+/// How many times as long a step may be as one with this error: error^(-1/12), to four percent and never more. Its logarithm is read off
+/// its bits, then one step of Newton's.
+fn stretch(error: f64) -> f64 {
+    let (error, one) = (error as f32, 1.0f32.to_bits() as i32);
+    let logarithm = error.to_bits() as i32 - one;
+    let near = f32::from_bits((one - logarithm / ORDER) as u32);
+    let cube = near * near * near;
+    let order = ORDER as f32;
+    f64::from(near * ((order + 1.0) - error * (cube * cube) * (cube * cube)) / order)
 }
 
 /// Whether it is the cheapest for a model: one that can be evaluated at eight moments at once, on contacts that damp and drive what is
@@ -123,29 +139,62 @@ pub fn go<'m>(
 /// Solves a step with the code for a kind of registers.
 trait Solve: Registers {
     fn solve(stages: &mut Stages<Self>, step: &Step<'_>) -> Solved;
+    /// The state at `theta` of the step solved last, which began at `y0`.
+    fn between(stages: &Stages<Self>, y0: &[f64], theta: f64, out: &mut [f64]);
+    /// The margin there, nearly, with that at the start.
+    fn margin_between(stages: &Stages<Self>, start_n: f64, theta: f64) -> f64;
 }
 
 macro_rules! solve {
-    ($type:ident, $function:ident $(, $features:literal)?) => {
+    ($type:ident, $solve:ident, $between:ident, $margin:ident $(, $features:literal)?) => {
         $(#[cfg(target_arch = "x86_64")] #[target_feature(enable = $features)])?
-        fn $function(stages: &mut Stages<$type>, step: &Step<'_>) -> Solved {
+        fn $solve(stages: &mut Stages<$type>, step: &Step<'_>) -> Solved {
             stages.solve_here(step)
         }
+        $(#[cfg(target_arch = "x86_64")] #[target_feature(enable = $features)])?
+        fn $between(stages: &Stages<$type>, y0: &[f64], theta: f64, out: &mut [f64]) {
+            stages.between(y0, theta, out);
+        }
+        $(#[cfg(target_arch = "x86_64")] #[target_feature(enable = $features)])?
+        fn $margin(stages: &Stages<$type>, start_n: f64, theta: f64) -> f64 {
+            stages.margin_between(start_n, theta)
+        }
         $(#[cfg(target_arch = "x86_64")] #[doc = $features])?
+        // SAFETY: stages of this type are made only behind a check of the processor's features, in `go`.
+        #[allow(unsafe_code, unused_unsafe)]
         impl Solve for $type {
             fn solve(stages: &mut Stages<Self>, step: &Step<'_>) -> Solved {
-                // SAFETY: stages of this type are made only behind a check of the processor's features, in `go`.
-                #[allow(unsafe_code, unused_unsafe)]
-                unsafe {
-                    $function(stages, step)
-                }
+                unsafe { $solve(stages, step) }
+            }
+            fn between(stages: &Stages<Self>, y0: &[f64], theta: f64, out: &mut [f64]) {
+                unsafe { $between(stages, y0, theta, out) }
+            }
+            fn margin_between(stages: &Stages<Self>, start_n: f64, theta: f64) -> f64 {
+                unsafe { $margin(stages, start_n, theta) }
             }
         }
     };
 }
-solve!(Plain8, solve_plain);
-solve!(Avx2, solve_avx2, "avx2,fma");
-solve!(Avx512, solve_avx512, "avx512f,avx512dq");
+solve!(Plain8, solve_plain, between_plain, margin_plain);
+solve!(Avx2, solve_avx2, between_avx2, margin_avx2, "avx2,fma");
+solve!(
+    Avx512,
+    solve_avx512,
+    between_avx512,
+    margin_avx512,
+    "avx512f,avx512dq"
+);
+
+/// Modes and units, and where they were found: a swaying load comes by again and again.
+struct Found {
+    modes: Vec<Mode>,
+    /// Of the body's states: [`Model::units`].
+    units: Vec<f64>,
+    /// Which handles rest, a bit each; all bits where nothing has been found yet.
+    resting: u32,
+    attitude: [f64; 4],
+    rotation: [[f64; 3]; 3],
+}
 
 struct Run<'m, E: Registers> {
     course: Course<'m>,
@@ -162,19 +211,18 @@ struct Run<'m, E: Registers> {
     before_s: f64,
     ended: f64,
     at: Vec<f64>,
-    units: Vec<f64>,
-    modes: Vec<Mode>,
     rows: Vec<Row>,
-    /// The attitude where they were found, unless contacts have changed since; and its rotation.
-    modes_at: Option<[f64; 4]>,
-    found_at: [[f64; 3]; 3],
+    /// What has been found lately, and which of it holds now.
+    found: Vec<Found>,
+    holds: usize,
+    oldest: usize,
     ledger_unit_j: f64,
     looks: Looks,
     margin_n: f64,
     h_next: f64,
-    /// How many handles rest after the jump that the next step begins with, and what a first step could be then.
-    jumped: Option<usize>,
-    after_jump: [f64; 3],
+    /// How many handles rested before and rest after the jump that the next step begins with, and what a first step could be then.
+    jumped: Option<[usize; 2]>,
+    after_jump: [[f64; 3]; 3],
     /// How often convergence has limited the steps lately.
     limited: u32,
 }
@@ -186,6 +234,14 @@ impl<'m, E: Solve> Run<'m, E> {
         course.y.truncate(size);
         course.w.least_load_n = f64::NEG_INFINITY;
         let tolerance = (settings.tolerance * SHARE).max(FINEST);
+        let springs = 3 * model.carriers();
+        let nothing = || Found {
+            modes: Vec::with_capacity(springs),
+            units: vec![0.0; model.layout().body],
+            resting: u32::MAX,
+            attitude: [0.0; 4],
+            rotation: [[0.0; 3]; 3],
+        };
         Self {
             demand: Demand {
                 tolerance,
@@ -200,17 +256,16 @@ impl<'m, E: Solve> Run<'m, E> {
             before_s: 1.0,
             ended: 0.0,
             at: vec![0.0; size],
-            units: vec![0.0; model.layout().body],
-            modes: Vec::new(),
-            rows: Vec::new(),
-            modes_at: None,
-            found_at: [[0.0; 3]; 3],
+            rows: Vec::with_capacity(springs),
+            found: std::iter::repeat_with(nothing).take(KNOWN).collect(),
+            holds: 0,
+            oldest: 0,
             ledger_unit_j: unit_j(&model.scene),
             looks: Looks::new(),
             margin_n: 0.0,
             h_next: 0.0,
             jumped: None,
-            after_jump: [f64::INFINITY; 3],
+            after_jump: [[f64::INFINITY; 3]; 3],
             limited: 0,
             course,
         }
@@ -237,38 +292,61 @@ impl<'m, E: Solve> Run<'m, E> {
         self.stages.look_at(self.course.watch());
     }
 
-    /// Slope, units and modes at the start of a step.
+    /// Slope and units at the start of a step.
     fn look_around(&mut self) {
         let course = &mut self.course;
         if !std::mem::take(&mut self.slope_known) {
             course.slope(&mut self.slope);
             self.margin_n = course.margin_n();
         }
-        let (model, y) = (course.model, &course.y);
-        model.units(y, &course.w, SLOWEST_PER_S, &mut self.units);
-        let watched = model.layout().ledger_range().start;
-        for (d, scale) in self.stages.scale.iter_mut().enumerate() {
-            *scale = if d < self.units.len() {
-                1.0 / (self.units[d] + y[d].abs())
-            } else if d < watched {
-                1.0
-            } else {
-                LEDGER / (self.ledger_unit_j + LEDGER * y[d].abs())
-            };
+        self.find();
+        let (model, y) = (self.course.model, &self.course.y);
+        let units = &self.found[self.holds].units;
+        let (body, watched) = (units.len(), model.layout().ledger_range().start);
+        for ((scale, unit), y) in self.stages.scale.iter_mut().zip(units).zip(y) {
+            *scale = 1.0 / (unit + y.abs());
         }
+        self.stages.scale[body..watched].fill(1.0);
+        for (scale, y) in self.stages.scale[watched..].iter_mut().zip(&y[watched..]) {
+            *scale = LEDGER / (self.ledger_unit_j + LEDGER * y.abs());
+        }
+    }
+
+    /// Units and modes as they are now: those found here before, if they still hold.
+    fn find(&mut self) {
+        let course = &self.course;
+        let (model, y) = (course.model, &course.y);
         let attitude = &y[model.freedoms().attitude()];
         let mut now = [0.0; 4];
         now[..attitude.len()].copy_from_slice(attitude);
-        let near = |then: [f64; 4]| now.iter().zip(then).all(|(a, b)| (a - b).abs() <= TURNED);
-        if !self.modes_at.is_some_and(near) {
-            self.modes.clear();
-            for axes in [0..2, 2..3] {
-                modes(model, y, &course.w, axes, &mut self.rows, &mut self.modes);
+        let mut resting = 0;
+        for p in &course.w.pair {
+            for gain in p.contact_gain.as_array() {
+                resting = resting << 1 | u32::from(*gain != 0.0);
             }
-            self.modes_at = Some(now);
-            if attitude.len() == 4 {
-                self.found_at = rotation(attitude);
-            }
+        }
+        let holds = |found: &Found| {
+            let mut turned = now.iter().zip(found.attitude);
+            found.resting == resting && turned.all(|(a, b)| (a - b).abs() <= TURNED)
+        };
+        if holds(&self.found[self.holds]) {
+            return;
+        }
+        if let Some(known) = self.found.iter().position(holds) {
+            self.holds = known;
+            return;
+        }
+        self.holds = self.oldest;
+        self.oldest = (self.oldest + 1) % KNOWN;
+        let found = &mut self.found[self.holds];
+        model.units(y, &course.w, SLOWEST_PER_S, &mut found.units);
+        found.modes.clear();
+        for axes in [0..2, 2..3] {
+            modes(model, y, &course.w, axes, &mut self.rows, &mut found.modes);
+        }
+        (found.resting, found.attitude) = (resting, now);
+        if attitude.len() == 4 {
+            found.rotation = rotation(attitude);
         }
     }
 
@@ -281,6 +359,7 @@ impl<'m, E: Solve> Run<'m, E> {
                 ended: self.ended,
             },
         };
+        let found = &self.found[self.holds];
         let step = Step {
             side: &self.side,
             t_s: self.course.t_s,
@@ -288,8 +367,8 @@ impl<'m, E: Solve> Run<'m, E> {
             slope: &self.slope,
             h_s: h,
             guess,
-            modes: &self.modes,
-            found_at: self.found_at,
+            modes: &found.modes,
+            found_at: found.rotation,
             demand: Demand {
                 tolerance: self.demand.tolerance * room,
                 ..self.demand
@@ -311,7 +390,7 @@ impl<'m, E: Solve> Run<'m, E> {
         let left = self.course.stop_s() - t0;
         // A jump excites what the step before it has not met: what a first step could be was learnt the last time as many handles rested.
         let wanted = match self.jumped {
-            Some(resting) => self.h_next.min(self.after_jump[resting]),
+            Some([before, resting]) => self.h_next.min(CAUTION * self.after_jump[before][resting]),
             None => self.h_next,
         };
         let room = |h: f64| if h == left { FILLS } else { 1.0 };
@@ -323,7 +402,7 @@ impl<'m, E: Solve> Run<'m, E> {
             self.course.check_work()?;
             rejected = true;
             let factor = if solved.converged {
-                (SAFETY * solved.error.powf(-EXPONENT)).clamp(SHRINK, 0.9)
+                (SAFETY * stretch(solved.error)).clamp(SHRINK, 0.9)
             } else {
                 0.5
             };
@@ -340,11 +419,11 @@ impl<'m, E: Solve> Run<'m, E> {
         }
         self.limited = self.limited.saturating_sub(1);
         let tried = h;
-        let factor = (SAFETY * solved.error.max(1e-14).powf(-EXPONENT))
+        let factor = (SAFETY * stretch(solved.error.max(1e-14)))
             .clamp(SHRINK, if rejected { 1.0 } else { GROW });
         let proposal = tried * factor;
-        if let Some(resting) = self.jumped.take() {
-            self.after_jump[resting] = if tried < wanted && !rejected {
+        if let Some([before, resting]) = self.jumped.take() {
+            self.after_jump[before][resting] = if tried < wanted && !rejected {
                 proposal.max(wanted)
             } else {
                 proposal
@@ -384,11 +463,11 @@ impl<'m, E: Solve> Run<'m, E> {
         let end_s = event.map_or(h, |theta| theta * h);
         while let Some(t) = self.course.sample_due(t0 + end_s - 2.0 * SAME_MOMENT_S) {
             let theta = ((t - t0) / h).clamp(0.0, 1.0);
-            self.stages.between(&self.course.y, theta, &mut self.at);
+            E::between(&self.stages, &self.course.y, theta, &mut self.at);
             self.course.model.freedoms().project(&mut self.at);
             self.course.sample(&self.at, false, observer)?;
         }
-        self.stages.between(&self.course.y, end_s / h, &mut self.at);
+        E::between(&self.stages, &self.course.y, end_s / h, &mut self.at);
         std::mem::swap(&mut self.course.y, &mut self.at);
         let t1 = if h == left && event.is_none() {
             self.course.stop_s()
@@ -396,7 +475,7 @@ impl<'m, E: Solve> Run<'m, E> {
             t0 + end_s
         };
         let switched = t1 >= self.course.stop_s();
-        if event.is_none() {
+        if event.is_none() && self.course.sample_due(t1).is_some() {
             self.at.copy_from_slice(&self.course.y);
             while self.course.sample_due(t1).is_some() {
                 self.course.sample(&self.at, false, observer)?;
@@ -407,9 +486,10 @@ impl<'m, E: Solve> Run<'m, E> {
         self.stages.keep();
         (self.before_s, self.ended) = (h, end_s / h);
         if event.is_some() {
+            let resting = |course: &Course<'_>| course.resting_handles().min(2);
+            let before = resting(&self.course);
             self.course.fire(observer);
-            self.modes_at = None;
-            self.jumped = Some(self.course.resting_handles().min(2));
+            self.jumped = Some([before, resting(&self.course)]);
         } else if !switched && !on_edge {
             for (slope, f) in self.slope.iter_mut().zip(&self.stages.f) {
                 *slope = f.as_array()[MOMENTS - 1];
@@ -461,10 +541,17 @@ impl<'m, E: Solve> Run<'m, E> {
         };
         let y0 = std::mem::take(&mut self.course.y);
         let (stages, at, course) = (&self.stages, &mut self.at, &mut self.course);
-        let event = events::first(&self.looks, resolution, |theta| {
-            stages.between(&y0, theta, at);
+        let margin = |theta: f64| {
+            E::between(stages, &y0, theta, at);
             course.margin_at_n(t0 + theta * h, at)
-        });
+        };
+        let event = match self.looks.crossing() {
+            Some(within) => {
+                let like = |theta: f64| E::margin_between(stages, self.margin_n, theta);
+                Some(events::where_alike(within, like, resolution, margin))
+            }
+            None => events::first(&self.looks, resolution, margin),
+        };
         self.course.y = y0;
         event
     }
@@ -473,6 +560,17 @@ impl<'m, E: Solve> Run<'m, E> {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn a_step_stretches_as_the_root_of_its_error() {
+        for k in -140..40 {
+            let error = 10f64.powf(0.1 * f64::from(k));
+            let exact = error.powf(-1.0 / f64::from(ORDER));
+            let part = stretch(error) / exact;
+            assert!((0.96..1.0 + 1e-6).contains(&part), "{error}: {part}");
+        }
+    }
+
     use crate::model::Workspace;
     use crate::scene::{builtin, parse};
 

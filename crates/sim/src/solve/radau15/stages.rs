@@ -127,8 +127,15 @@ pub struct Stages<E: Registers> {
     /// Whether the attitude is a quaternion, in which case the body has all thirteen states.
     quaternion: bool,
     a: Columns<E>,
+    /// h a_ij of the step that is solved.
+    step: Columns<E>,
     legendre: Columns<E>,
     nodes: E,
+    /// Barycentric weights of the start and the nodes.
+    start: f64,
+    barycentric: E,
+    /// Legendre polynomials at the start of a step: ±1.
+    at_start: E,
     eigen: Eigen<E>,
     solvers: Vec<Solver<E>>,
     /// Rows of the rotation that takes an angular velocity in the body at each stage to the body as it stood where the modes were found.
@@ -144,17 +151,26 @@ fn columns<E: Registers>(m: &[[f64; MOMENTS]; MOMENTS]) -> Columns<E> {
     std::array::from_fn(|j| E::load(&m[j]))
 }
 
-/// Σ_j column_j x_j, in two chains.
+/// Σ_j column_j x_j and what it is added to, in four chains that do not wait for each other.
 #[inline(always)]
-fn product<E: Registers>(m: &Columns<E>, x: &E) -> E {
+fn product<E: Registers>(m: &Columns<E>, x: &E, onto: E) -> E {
     let x = x.as_array();
-    let mut even = m[0] * E::splat(x[0]);
-    let mut odd = m[1] * E::splat(x[1]);
-    for j in (2..MOMENTS).step_by(2) {
-        even = m[j].madd(E::splat(x[j]), even);
-        odd = m[j + 1].madd(E::splat(x[j + 1]), odd);
-    }
-    even + odd
+    let first = m[0].madd(E::splat(x[0]), onto);
+    let second = m[1] * E::splat(x[1]);
+    let third = m[2] * E::splat(x[2]);
+    let fourth = m[3] * E::splat(x[3]);
+    let first = m[4].madd(E::splat(x[4]), first);
+    let second = m[5].madd(E::splat(x[5]), second);
+    let third = m[6].madd(E::splat(x[6]), third);
+    let fourth = m[7].madd(E::splat(x[7]), fourth);
+    (first + second) + (third + fourth)
+}
+
+/// The sum of eight.
+#[inline(always)]
+fn total<E: Registers>(of: &E) -> f64 {
+    let x = of.as_array();
+    ((x[0] + x[4]) + (x[2] + x[6])) + ((x[1] + x[5]) + (x[3] + x[7]))
 }
 
 /// The largest of eight; not a number where one of them is not.
@@ -217,8 +233,12 @@ impl<E: Registers> Stages<E> {
             velocities: model.freedoms().positions()..model.layout().body,
             quaternion: model.freedoms().rotation().is_some(),
             a: columns(&TABLEAU.a),
+            step: [zero; MOMENTS],
             legendre: columns(&TABLEAU.legendre),
             nodes: E::load(&C),
+            at_start: E::load(&std::array::from_fn(|k| [1.0, -1.0][k % 2])),
+            start: TABLEAU.barycentric[0],
+            barycentric: E::load(&std::array::from_fn(|k| TABLEAU.barycentric[k + 1])),
             eigen: Eigen {
                 to: columns(&TABLEAU.to_eigen),
                 from: columns(&TABLEAU.from_eigen),
@@ -305,14 +325,27 @@ impl<E: Registers> Stages<E> {
                     ..=5.0 => 3,
                     _ => 1,
                 };
-                for (d, y) in self.y.iter_mut().enumerate() {
-                    let part = self.smooth[d].as_array();
-                    let (mut jump, mut guess) = (slope[d], E::splat(y0[d]));
-                    for k in 0..reach {
-                        jump -= part[k] * here[k].0;
-                        guess = columns[k].madd(E::splat(part[k]), guess);
+                let slopes = here.map(|x| x.0);
+                let slopes = E::load(&std::array::from_fn(|k| {
+                    if k < reach { slopes[k] } else { 0.0 }
+                }));
+                let tiles = self.y.chunks_mut(MOMENTS).zip(self.smooth.chunks(MOMENTS));
+                let starts = y0.chunks(MOMENTS).zip(slope.chunks(MOMENTS));
+                for ((y, smooth), (y0, slope)) in tiles.zip(starts) {
+                    let mut slopes = [slopes; MOMENTS];
+                    for (slope, part) in slopes.iter_mut().zip(smooth) {
+                        *slope = *slope * *part;
                     }
-                    *y = t.madd(E::splat(jump), guess);
+                    let before = E::sums(slopes);
+                    let each = y.iter_mut().zip(smooth).zip(y0.iter().zip(slope));
+                    for (((y, part), (y0, slope)), before) in each.zip(before.as_array()) {
+                        let part = part.as_array();
+                        let mut guess = t.madd(E::splat(slope - before), E::splat(*y0));
+                        for k in 0..reach {
+                            guess = columns[k].madd(E::splat(part[k]), guess);
+                        }
+                        *y = guess;
+                    }
                 }
             }
             Guess::Part(part) => {
@@ -320,7 +353,7 @@ impl<E: Registers> Stages<E> {
                 let start = E::load(&weights.map(|w| w[0]));
                 let rest: Columns<E> = std::array::from_fn(|j| E::load(&weights.map(|w| w[j + 1])));
                 for (y, y0) in self.y.iter_mut().zip(y0) {
-                    *y = start.madd(E::splat(*y0), product(&rest, y));
+                    *y = product(&rest, y, start * E::splat(*y0));
                 }
             }
         }
@@ -343,7 +376,11 @@ impl<E: Registers> Stages<E> {
         let ledger = side.layout.ledger_range();
         let watched = ledger.start;
         let phases = side.layout.phase_range();
+        self.step = self.a;
+        self.step.iter_mut().for_each(|a| *a = *a * h);
         self.guess(y0, h, slope, guess);
+        // What a sweep knows of springs asks that positions belong to the velocities.
+        self.rise(y0);
         let t = self.nodes.madd(E::splat(h), E::splat(t0));
         side.clock(t, &mut self.w);
         let mut carriers = if !self.carriers_lead {
@@ -363,7 +400,7 @@ impl<E: Registers> Stages<E> {
                 side.phases(&mut [self.octet(t)]);
             }
             if carriers == Carriers::Lead {
-                let change = self.follow(y0, h, phases.clone());
+                let change = self.follow(y0, phases.clone());
                 rounds += 1;
                 if change * rate(change, last) <= enough * phases.len() as f64 {
                     carriers = Carriers::Settle;
@@ -388,9 +425,9 @@ impl<E: Registers> Stages<E> {
             if converged {
                 break;
             }
-            let mut change = self.sweep(y0, h);
+            let mut change = self.sweep(y0);
             if carriers == Carriers::Feel {
-                change += self.follow(y0, h, self.velocities.end..watched);
+                change += self.follow(y0, self.velocities.end..watched);
             }
             converged = change * rate(change, last) <= enough * watched as f64;
             let telling = sweeps == TELLING
@@ -413,7 +450,7 @@ impl<E: Registers> Stages<E> {
         self.margin = -nearest;
         side.powers(&mut self.f, &self.w);
         for d in ledger {
-            self.y[d] = product(&self.a, &self.f[d]).madd(E::splat(h), E::splat(y0[d]));
+            self.y[d] = product(&self.step, &self.f[d], E::splat(y0[d]));
         }
         let (error, between) = self.errors(self.y.len(), h, demand.tolerance);
         let missed = self.missed(slope, watched, h) / demand.tolerance;
@@ -428,11 +465,10 @@ impl<E: Registers> Stages<E> {
 
     /// New stages of some states that nothing makes stiff, from the slopes at the old ones; returns as [`Self::sweep`].
     #[inline(always)]
-    fn follow(&mut self, y0: &[f64], h: f64, states: Range<usize>) -> f64 {
-        let step = E::splat(h);
+    fn follow(&mut self, y0: &[f64], states: Range<usize>) -> f64 {
         let mut moved = E::splat(0.0);
         for d in states {
-            let new = product(&self.a, &self.f[d]).madd(step, E::splat(y0[d]));
+            let new = product(&self.step, &self.f[d], E::splat(y0[d]));
             let part = (new - self.y[d]) * self.scale[d];
             self.y[d] = new;
             moved = part.madd(part, moved);
@@ -442,30 +478,32 @@ impl<E: Registers> Stages<E> {
 
     /// New stages of the body from the slopes at the old ones. The largest sum of squares, over the states, of what they moved by, in units.
     #[inline(always)]
-    fn sweep(&mut self, y0: &[f64], h: f64) -> f64 {
-        let step = E::splat(h);
+    fn sweep(&mut self, y0: &[f64]) -> f64 {
         let (from, body) = (self.velocities.start, self.velocities.end);
         let (y, f) = (&mut self.y[..body], &mut self.f[..body]);
         let (y0, scale) = (&y0[..body], &self.scale[..body]);
         let mut moved = E::splat(0.0);
         let mut by = [E::splat(0.0); WATCHED];
         for (d, by) in (from..body).zip(&mut by) {
-            *by = product(&self.a, &f[d]).madd(step, E::splat(y0[d])) - y[d];
+            *by = product(&self.step, &f[d], E::splat(y0[d]) - y[d]);
         }
         // A mode is fixed in the world more than in the body, which may turn within a step.
         let turns = self.quaternion && !self.solvers.is_empty();
         if turns {
             [by[3], by[4], by[5]] = by_rows(self.turned, [by[3], by[4], by[5]]);
         }
-        let residual = by;
+        let (residual, zero) = (by, E::splat(0.0));
         for solver in &self.solvers {
-            let mut along = residual[0] * solver.mode.from[0];
-            for a in 1..WATCHED {
-                along = residual[a].madd(E::splat(solver.mode.from[a]), along);
+            let from = solver.mode.from;
+            let (mut first, mut second) = (residual[0] * from[0], residual[3] * from[3]);
+            for a in 1..WATCHED / 2 {
+                first = residual[a].madd(E::splat(from[a]), first);
+                second = residual[a + 3].madd(E::splat(from[a + 3]), second);
             }
-            let along = product(&self.eigen.to, &along);
+            let along = first + second;
+            let along = product(&self.eigen.to, &along, zero);
             let turned = along.swapped() * solver.across;
-            let further = product(&self.eigen.from, &solver.straight.madd(along, turned));
+            let further = product(&self.eigen.from, &solver.straight.madd(along, turned), zero);
             for (by, &to) in by.iter_mut().zip(&solver.mode.to) {
                 *by = further.madd(E::splat(to), *by);
             }
@@ -478,7 +516,17 @@ impl<E: Registers> Stages<E> {
             let part = by * scale[d];
             moved = part.madd(part, moved);
         }
-        // Positions follow from the new velocities.
+        moved += self.rise(y0);
+        largest(&moved)
+    }
+
+    /// New positions from the velocities, as new as these are. The sum of squares, over the states, of what they moved by, in units.
+    #[inline(always)]
+    fn rise(&mut self, y0: &[f64]) -> E {
+        let (from, body) = (self.velocities.start, self.velocities.end);
+        let (y, f) = (&mut self.y[..body], &mut self.f[..body]);
+        let (y0, scale) = (&y0[..body], &self.scale[..body]);
+        let mut moved = E::splat(0.0);
         if self.quaternion {
             f[..3].copy_from_slice(&y[7..10]);
             let turned = turn([y[3], y[4], y[5], y[6]], [y[10], y[11], y[12]]);
@@ -487,12 +535,12 @@ impl<E: Registers> Stages<E> {
             f[..from].copy_from_slice(&y[from..body]);
         }
         for d in 0..from {
-            let new = product(&self.a, &f[d]).madd(step, E::splat(y0[d]));
+            let new = product(&self.step, &f[d], E::splat(y0[d]));
             let part = (new - y[d]) * scale[d];
             y[d] = new;
             moved = part.madd(part, moved);
         }
-        largest(&moved)
+        moved
     }
 
     /// Errors at the end of the step and between the stages, in units of the tolerance, from the last Legendre coefficients of the slopes.
@@ -505,7 +553,7 @@ impl<E: Registers> Stages<E> {
         let mut squares = E::splat(0.0);
         let each = self.f[..states].iter().zip(&mut self.parts);
         for ((f, part), scale) in each.zip(&self.scale) {
-            *part = product(&self.legendre, f);
+            *part = product(&self.legendre, f, E::splat(0.0));
             let part = *part * *scale;
             squares = part.madd(part, squares);
         }
@@ -521,15 +569,24 @@ impl<E: Registers> Stages<E> {
     /// polynomial of the slopes than their coefficients let expect, by what the part of the step before the first node makes of that.
     #[inline(always)]
     fn missed(&self, slope: &[f64], states: usize, h: f64) -> f64 {
-        let mut squares = [0.0; 3];
-        for ((part, slope), scale) in self.parts[..states].iter().zip(slope).zip(&self.scale) {
-            let p = part.as_array();
-            let start = (p[0] - p[1]) + (p[2] - p[3]) + (p[4] - p[5]) + (p[6] - p[7]);
-            squares[0] += ((slope - start) * scale).powi(2);
-            squares[1] += (p[4] * p[4] + p[5] * p[5]) * scale * scale;
-            squares[2] += (p[6] * p[6] + p[7] * p[7]) * scale * scale;
+        let (mut squares, mut apart) = (E::splat(0.0), E::splat(0.0));
+        let tiles = self.parts[..states].chunks(MOMENTS);
+        let others = slope.chunks(MOMENTS).zip(self.scale.chunks(MOMENTS));
+        for (parts, (slopes, scales)) in tiles.zip(others) {
+            let mut starts = [E::splat(0.0); MOMENTS];
+            let (mut slope, mut scale) = ([0.0; MOMENTS], [0.0; MOMENTS]);
+            for (l, part) in parts.iter().enumerate() {
+                (slope[l], scale[l]) = (slopes[l], scales[l]);
+                let part = *part * scales[l];
+                squares = part.madd(part, squares);
+                starts[l] = part * self.at_start;
+            }
+            let off = E::load(&slope).madd(E::load(&scale), -E::sums(starts));
+            apart = off.madd(off, apart);
         }
-        let [apart, before, last] = squares.map(f64::sqrt);
+        let s = squares.as_array();
+        let [before, last] = [s[4] + s[5], s[6] + s[7]].map(f64::sqrt);
+        let apart = total(&apart).sqrt();
         let next = last * (last / before.max(f64::MIN_POSITIVE)).min(1.0).sqrt();
         (apart - EXPECTED * next).max(0.0) * h * C[0] / (states as f64).sqrt()
     }
@@ -554,7 +611,8 @@ impl<E: Registers> Stages<E> {
         self.watch.extend(watch.iter().map(spread));
     }
 
-    /// The state at `theta` of the step solved last.
+    /// The state at `theta` of the step solved last, which began at `y0`.
+    #[inline(always)]
     pub fn between(&self, y0: &[f64], theta: f64, out: &mut [f64]) {
         if theta == 1.0 {
             for (out, y) in out.iter_mut().zip(&self.y) {
@@ -562,12 +620,39 @@ impl<E: Registers> Stages<E> {
             }
             return;
         }
-        let weights = weights(theta);
-        for ((out, y), y0) in out.iter_mut().zip(&self.y).zip(y0) {
-            // Differences, so that next to the start nothing is lost.
-            let parts = y.as_array().iter().zip(&weights[1..]);
-            *out = y0 + parts.map(|(y, w)| (y - y0) * w).sum::<f64>();
+        let (_, weights) = self.weights(theta);
+        let tiles = self.y.chunks(MOMENTS).zip(y0.chunks(MOMENTS));
+        for ((y, y0), out) in tiles.zip(out.chunks_mut(MOMENTS)) {
+            let mut parts = [E::splat(0.0); MOMENTS];
+            for ((part, y), y0) in parts.iter_mut().zip(y).zip(y0) {
+                // Differences, so that next to the start nothing is lost.
+                *part = (*y - E::splat(*y0)) * weights;
+            }
+            let rise = E::sums(parts);
+            for ((out, y0), rise) in out.iter_mut().zip(y0).zip(rise.as_array()) {
+                *out = y0 + rise;
+            }
         }
+    }
+
+    /// The margin at `theta` by the polynomial through those at the stages and the one at the start.
+    #[inline(always)]
+    pub fn margin_between(&self, start_n: f64, theta: f64) -> f64 {
+        let (start, rest) = self.weights(theta);
+        start_n * start + total(&(self.margin * rest))
+    }
+
+    /// [`weights`], side by side, with one division.
+    #[inline(always)]
+    fn weights(&self, theta: f64) -> (f64, E) {
+        let apart = E::splat(theta) - self.nodes;
+        let x = apart.as_array();
+        let all = ((x[0] * x[4]) * (x[2] * x[6])) * ((x[1] * x[5]) * (x[3] * x[7]));
+        if all == 0.0 {
+            let [start, rest @ ..] = weights(theta);
+            return (start, E::load(&rest));
+        }
+        (self.start * all, self.barycentric * (theta * all) / apart)
     }
 }
 
