@@ -272,14 +272,14 @@ fn back_from(
     for &(theta, _) in before.iter().rev() {
         let here = (theta, margin(theta));
         if here.1 > 0.0 {
-            return between(here, b, straight(here.1, b.1), resolution, margin);
+            return between(here, b, resolution, margin);
         }
         if theta > 0.0 {
             b = here;
         }
     }
     // A zero at the step's start has fired already: the step begins on its far side.
-    between((0.0, 0.0), b, straight(0.0, b.1), resolution, margin)
+    between((0.0, 0.0), b, resolution, margin)
 }
 
 /// A look-alike's zero is found to this part of the way between two looks.
@@ -289,19 +289,20 @@ const BENT: f64 = 100.0;
 /// Secants that have not found a zero by then will not.
 const MOST_SECANTS: usize = 8;
 
-/// The first zero of `margin`, to `resolution`, where looks that are as true as `margin` say between which two of them it is; `like` is
-/// nearly the margin, and cheap: from its zero on with its slope there, then by secants.
+/// The zero of `margin`, to `resolution`, between two looks that are nearly true; `like` is nearly the margin, and cheap: from its zero on
+/// with its slope there, then by secants. `None` where they lead elsewhere.
 pub fn where_alike(
-    [mut a, mut b]: [(f64, f64); 2],
+    [a, b]: [(f64, f64); 2],
     like: impl Fn(f64) -> f64,
     resolution: f64,
     mut margin: impl FnMut(f64) -> f64,
-) -> f64 {
+) -> Option<f64> {
     let width = b.0 - a.0;
+    let within = |theta: f64| a.0 < theta && theta < b.0;
     let (mut here, mut slope) = (b, (b.1 - a.1) / width);
     let mut theta = b.0 - b.1 / slope;
     for _ in 0..MOST_SECANTS {
-        if !(a.0 < theta && theta < b.0) || (theta - here.0).abs() <= ALIKE * width {
+        if !within(theta) || (theta - here.0).abs() <= ALIKE * width {
             break;
         }
         let next = (theta, like(theta));
@@ -311,7 +312,7 @@ pub fn where_alike(
     }
     let (mut before, mut last) = (None, f64::INFINITY);
     for _ in 0..MOST_SECANTS {
-        if !(a.0 < theta && theta < b.0) {
+        if !within(theta) {
             break;
         }
         let here = (theta, margin(theta));
@@ -322,13 +323,11 @@ pub fn where_alike(
         let moved = (theta - here.0).abs();
         // A secant errs by the product of the last two steps, in parts of the way in which the slope changes by itself.
         if moved <= resolution || BENT * moved * moved.max(last) <= resolution * width {
-            return theta;
+            return (slope < 0.0).then_some(theta.clamp(a.0, b.0));
         }
-        let side = if here.1 > 0.0 { &mut a } else { &mut b };
-        *side = here;
         last = moved;
     }
-    between(a, b, straight(a.1, b.1), resolution, margin)
+    None
 }
 
 /// Where and how low the parabola through three points is lowest, within them.
@@ -339,25 +338,20 @@ fn lowest(l: (f64, f64), m: (f64, f64), r: (f64, f64)) -> Option<(f64, f64)> {
     (bend > 0.0).then_some((at, l.1 + (at - l.0) * (left + bend * (at - m.0))))
 }
 
-/// Where a straight line through two margins is zero, as a part of the way. The margin at the start may be zero, which says nothing about
-/// where the next zero is.
-fn straight(a: f64, b: f64) -> f64 {
-    if a > 0.0 { a / (a - b) } else { 0.5 }
-}
-
-/// The zero between `a` (margin > 0) and `b` (margin ≤ 0), which may be at `guess` of the way. Chandrupatla's method (1997): inverse quadratic
+/// The zero between `a` (margin > 0) and `b` (margin ≤ 0). Chandrupatla's method (1997): inverse quadratic
 /// where the margin is straight enough for it to be safe, bisection elsewhere; never slower than bisection by more than a factor of
 /// two. It ends early as secants do: [`where_alike`].
 fn between(
     mut a: (f64, f64),
     mut b: (f64, f64),
-    mut guess: f64,
     resolution: f64,
     mut margin: impl FnMut(f64) -> f64,
 ) -> f64 {
     if b.1 == 0.0 {
         return b.0;
     }
+    // The margin at the start may be zero, which says nothing about where the next zero is.
+    let mut guess = if a.1 > 0.0 { a.1 / (a.1 - b.1) } else { 0.5 };
     a.1 = a.1.max(f64::MIN_POSITIVE);
     let whole = (b.0 - a.0).abs();
     loop {
@@ -450,14 +444,18 @@ mod tests {
                     calls += 1;
                     margin(t)
                 });
+                let found = found.unwrap();
                 assert!((found - zero).abs() < 2e-15, "{zero}: {found}");
                 assert!(calls <= most, "{zero}: {calls} of {most}");
             }
         }
-        // Neither a zero that is not there nor a flat one keeps it for ever.
-        let flat = |t: f64| if t < 0.5 { 1e-300 } else { -1.0 };
-        let found = where_alike([(0.0, 1e-300), (1.0, -1.0)], flat, 1e-15, flat);
-        assert!((found - 0.5).abs() < 2e-15, "{found}");
+        // A jump has no zero, and looks that were not true lead to none.
+        let jump = |t: f64| if t < 0.5 { 1e-300 } else { -1.0 };
+        let looks = [(0.0, 1e-300), (1.0, -1.0)];
+        assert_eq!(where_alike(looks, jump, 1e-15, jump), None);
+        let line = |t: f64| -0.1 - t;
+        let looks = [(0.0, 0.1), (1.0, -1.1)];
+        assert_eq!(where_alike(looks, |t| 0.1 - 1.2 * t, 1e-15, line), None);
     }
 
     #[test]

@@ -541,17 +541,14 @@ impl<'m, E: Solve> Run<'m, E> {
         };
         let y0 = std::mem::take(&mut self.course.y);
         let (stages, at, course) = (&self.stages, &mut self.at, &mut self.course);
-        let margin = |theta: f64| {
+        let mut margin = |theta: f64| {
             E::between(stages, &y0, theta, at);
             course.margin_at_n(t0 + theta * h, at)
         };
-        let event = match self.looks.crossing() {
-            Some(within) => {
-                let like = |theta: f64| E::margin_between(stages, self.margin_n, theta);
-                Some(events::where_alike(within, like, resolution, margin))
-            }
-            None => events::first(&self.looks, resolution, margin),
-        };
+        let like = |theta: f64| E::margin_between(stages, self.margin_n, theta);
+        let near = self.looks.crossing();
+        let near = near.and_then(|looks| events::where_alike(looks, like, resolution, &mut margin));
+        let event = near.or_else(|| events::first(&self.looks, resolution, margin));
         self.course.y = y0;
         event
     }
