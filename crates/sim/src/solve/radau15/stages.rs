@@ -400,7 +400,7 @@ impl<E: Registers> Stages<E> {
                 side.phases(&mut [self.octet(t)]);
             }
             if carriers == Carriers::Lead {
-                let change = self.follow(y0, phases.clone());
+                let change = largest(&self.follow(y0, phases.clone()));
                 rounds += 1;
                 if change * rate(change, last) <= enough * phases.len() as f64 {
                     carriers = Carriers::Settle;
@@ -427,7 +427,7 @@ impl<E: Registers> Stages<E> {
             }
             let mut change = self.sweep(y0);
             if carriers == Carriers::Feel {
-                change += self.follow(y0, self.velocities.end..watched);
+                change += largest(&self.follow(y0, self.velocities.end..watched));
             }
             converged = change * rate(change, last) <= enough * watched as f64;
             let telling = sweeps == TELLING
@@ -463,9 +463,10 @@ impl<E: Registers> Stages<E> {
         }
     }
 
-    /// New stages of some states that nothing makes stiff, from the slopes at the old ones; returns as [`Self::sweep`].
+    /// New stages of some states that nothing makes stiff, from the slopes at the old ones. The sum of squares, over the states, of what they
+    /// moved by, in units.
     #[inline(always)]
-    fn follow(&mut self, y0: &[f64], states: Range<usize>) -> f64 {
+    fn follow(&mut self, y0: &[f64], states: Range<usize>) -> E {
         let mut moved = E::splat(0.0);
         for d in states {
             let new = product(&self.step, &self.f[d], E::splat(y0[d]));
@@ -473,7 +474,7 @@ impl<E: Registers> Stages<E> {
             self.y[d] = new;
             moved = part.madd(part, moved);
         }
-        largest(&moved)
+        moved
     }
 
     /// New stages of the body from the slopes at the old ones. The largest sum of squares, over the states, of what they moved by, in units.
@@ -520,27 +521,18 @@ impl<E: Registers> Stages<E> {
         largest(&moved)
     }
 
-    /// New positions from the velocities, as new as these are. The sum of squares, over the states, of what they moved by, in units.
+    /// New positions from the velocities, as new as these are; returns as [`Self::follow`].
     #[inline(always)]
     fn rise(&mut self, y0: &[f64]) -> E {
-        let (from, body) = (self.velocities.start, self.velocities.end);
-        let (y, f) = (&mut self.y[..body], &mut self.f[..body]);
-        let (y0, scale) = (&y0[..body], &self.scale[..body]);
-        let mut moved = E::splat(0.0);
+        let (from, y) = (self.velocities.start, &self.y);
         if self.quaternion {
-            f[..3].copy_from_slice(&y[7..10]);
+            self.f[..3].copy_from_slice(&y[7..10]);
             let turned = turn([y[3], y[4], y[5], y[6]], [y[10], y[11], y[12]]);
-            f[3..7].copy_from_slice(&turned);
+            self.f[3..7].copy_from_slice(&turned);
         } else {
-            f[..from].copy_from_slice(&y[from..body]);
+            self.f[..from].copy_from_slice(&y[from..self.velocities.end]);
         }
-        for d in 0..from {
-            let new = product(&self.step, &f[d], E::splat(y0[d]));
-            let part = (new - y[d]) * scale[d];
-            y[d] = new;
-            moved = part.madd(part, moved);
-        }
-        moved
+        self.follow(y0, 0..from)
     }
 
     /// Errors at the end of the step and between the stages, in units of the tolerance, from the last Legendre coefficients of the slopes.
