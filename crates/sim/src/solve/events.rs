@@ -48,17 +48,17 @@ impl Looks {
     /// The margin noted last, which is that at the end of the step once all stages are through.
     #[inline(always)]
     pub fn latest(&self) -> f64 {
-        self.seen[(self.count + MOST - 1) % MOST].1
+        self.last().1
     }
 
-    fn latest_at(&self) -> f64 {
-        self.seen[(self.count + MOST - 1) % MOST].0
+    fn last(&self) -> (f64, f64) {
+        self.seen[(self.count + MOST - 1) % MOST]
     }
 
     /// A margin at `theta` of the step.
     #[inline(always)]
     pub fn note(&mut self, theta: f64, margin: f64) {
-        self.ordered &= self.count == 0 || self.latest_at() < theta;
+        self.ordered &= self.count == 0 || self.last().0 < theta;
         self.seen[self.count % MOST] = (theta, margin);
         self.count += 1;
         self.least = self.least.min(margin);
@@ -77,7 +77,8 @@ impl Looks {
         (0..n).any(|i| dip(&seen[..n], i).is_some())
     }
 
-    /// Between which looks the margin falls below zero, unless it may have done so before: for looks as accurate as any that follow.
+    /// Between which looks the margin falls below zero, unless it may have done so before: for looks that are nearly as true as the margins
+    /// which [`where_alike`] then asks for.
     pub fn crossing(&self) -> Option<[(f64, f64); 2]> {
         let (seen, n) = self.sorted();
         let beyond = seen[..n].iter().position(|s| s.1 < 0.0)?;
