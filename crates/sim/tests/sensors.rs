@@ -4,7 +4,10 @@ mod common;
 
 use common::{readings, samples, scene};
 use nalgebra::Vector3;
+use sim::effects::imu::Imu;
+use sim::run::Sample;
 use sim::scene::parse;
+use sim::solve::METHODS;
 
 /// At rest the specific force is +g along the axis that points up, whichever axis that is.
 #[test]
@@ -105,24 +108,42 @@ fn val_shoulder_sensor_of_a_steady_gait() {
     }
 }
 
-/// Instruments touch nothing: the samples are the same to the last bit.
+/// Instruments touch nothing: with any method the samples are the same to the last bit, however long its steps are and however loose the
+/// polynomials between their ends.
 #[test]
 fn sensors_only_watch() {
-    let with = parse(
-        "field-imu",
-        sim::scene::builtin("field-imu").unwrap(),
-        &["duration_s=5.0".into()],
-    )
-    .unwrap();
-    let mut without = with.clone();
-    without.effects.imu = None;
-    let motion = |s: &sim::scene::Scene| {
-        samples(s)
-            .iter()
-            .flat_map(|s| s.pose.position_m.map(f64::to_bits))
-            .collect::<Vec<_>>()
-    };
-    assert_eq!(motion(&with), motion(&without));
+    let scenes = [
+        ("field-imu", 1e-6),
+        ("music", 1e-3),
+        ("music", 1e-9),
+        ("long-pole", 1e-5),
+    ];
+    for (name, tolerance) in scenes {
+        for method in METHODS {
+            let set = [
+                "duration_s=12.0".to_owned(),
+                format!("solver.method={:?}", method.name),
+                format!("solver.tolerance={tolerance:e}"),
+            ];
+            let text = sim::scene::builtin(name).unwrap();
+            let mut without = parse(name, text, &set).unwrap();
+            without.effects.imu = None;
+            let mut with = without.clone();
+            with.effects.imu = Some(Imu {
+                rate_hz: 71.0,
+                ideal: true,
+                ..Imu::default()
+            });
+            let motion = |s: &sim::scene::Scene| {
+                let bits = |s: &Sample| {
+                    let q = s.pose.orientation.map(f64::to_bits);
+                    (s.pose.position_m.map(f64::to_bits), q)
+                };
+                samples(s).iter().map(bits).collect::<Vec<_>>()
+            };
+            assert!(motion(&with) == motion(&without), "{name} {}", method.name);
+        }
+    }
 }
 
 /// Its own clock: stamps begin at the offset and tick nominally while true time runs at the drifting rate; samples get lost.

@@ -191,6 +191,12 @@ impl<'m> Course<'m> {
         (due <= t_s + SAME_MOMENT_S).then_some(due)
     }
 
+    /// The same of the log alone. A step may be cut short for it, as it may not for a sensor, which must leave no trace in the motion.
+    pub fn log_due(&self, t_s: f64) -> Option<f64> {
+        let due = self.tickers[0].due_s;
+        (due <= t_s + SAME_MOMENT_S).then_some(due)
+    }
+
     /// Hands the state that [`Self::sample_due`] asked for to the observer. `evaluated`: the workspace holds the forces there already.
     pub fn sample(
         &mut self,

@@ -5,6 +5,7 @@
 //! zero does not fire again; a margin that touches zero from above without passing it (grazing) is no event.
 
 /// Margins seen at the start and the stages of one step.
+#[derive(Clone)]
 pub struct Looks {
     seen: [(f64, f64); MOST],
     count: usize,

@@ -11,7 +11,7 @@
 //! evaluations.
 //!
 //! The stages are a polynomial of degree 8, which holds samples and events; where it does not, the step is taken anew to the moment that
-//! is asked for, from what is known of it. Within a step contacts are frozen, as in [`super::pair`].
+//! is asked for, from what is known of it: for good at a sample of the log or an event, aside for a sensor. Within a step contacts are frozen, as in [`super::pair`].
 //!
 //! For models that can be evaluated so ([`Model::on_eight`]). Source: Hairer & Wanner, Solving Ordinary Differential Equations II, 2nd ed.
 //! (1996), IV.5 and IV.8; the idea of one long step of order 15 by iteration: Everhart, in Dynamics of Comets (1985), 185; Rein &
@@ -440,7 +440,7 @@ impl<'m, E: Solve> Run<'m, E> {
             let roughly = solved.between > TRUST;
             let event = self.event(t0, h, roughly);
             let until = event.map_or(h, |theta| theta * h);
-            let due = self.course.sample_due(t0 + until - 2.0 * SAME_MOMENT_S);
+            let due = self.course.log_due(t0 + until - 2.0 * SAME_MOMENT_S);
             let cut = match (due, event) {
                 (Some(t), _) if solved.between > self.trust => t - t0,
                 (_, Some(theta)) if roughly && theta < 0.99 => 1.001 * theta * h + ROUGHLY * h,
@@ -463,7 +463,11 @@ impl<'m, E: Solve> Run<'m, E> {
         let end_s = event.map_or(h, |theta| theta * h);
         while let Some(t) = self.course.sample_due(t0 + end_s - 2.0 * SAME_MOMENT_S) {
             let theta = ((t - t0) / h).clamp(0.0, 1.0);
-            E::between(&self.stages, &self.course.y, theta, &mut self.at);
+            if solved.between > self.trust {
+                self.aside(theta, h);
+            } else {
+                E::between(&self.stages, &self.course.y, theta, &mut self.at);
+            }
             self.course.model.freedoms().project(&mut self.at);
             self.course.sample(&self.at, false, observer)?;
         }
@@ -501,6 +505,19 @@ impl<'m, E: Solve> Run<'m, E> {
             self.begin();
         }
         Ok(())
+    }
+
+    /// Puts the state at a part of the step into `at`, by a step that ends there and of which nothing else is kept.
+    fn aside(&mut self, theta: f64, h: f64) {
+        let whole = self.stages.clone();
+        let solved = self.solve(theta * h, Some(theta), 1.0);
+        if solved.converged {
+            E::between(&self.stages, &self.course.y, 1.0, &mut self.at);
+        } else {
+            // Shorter than one that did converge, it hardly ever does not; the polynomial is then the best there is.
+            E::between(&whole, &self.course.y, theta, &mut self.at);
+        }
+        self.stages = whole;
     }
 
     fn too_small(&self, step_s: f64) -> Stopped {

@@ -154,6 +154,7 @@ pub fn integrate<const EVENTS: bool>(
 
 type Factors<N> = LU<N, Dyn, Dyn>;
 
+#[derive(Clone)]
 struct Radau {
     tolerance: f64,
     asked: f64,
@@ -418,6 +419,17 @@ impl Radau {
         }
     }
 
+    /// Puts the state at `h` after the start of the step into `at`, by a step that ends there and of which nothing else is kept; `false` where
+    /// that errs too much, though the longer one did not.
+    fn aside(&mut self, course: &mut Course<'_>, h: f64) -> Result<bool, Stopped> {
+        let mut aside = self.clone();
+        let (reached, ..) = aside.solve(course, h)?;
+        aside.polynomial(reached);
+        aside.between(course, 1.0);
+        self.at.copy_from_slice(&aside.at);
+        Ok(reached == h)
+    }
+
     /// Gustafsson's predictive control: the factor from this step and the one before.
     fn predicted(&self, h: f64, error: f64) -> f64 {
         let trend = self.before.map_or(1.0, |(step, before)| {
@@ -452,7 +464,7 @@ impl Radau {
                 None
             };
             let until = event.map_or(h, |theta| theta * h);
-            let due = course.sample_due(t0 + until - 2.0 * SAME_MOMENT_S);
+            let due = course.log_due(t0 + until - 2.0 * SAME_MOMENT_S);
             // What is wanted first and not held by the polynomial is where the step has to end, or just before.
             let cut = match (due, event) {
                 (Some(t), _) if !self.holds(course, (t - t0) / h) => t - t0,
@@ -463,7 +475,10 @@ impl Radau {
         };
         let end_s = event.map_or(h, |theta| theta * h);
         while let Some(t) = course.sample_due(t0 + end_s - 2.0 * SAME_MOMENT_S) {
-            self.between(course, (t - t0) / h);
+            let theta = (t - t0) / h;
+            if self.holds(course, theta) || !self.aside(course, theta * h)? {
+                self.between(course, theta);
+            }
             course.model.freedoms().project(&mut self.at);
             course.sample(&self.at, false, observer)?;
         }

@@ -92,6 +92,7 @@ pub struct Demand {
 }
 
 /// (a_ij) seen from its eigenvectors, four real parts and four imaginary parts side by side.
+#[derive(Clone)]
 struct Eigen<E> {
     to: Columns<E>,
     from: Columns<E>,
@@ -103,6 +104,7 @@ struct Eigen<E> {
 }
 
 /// Multiplies by (1 + h d A + h² κ A²)⁻¹ − 1 of a mode, as a complex number for each eigenvalue of A.
+#[derive(Clone)]
 struct Solver<E> {
     mode: Mode,
     /// Its real parts, twice; and its imaginary parts, those that meet imaginary parts with the other sign.
@@ -111,6 +113,7 @@ struct Solver<E> {
 }
 
 /// Stages of a step and what they are computed with.
+#[derive(Clone)]
 pub struct Stages<E: Registers> {
     pub w: Workspace<Eight<E>>,
     /// States at the nodes.
