@@ -8,7 +8,7 @@ pub use reduced::{Pinned, choose};
 
 use crate::body::Body;
 #[cfg(target_arch = "x86_64")]
-use crate::lanes::{Avx2, Avx512};
+use crate::lanes::{Avx2, Avx512, FusedEach};
 use crate::lanes::{Eight, Moments, Number, Plain8, f64x2, pack, sum};
 use crate::model::{All, Block, Pair, Part, Workspace};
 use crate::scene::Start;
@@ -67,7 +67,7 @@ impl Pose {
 }
 
 /// A choice of coordinates for the body.
-pub trait Freedoms: Send + Sync {
+pub trait Freedoms: FreedomsOnEight + Send + Sync {
     /// How many states it needs.
     fn size(&self) -> usize;
     /// Their names, with units.
@@ -84,8 +84,6 @@ pub trait Freedoms: Send + Sync {
     fn orient(&self, _y: &[f64], _w: &mut Workspace) {}
     /// Writes the derivatives of the body's states from the forces in the workspace.
     fn accelerate(&self, y: &[f64], w: &mut Workspace, dy: &mut [f64]);
-    /// The same at eight moments side by side.
-    fn on_eight(&self) -> &dyn FreedomsOnEight;
     /// Which of the positions are angles or a quaternion.
     fn attitude(&self) -> Range<usize>;
     /// How fast each velocity, of which there are six at most, moves a handle (body coordinates, m) along one of the world's axes.
@@ -128,9 +126,20 @@ pub(crate) trait Coordinates: Send + Sync {
     fn rates_at<N: Moments>(&self, y: &[N::Each], w: &Workspace<N>, dy: &mut [N::Each]);
 }
 
-/// [`Freedoms::gaps`] and [`Freedoms::accelerate`] at eight moments, for each kind of registers: see [`crate::model::OnEight`].
+/// [`Freedoms::gaps`] and [`Freedoms::accelerate`] by [fused arithmetic](crate::lanes::Fused), and at eight moments for each kind of registers: see
+/// [`crate::model::OnEight`].
 #[allow(missing_docs)]
 pub trait FreedomsOnEight {
+    /// # Safety
+    /// The processor has AVX2 and FMA.
+    #[cfg(target_arch = "x86_64")]
+    #[allow(unsafe_code)]
+    unsafe fn gaps_fused(&self, y: &[f64], w: &mut Workspace);
+    /// # Safety
+    /// The processor has AVX2 and FMA.
+    #[cfg(target_arch = "x86_64")]
+    #[allow(unsafe_code)]
+    unsafe fn accelerate_fused(&self, y: &[f64], w: &Workspace, dy: &mut [f64]);
     fn gaps_plain(&self, y: &[Plain8], w: &mut Workspace<Eight<Plain8>>);
     fn rates_plain(&self, y: &[Plain8], w: &Workspace<Eight<Plain8>>, dy: &mut [Plain8]);
     /// # Safety
@@ -156,6 +165,18 @@ pub trait FreedomsOnEight {
 }
 
 impl<T: Coordinates> FreedomsOnEight for T {
+    #[cfg(target_arch = "x86_64")]
+    #[target_feature(enable = "avx2,fma")]
+    #[allow(unsafe_code)]
+    unsafe fn gaps_fused(&self, y: &[f64], w: &mut Workspace) {
+        self.gaps_at(FusedEach::all(y), w.fused(), All);
+    }
+    #[cfg(target_arch = "x86_64")]
+    #[target_feature(enable = "avx2,fma")]
+    #[allow(unsafe_code)]
+    unsafe fn accelerate_fused(&self, y: &[f64], w: &Workspace, dy: &mut [f64]) {
+        self.rates_at(FusedEach::all(y), w.as_fused(), FusedEach::all_mut(dy));
+    }
     fn gaps_plain(&self, y: &[Plain8], w: &mut Workspace<Eight<Plain8>>) {
         self.gaps_at(y, w, All);
     }
@@ -284,16 +305,17 @@ impl Coordinates for Six {
             *torque += further;
         }
         let [wx, wy, wz] = w.spin;
-        let momentum = self.inertia.times([wx, wy, wz]);
+        let [lx, ly, lz] = self.inertia.times([wx, wy, wz]);
         let angular = self.inverse_inertia.times([
-            in_body[0] - (wy * momentum[2] - wz * momentum[1]),
-            in_body[1] - (wz * momentum[0] - wx * momentum[2]),
-            in_body[2] - (wx * momentum[1] - wy * momentum[0]),
+            wz.madd(ly, wy.nmadd(lz, in_body[0])),
+            wx.madd(lz, wz.nmadd(lx, in_body[1])),
+            wy.madd(lx, wx.nmadd(ly, in_body[2])),
         ]);
         let [qx, qy, qz, qw] = turn([y[3], y[4], y[5], y[6]], w.spin);
         dy[..7].copy_from_slice(&[y[7], y[8], y[9], qx, qy, qz, qw]);
         for a in 0..3 {
-            dy[7 + a] = force[a] * self.inverse_mass + self.gravity[a];
+            let gravity = N::Each::splat(self.gravity[a]);
+            dy[7 + a] = force[a].madd(N::Each::splat(self.inverse_mass), gravity);
             dy[10 + a] = angular[a];
         }
     }
@@ -304,10 +326,10 @@ impl Coordinates for Six {
 pub(crate) fn turn<T: Number>(q: [T; 4], [wx, wy, wz]: [T; 3]) -> [T; 4] {
     let [qx, qy, qz, qw] = [q[0] * 0.5, q[1] * 0.5, q[2] * 0.5, q[3] * 0.5];
     [
-        qw * wx + qy * wz - qz * wy,
-        qw * wy + qz * wx - qx * wz,
-        qw * wz + qx * wy - qy * wx,
-        -(qx * wx + qy * wy + qz * wz),
+        qz.nmadd(wy, qy.madd(wz, qw * wx)),
+        qx.nmadd(wz, qz.madd(wx, qw * wy)),
+        qy.nmadd(wx, qx.madd(wy, qw * wz)),
+        -dot([qx, qy, qz], [wx, wy, wz]),
     ]
 }
 
@@ -367,12 +389,7 @@ impl<N: Moments> Arms<N> for Turned<N> {
             self.rows,
             [N::always(h[0]), N::always(h[1]), N::always(h[2])],
         );
-        let arm_rate = [
-            w[1] * arm[2] - w[2] * arm[1],
-            w[2] * arm[0] - w[0] * arm[2],
-            w[0] * arm[1] - w[1] * arm[0],
-        ];
-        [arm, arm_rate]
+        [arm, cross(*w, arm)]
     }
 }
 
@@ -415,9 +432,9 @@ fn dot<T: Number>(a: [T; 3], b: [T; 3]) -> T {
 #[inline(always)]
 fn cross<T: Number>(a: [T; 3], b: [T; 3]) -> [T; 3] {
     [
-        a[1] * b[2] - a[2] * b[1],
-        a[2] * b[0] - a[0] * b[2],
-        a[0] * b[1] - a[1] * b[0],
+        a[2].nmadd(b[1], a[1] * b[2]),
+        a[0].nmadd(b[2], a[2] * b[0]),
+        a[1].nmadd(b[0], a[0] * b[1]),
     ]
 }
 
@@ -431,9 +448,9 @@ fn pull<N: Moments>(pairs: &[Pair<N>]) -> [[N::Each; 3]; 2] {
         force[0] += fx;
         force[1] += fy;
         force[2] += fz;
-        torque[0] += ay * fz - az * fy;
-        torque[1] += az * fx - ax * fz;
-        torque[2] += ax * fy - ay * fx;
+        torque[0] = az.nmadd(fy, ay.madd(fz, torque[0]));
+        torque[1] = ax.nmadd(fz, az.madd(fx, torque[1]));
+        torque[2] = ay.nmadd(fx, ax.madd(fy, torque[2]));
     }
     [sums::<N>(force), sums::<N>(torque)]
 }
@@ -453,14 +470,18 @@ fn times<T: Number>(m: &Matrix3<f64>, v: [T; 3]) -> [T; 3] {
 pub(crate) fn rotation<T: Number>(q: &[T]) -> [[T; 3]; 3] {
     let (x, y, z, w) = (q[0], q[1], q[2], q[3]);
     let (one, two) = (T::splat(1.0), T::splat(2.0));
-    let s = two / (x * x + y * y + z * z + w * w);
+    let s = two / w.madd(w, dot([x, y, z], [x, y, z]));
     let (sx, sy, sz) = (s * x, s * y, s * z);
-    let (xx, xy, xz, yy, yz, zz) = (sx * x, sx * y, sx * z, sy * y, sy * z, sz * z);
     let (wx, wy, wz) = (sx * w, sy * w, sz * w);
+    let less = sz.nmadd(z, one);
     [
-        [one - (yy + zz), xy - wz, xz + wy],
-        [xy + wz, one - (xx + zz), yz - wx],
-        [xz - wy, yz + wx, one - (xx + yy)],
+        [sy.nmadd(y, less), sx.madd(y, -wz), sx.madd(z, wy)],
+        [sx.madd(y, wz), sx.nmadd(x, less), sy.madd(z, -wx)],
+        [
+            sx.madd(z, -wy),
+            sy.madd(z, wx),
+            sy.nmadd(y, sx.nmadd(x, one)),
+        ],
     ]
 }
 
@@ -551,10 +572,6 @@ impl Freedoms for Six {
         self.rates_at(y, w, dy);
     }
 
-    fn on_eight(&self) -> &dyn FreedomsOnEight {
-        self
-    }
-
     fn attitude(&self) -> Range<usize> {
         3..7
     }
@@ -615,10 +632,22 @@ impl Freedoms for Six {
     }
 }
 
-/// Scales a quaternion to unit length; |q| is within rounding of 1 afterwards.
+/// Scales a quaternion to unit length; |q| is within rounding of 1 afterwards, and one that is so already stays what it is.
 #[inline(always)]
 fn normalise(q: &mut [f64]) {
-    let s = 1.0 / (q[0] * q[0] + q[1] * q[1] + q[2] * q[2] + q[3] * q[3]).sqrt();
+    const ROUNDING: f64 = 16.0 * f64::EPSILON;
+    /// Within this of 1 two terms of the series of 1/√x are enough.
+    const NEAR: f64 = 1e-8;
+    let square = q[0] * q[0] + q[1] * q[1] + q[2] * q[2] + q[3] * q[3];
+    let off = square - 1.0;
+    if off.abs() <= ROUNDING {
+        return;
+    }
+    let s = if off.abs() <= NEAR {
+        1.0 - 0.5 * off
+    } else {
+        1.0 / square.sqrt()
+    };
     for x in q {
         *x *= s;
     }

@@ -4,9 +4,13 @@
 //! parameters are zero, so that it exerts nothing.
 
 mod eight;
+#[cfg(target_arch = "x86_64")]
+mod fused;
 mod number;
 
 pub use eight::*;
+#[cfg(target_arch = "x86_64")]
+pub use fused::{Fused, FusedEach, FusedPair};
 pub use number::{Eight, Moments, Now, Number, Two};
 use wide::bytemuck::cast;
 pub use wide::f64x2;
@@ -75,22 +79,62 @@ const ROUND: f64 = 6_755_399_441_055_744.0;
 /// libm does it, and what is not finite gives NaN. Source of the reduction: Cody & Waite (1980).
 #[inline(always)]
 pub fn sin_cos(x: f64x2) -> (f64x2, f64x2) {
+    sin_cos_by::<f64x2>(x)
+}
+
+/// A pair of numbers, however it is multiplied and added.
+trait Pairwise: Number {
+    fn of(x: f64x2) -> Self;
+    fn as_pair(self) -> f64x2;
+}
+
+impl Pairwise for f64x2 {
+    #[inline(always)]
+    fn of(x: f64x2) -> Self {
+        x
+    }
+    #[inline(always)]
+    fn as_pair(self) -> f64x2 {
+        self
+    }
+}
+
+/// [`sin_cos`] by the operations of `P`.
+#[inline(always)]
+fn sin_cos_by<P: Pairwise>(x: f64x2) -> (f64x2, f64x2) {
     let splat = f64x2::splat;
     // Also true for NaN.
     if !x.abs().simd_le(splat(FAR_RAD)).all() {
         return far(x);
     }
-    let shifted = x * splat(std::f64::consts::FRAC_2_PI) + splat(ROUND);
+    // Functions, as closures would not be inlined into code compiled for more of the processor.
+    #[inline(always)]
+    fn madd<P: Pairwise>(a: f64x2, b: f64x2, c: f64x2) -> f64x2 {
+        P::of(a).madd(P::of(b), P::of(c)).as_pair()
+    }
+    #[inline(always)]
+    fn poly<P: Pairwise>(c: &[f64x2; 6], z: f64x2, z2: f64x2) -> f64x2 {
+        // By pairs (Estrin) rather than one after the other: the stages of a step wait for this.
+        let (high, middle) = (madd::<P>(c[0], z, c[1]), madd::<P>(c[2], z, c[3]));
+        let low = madd::<P>(c[4], z, c[5]);
+        madd::<P>(madd::<P>(high, z2, middle), z2, low)
+    }
+    let shifted = madd::<P>(x, splat(std::f64::consts::FRAC_2_PI), splat(ROUND));
     let quadrant: i64x2 = cast(shifted);
-    let n = shifted - splat(ROUND);
-    let r = ((x - n * HALF_PI[0]) - n * HALF_PI[1]) - n * HALF_PI[2];
+    let n = splat(ROUND) - shifted;
+    let mut r = x;
+    for part in if P::ONE_ROUNDING {
+        &WHOLE[..]
+    } else {
+        &HALF_PI[..]
+    } {
+        r = madd::<P>(n, *part, r);
+    }
     let z = r * r;
-    // By pairs (Estrin) rather than one after the other: the stages of a step wait for this.
     let z2 = z * z;
-    let poly =
-        |c: &[f64x2; 6]| (c[4] * z + c[5]) + z2 * ((c[2] * z + c[3]) + z2 * (c[0] * z + c[1]));
-    let s = r + r * z * poly(&SIN);
-    let c = splat(1.0) - (z * splat(0.5) - z2 * poly(&COS));
+    let s = madd::<P>(r * z, poly::<P>(&SIN, z, z2), r);
+    let upper = madd::<P>(z, splat(-0.5), splat(1.0));
+    let c = madd::<P>(z2, poly::<P>(&COS, z, z2), upper);
     // Odd quadrants swap; bit 1 of n and of n + 1 is the sign.
     let odd: f64x2 = cast(i64x2::ZERO - (quadrant & i64x2::splat(1)));
     let swapped = (s ^ c) & odd;
@@ -123,6 +167,8 @@ const HALF_PI: [f64x2; 3] = both([
     6.077_100_503_593_46e-11,
     2.912_732_056_093_356e-20,
 ]);
+/// π/2 in two parts, for products that are not rounded before they are added: n times the first is then exact however many bits it has.
+const WHOLE: [f64x2; 2] = both([std::f64::consts::FRAC_PI_2, 6.123_233_995_736_766e-17]);
 const SIN: [f64x2; 6] = both([
     1.589_623_015_765_465_6e-10,
     -2.505_074_776_285_780_7e-8,

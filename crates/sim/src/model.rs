@@ -27,6 +27,8 @@ use crate::body::Body;
 use crate::effects;
 use crate::freedoms::{Freedoms, Six, choose};
 use crate::lanes::{self, f64x2, pack, pairs};
+#[cfg(target_arch = "x86_64")]
+use crate::lanes::{FusedPair, Number};
 use crate::random::{Stream, normal};
 use crate::scene::Scene;
 use crate::sensors::drum::Track;
@@ -110,6 +112,8 @@ pub struct Model {
     has_friction: bool,
     /// Whether there are so many carriers that they are treated block by block.
     in_blocks: bool,
+    /// Whether the processor has AVX2 and FMA, and the carriers are not in blocks.
+    fused: bool,
     sensor_clocks: Vec<Clock>,
     imus: Vec<Imu>,
     track: Option<Track>,
@@ -164,6 +168,7 @@ impl Model {
             watches_contact: false,
             has_friction: false,
             in_blocks: false,
+            fused: false,
             sensor_clocks: Vec::new(),
             imus: Vec::new(),
             track: None,
@@ -208,6 +213,12 @@ impl Model {
             && stage(Stage::Shoulders)
                 .chain(stage(Stage::Handles))
                 .all(|term| term.on_block().is_some());
+        #[cfg(target_arch = "x86_64")]
+        {
+            model.fused = !model.in_blocks
+                && is_x86_feature_detected!("avx2")
+                && is_x86_feature_detected!("fma");
+        }
         model
     }
 
@@ -364,13 +375,21 @@ impl Model {
             return;
         }
         let positions = self.freedoms.positions();
-        units[positions..].fill(0.0);
-        let damping = [&self.side_damping[..], &self.contact_damping];
-        self.freedoms.damping_per_s(y, &w.pair, damping, units);
+        self.damping_per_s(y, w, units);
         for (unit, &scale) in units.iter_mut().zip(scales).skip(positions) {
             let damping_per_s = *unit;
             let most = (LOOSEST / damping_per_s).max(scale);
             *unit = (COORDINATE * damping_per_s).clamp(COORDINATE * slowest_per_s, most);
+        }
+    }
+
+    /// −∂v̇/∂v of each of the body's velocities, 1/s, that contacts, holds and straps make as they stand in the workspace; `rates` has the
+    /// body's states, of which the positions are left alone.
+    pub fn damping_per_s(&self, y: &[f64], w: &Workspace, rates: &mut [f64]) {
+        rates[self.freedoms.positions()..].fill(0.0);
+        if !self.contact_damping.is_empty() {
+            let damping = [&self.side_damping[..], &self.contact_damping];
+            self.freedoms.damping_per_s(y, &w.pair, damping, rates);
         }
     }
 
@@ -481,7 +500,7 @@ impl Model {
             beat: [0.0; 2],
             body_torque: [0.0; 3],
             extra: self.extra.iter().map(|(_, first)| *first).collect(),
-            extra_rate: vec![0.0; self.extra.len()],
+            extra_rate: vec![0.0; self.extra.len()].into(),
         }
     }
 
@@ -568,8 +587,14 @@ impl Model {
     #[inline]
     pub fn rhs_of_motion(&self, t_s: f64, y: &[f64], dy: &mut [f64], w: &mut Workspace) {
         if self.carried {
-            self.forces(t_s, y, w);
-            return self.motion(y, dy, w);
+            #[cfg(target_arch = "x86_64")]
+            if self.fused {
+                // SAFETY: the processor was asked.
+                #[allow(unsafe_code)]
+                return unsafe { self.rhs_fused(t_s, y, dy, w) };
+            }
+            self.forces_by::<false>(t_s, y, w);
+            return self.motion_by::<false>(y, dy, w);
         }
         // Nothing acts on the handles: nobody asks where they are until a sample does.
         let pairs = std::mem::take(&mut w.pair);
@@ -584,9 +609,33 @@ impl Model {
         self.powers(dy, w);
     }
 
-    #[inline(always)]
+    #[cfg(target_arch = "x86_64")]
+    #[target_feature(enable = "avx2,fma")]
+    fn rhs_fused(&self, t_s: f64, y: &[f64], dy: &mut [f64], w: &mut Workspace) {
+        self.forces_by::<true>(t_s, y, w);
+        self.motion_by::<true>(y, dy, w);
+    }
+
+    #[inline]
     fn motion(&self, y: &[f64], dy: &mut [f64], w: &mut Workspace) {
-        self.freedoms.accelerate(y, w, dy);
+        #[cfg(target_arch = "x86_64")]
+        if self.fused {
+            // SAFETY: the processor was asked.
+            #[allow(unsafe_code)]
+            return unsafe { self.motion_fused(y, dy, w) };
+        }
+        self.motion_by::<false>(y, dy, w);
+    }
+
+    #[cfg(target_arch = "x86_64")]
+    #[target_feature(enable = "avx2,fma")]
+    fn motion_fused(&self, y: &[f64], dy: &mut [f64], w: &mut Workspace) {
+        self.motion_by::<true>(y, dy, w);
+    }
+
+    #[inline(always)]
+    fn motion_by<const FUSED: bool>(&self, y: &[f64], dy: &mut [f64], w: &mut Workspace) {
+        self.accelerate::<FUSED>(y, w, dy);
         let phases = self.layout.phase_range();
         lanes::store(w.pair.iter().map(|p| p.rate), &mut dy[phases]);
         if !w.extra.is_empty() {
@@ -595,16 +644,30 @@ impl Model {
     }
 
     #[inline(always)]
+    fn accelerate<const FUSED: bool>(&self, y: &[f64], w: &mut Workspace, dy: &mut [f64]) {
+        #[cfg(target_arch = "x86_64")]
+        if FUSED {
+            // SAFETY: where this is true the processor was asked.
+            #[allow(unsafe_code)]
+            return unsafe { self.freedoms.accelerate_fused(y, w, dy) };
+        }
+        self.freedoms.accelerate(y, w, dy);
+    }
+
+    #[inline(always)]
     fn powers(&self, dy: &mut [f64], w: &Workspace) {
         if self.in_blocks {
             return self.powers_in_blocks(dy, w);
         }
-        for ((_, account), out) in self
-            .accounts
-            .iter()
-            .zip(dy[self.layout.ledger_range()].chunks_exact_mut(2))
-        {
-            let power = account.power(w, &w.pair, 0);
+        let out = dy[self.layout.ledger_range()].chunks_exact_mut(2);
+        for ((_, account), out) in self.accounts.iter().zip(out) {
+            // SAFETY: the processor was asked.
+            #[allow(unsafe_code)]
+            let power = if self.fused {
+                unsafe { account.power_fused(w) }
+            } else {
+                account.power(w, &w.pair, 0)
+            };
             out.copy_from_slice(&[power.work_w, power.dissipated_w]);
         }
     }
@@ -626,36 +689,64 @@ impl Model {
     /// Everything up to the forces; what the accelerations need.
     #[inline]
     pub fn forces(&self, t_s: f64, y: &[f64], w: &mut Workspace) {
+        #[cfg(target_arch = "x86_64")]
+        if self.fused {
+            // SAFETY: the processor was asked.
+            #[allow(unsafe_code)]
+            return unsafe { self.forces_fused(t_s, y, w) };
+        }
+        self.forces_by::<false>(t_s, y, w);
+    }
+
+    #[cfg(target_arch = "x86_64")]
+    #[target_feature(enable = "avx2,fma")]
+    fn forces_fused(&self, t_s: f64, y: &[f64], w: &mut Workspace) {
+        self.forces_by::<true>(t_s, y, w);
+    }
+
+    #[inline(always)]
+    fn forces_by<const FUSED: bool>(&self, t_s: f64, y: &[f64], w: &mut Workspace) {
         // Even a copy of nothing would be a call.
         if !w.extra.is_empty() {
             w.extra.copy_from_slice(&y[self.layout.extra_range()]);
         }
         if self.has_phases {
-            self.phases(t_s, y, w);
+            self.phases::<FUSED>(t_s, y, w);
         }
         if self.in_blocks {
             self.handles_in_blocks(t_s, y, w);
         } else {
-            self.handles(t_s, y, w);
+            self.handles::<FUSED>(t_s, y, w);
         }
         w.body_torque = [0.0; 3];
-        for term in &self.terms[Stage::Body as usize] {
-            term.apply(t_s, w);
+        self.apply::<FUSED>(Stage::Body, t_s, w);
+    }
+
+    #[inline(always)]
+    fn apply<const FUSED: bool>(&self, stage: Stage, t_s: f64, w: &mut Workspace) {
+        for term in &self.terms[stage as usize] {
+            if FUSED {
+                // SAFETY: where this is true the processor was asked.
+                #[allow(unsafe_code)]
+                unsafe {
+                    term.apply_fused(t_s, w);
+                }
+            } else {
+                term.apply(t_s, w);
+            }
         }
     }
 
     /// Shoulders, handles and the forces between them.
     #[inline(always)]
-    fn handles(&self, t_s: f64, y: &[f64], w: &mut Workspace) {
+    fn handles<const FUSED: bool>(&self, t_s: f64, y: &[f64], w: &mut Workspace) {
         if self.has_phases {
-            for term in &self.terms[Stage::Shoulders as usize] {
-                term.apply(t_s, w);
-            }
+            self.apply::<FUSED>(Stage::Shoulders, t_s, w);
         }
         if !self.terms[Stage::Party as usize].is_empty() {
             self.party(t_s, w);
         }
-        self.freedoms.gaps(y, w);
+        self.place::<FUSED>(y, w);
         let bends = &self.terms[Stage::Bends as usize];
         if !bends.is_empty() {
             self.freedoms.orient(y, w);
@@ -663,9 +754,18 @@ impl Model {
                 term.apply(t_s, w);
             }
         }
-        for term in &self.terms[Stage::Handles as usize] {
-            term.apply(t_s, w);
+        self.apply::<FUSED>(Stage::Handles, t_s, w);
+    }
+
+    #[inline(always)]
+    fn place<const FUSED: bool>(&self, y: &[f64], w: &mut Workspace) {
+        #[cfg(target_arch = "x86_64")]
+        if FUSED {
+            // SAFETY: where this is true the processor was asked.
+            #[allow(unsafe_code)]
+            return unsafe { self.freedoms.gaps_fused(y, w) };
         }
+        self.freedoms.gaps(y, w);
     }
 
     /// The same, with everything about a block done before it leaves the first cache.
@@ -685,25 +785,22 @@ impl Model {
         }
     }
 
-    #[inline]
-    fn phases(&self, t_s: f64, y: &[f64], w: &mut Workspace) {
+    #[inline(always)]
+    fn phases<const FUSED: bool>(&self, t_s: f64, y: &[f64], w: &mut Workspace) {
         for (pair, phase) in w
             .pair
             .iter_mut()
             .zip(lanes::load(&y[self.layout.phase_range()]))
         {
-            (pair.sin, pair.cos) = lanes::sin_cos(phase);
+            (pair.sin, pair.cos) = sin_cos::<FUSED>(phase);
             pair.rate = pair.constant_rate;
             // Blocks do it when they are at hand.
             if !self.in_blocks {
                 pair.stand();
             }
         }
-        for stage in [Stage::Clock, Stage::Phases] {
-            for term in &self.terms[stage as usize] {
-                term.apply(t_s, w);
-            }
-        }
+        self.apply::<FUSED>(Stage::Clock, t_s, w);
+        self.apply::<FUSED>(Stage::Phases, t_s, w);
     }
 
     #[cold]
@@ -735,6 +832,17 @@ impl Model {
     }
 }
 
+/// [`lanes::sin_cos`], in code compiled for fused arithmetic or not.
+#[inline(always)]
+fn sin_cos<const FUSED: bool>(x: f64x2) -> (f64x2, f64x2) {
+    #[cfg(target_arch = "x86_64")]
+    if FUSED {
+        let (sin, cos) = FusedPair(x).sin_cos();
+        return (sin.0, cos.0);
+    }
+    lanes::sin_cos(x)
+}
+
 impl Model {
     /// What rounding makes of N* of a handle where the heights that it compares are of size `height_m`, N.
     pub(crate) fn contact_rounding_n(&self, handle: usize, height_m: f64) -> f64 {
@@ -761,6 +869,35 @@ impl Model {
 mod tests {
     use super::*;
     use crate::scene::parse;
+
+    /// The same numbers with one rounding instead of two, ledger included: every built-in scene, at a state with everything in motion.
+    #[test]
+    fn fused_arithmetic_gives_the_same_but_for_rounding() {
+        for (name, text) in crate::scene::BUILTIN {
+            let scene = parse(name, text, &[]).unwrap_or_else(|e| panic!("{e}"));
+            let mut model = Model::new(&scene);
+            let mut y = model.initial_state();
+            let body = model.layout().body;
+            for (k, y) in y[..body].iter_mut().enumerate() {
+                *y += 0.01 * (1.0 + k as f64).sin();
+            }
+            model.freedoms().project(&mut y);
+            let rates = |model: &Model| {
+                let (mut dy, mut w) = (vec![f64::NAN; y.len()], model.workspace());
+                model.begin_segment(7.0, &mut w);
+                model.rhs(7.01, &y, &mut dy, &mut w);
+                dy
+            };
+            let fused = rates(&model);
+            model.fused = false;
+            let plain = rates(&model);
+            let largest = plain.iter().fold(0.0f64, |a, b| a.max(b.abs()));
+            for (k, (a, b)) in fused.iter().zip(&plain).enumerate() {
+                let apart = (a - b).abs() / (1.0 + largest);
+                assert!(apart < 1e-13, "{name} {k}: {a} {b}"); // measured APART
+            }
+        }
+    }
 
     #[test]
     fn blocks_give_what_all_pairs_at_once_give() {

@@ -186,8 +186,8 @@ impl Book for HuntCrossley {
         let (mut work, mut absorbed) = (N::Pair::splat(0.0), N::Pair::splat(0.0));
         for (k, p) in pairs.iter().enumerate() {
             let spring = in_contact(p, self.spring::<N>(first + k, p.gap[2]));
-            work += p.normal * p.base_rate[2];
-            absorbed += (p.normal - spring) * p.gap_rate[2];
+            work = p.normal.madd(p.base_rate[2], work);
+            absorbed = (p.normal - spring).madd(p.gap_rate[2], absorbed);
         }
         Power {
             work_w: N::sum(work),
@@ -243,8 +243,8 @@ impl Book for SpringDampers {
         for (p, &(stiffness, _)) in pairs.iter().zip(&self.0[first..]) {
             // N δ̇ goes into the spring and the damper; the spring's part returns through `stored_j`.
             let spring = in_contact(p, N::always(stiffness) * p.gap[2]);
-            work += p.normal * p.base_rate[2];
-            absorbed += (p.normal - spring) * p.gap_rate[2];
+            work = p.normal.madd(p.base_rate[2], work);
+            absorbed = (p.normal - spring).madd(p.gap_rate[2], absorbed);
         }
         Power {
             work_w: N::sum(work),

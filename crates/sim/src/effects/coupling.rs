@@ -170,7 +170,7 @@ impl Whole for MeanField {
         let s = N::both(N::sum(s) * self.gain);
         let c = N::both((N::sum(c) + -self.padding) * self.gain);
         for p in &mut w.pair {
-            p.rate += p.cos * s - p.sin * c;
+            p.rate = p.sin.nmadd(c, p.cos.madd(s, p.rate));
         }
     }
 }

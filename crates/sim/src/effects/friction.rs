@@ -142,11 +142,11 @@ impl Coulomb {
     fn limited<T: Number>(&self, normal: T, hold: [T; 2], rate: [T; 2]) -> [T; 2] {
         let most = (normal * self.mu).larger(T::splat(0.0));
         let wanted = [
-            hold[0] + most * (rate[0] * self.per_velocity),
-            hold[1] + most * (rate[1] * self.per_velocity),
+            most.madd(rate[0] * self.per_velocity, hold[0]),
+            most.madd(rate[1] * self.per_velocity, hold[1]),
         ];
         let tiny = T::splat(f64::MIN_POSITIVE);
-        let length = (most * most + wanted[0] * wanted[0] + wanted[1] * wanted[1])
+        let length = (wanted[0].madd(wanted[0], wanted[1].madd(wanted[1], most * most)))
             .larger(tiny)
             .sqrt();
         let kept = most / length;

@@ -7,7 +7,7 @@
 //! phase (rad). Prescribed motion: the load does not push the shoulder back, whatever the force.
 //! Source: paper, eq. (base).
 
-use crate::lanes::{Moments, f64x2, pack};
+use crate::lanes::{Moments, Number, f64x2, pack};
 use crate::model::{Local, Model, Pair, Part, Stage, Workspace};
 use crate::scene::{Checker, PerCarrier, Problem, Scene, problem};
 use schemars::JsonSchema;
@@ -145,8 +145,9 @@ impl Wave {
         {
             let (sin, cos) = turn(p);
             let (sine, cosine) = (N::always(sine), N::always(cosine));
-            p.base[axis] += sine * sin + cosine * cos;
-            p.base_rate[axis] += p.rate * order * (sine * cos - cosine * sin);
+            p.base[axis] = sine.madd(sin, cosine.madd(cos, p.base[axis]));
+            let slope = cosine.nmadd(sin, sine * cos);
+            p.base_rate[axis] = (p.rate * order).madd(slope, p.base_rate[axis]);
         }
     }
 }
@@ -174,7 +175,7 @@ impl Local for Higher {
             wave.add(w, &part, |p| {
                 let (mut s, mut c) = (p.sin, p.cos);
                 for _ in 1..wave.order {
-                    (s, c) = (s * p.cos + c * p.sin, c * p.cos - s * p.sin);
+                    (s, c) = (s.madd(p.cos, c * p.sin), s.nmadd(p.sin, c * p.cos));
                 }
                 (s, c)
             });

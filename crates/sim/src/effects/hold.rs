@@ -85,8 +85,8 @@ impl Book for SpringDampers {
         for (p, &(stiffness, _)) in pairs.iter().zip(&self.0[first..]) {
             for axis in 0..2 {
                 let spring = N::always(stiffness) * p.gap[axis];
-                work += p.tangential[axis] * p.base_rate[axis];
-                absorbed += (p.tangential[axis] - spring) * p.gap_rate[axis];
+                work = p.tangential[axis].madd(p.base_rate[axis], work);
+                absorbed = (p.tangential[axis] - spring).madd(p.gap_rate[axis], absorbed);
             }
         }
         Power {

@@ -79,8 +79,8 @@ fn amplify<N: Moments>(pairs: &mut [Pair<N>], gain: N::Each, gain_rate: N::Each)
     let (gain, gain_rate) = (N::both(gain), N::both(gain_rate));
     for p in pairs {
         let lifted = p.base[2] - p.rest[2];
-        p.base[2] = p.rest[2] + lifted * gain;
-        p.base_rate[2] = p.base_rate[2] * gain + lifted * gain_rate;
+        p.base[2] = lifted.madd(gain, p.rest[2]);
+        p.base_rate[2] = lifted.madd(gain_rate, p.base_rate[2] * gain);
     }
 }
 

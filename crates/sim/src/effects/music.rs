@@ -179,7 +179,8 @@ impl Whole for Pull {
         // sin(ψ − φ) from the sines and cosines that are there already.
         let [sin, cos] = w.beat.map(N::both);
         for (p, strength) in w.pair.iter_mut().zip(&self.strength) {
-            p.rate += N::always(*strength) * (p.cos * sin - p.sin * cos);
+            let apart = p.sin.nmadd(cos, p.cos * sin);
+            p.rate = N::always(*strength).madd(apart, p.rate);
         }
     }
 }

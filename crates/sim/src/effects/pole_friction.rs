@@ -75,7 +75,7 @@ impl Rub {
             };
         }
         let rate = w.spin[0];
-        N::sum(load) * -self.arm_m * rate / (rate * rate + self.rate2).sqrt()
+        N::sum(load) * -self.arm_m * rate / rate.madd(rate, N::Each::splat(self.rate2)).sqrt()
     }
 }
 

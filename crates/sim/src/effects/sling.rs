@@ -77,9 +77,10 @@ impl Strap {
     fn force<N: Moments>(&self, p: &Pair<N>, least_n: f64) -> [N::Pair; 2] {
         let least = N::Pair::splat(self.least_n.max(least_n));
         let load = p.normal.larger(least) * self.per_length;
+        let damping_s = N::Pair::splat(self.damping_s);
         [
-            load * (p.gap[0] + p.gap_rate[0] * self.damping_s),
-            load * (p.gap[1] + p.gap_rate[1] * self.damping_s),
+            load * p.gap_rate[0].madd(damping_s, p.gap[0]),
+            load * p.gap_rate[1].madd(damping_s, p.gap[1]),
         ]
     }
 }
@@ -121,8 +122,8 @@ impl Book for Strap {
         let (mut work, mut absorbed) = (N::Pair::splat(0.0), N::Pair::splat(0.0));
         for p in pairs {
             for (axis, force) in self.force(p, w.least_load_n).into_iter().enumerate() {
-                work += force * p.base_rate[axis];
-                absorbed += force * p.gap_rate[axis];
+                work = force.madd(p.base_rate[axis], work);
+                absorbed = force.madd(p.gap_rate[axis], absorbed);
             }
         }
         Power {

@@ -175,8 +175,8 @@ impl<N: Moments, const AXIS: usize> Arms<N> for Swung<N, AXIS> {
                 arm[k] = along;
             } else {
                 let (b, c) = (N::always(b[k]), N::always(c[k]));
-                arm[k] = along + b * self.cos + c * self.sin;
-                arm_rate[k] = (c * self.cos - b * self.sin) * self.rate;
+                arm[k] = c.madd(self.sin, b.madd(self.cos, along));
+                arm_rate[k] = b.nmadd(self.sin, c * self.cos) * self.rate;
             }
         }
         [arm, arm_rate]

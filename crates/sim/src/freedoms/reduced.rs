@@ -13,7 +13,7 @@
 
 use super::gimbal::Gimbal;
 use super::hinge::{ASKEW, Hinge};
-use super::{Coordinates, Freedoms, FreedomsOnEight, Pose, Six, cross, dot, pull, times};
+use super::{Coordinates, Freedoms, Pose, Six, cross, dot, pull, times};
 use crate::body::Body;
 use crate::lanes::{Moments, Number, f64x2, pack, sum};
 use crate::model::{All, Block, Pair, Part, Workspace};
@@ -111,9 +111,6 @@ impl Freedoms for Pinned {
     }
     fn accelerate(&self, y: &[f64], w: &mut Workspace, dy: &mut [f64]) {
         self.rates_at(y, w, dy);
-    }
-    fn on_eight(&self) -> &dyn FreedomsOnEight {
-        self
     }
     fn attitude(&self) -> Range<usize> {
         self.six.attitude()
@@ -401,10 +398,6 @@ impl<T: Turning> Freedoms for Reduced<T> {
 
     fn accelerate(&self, y: &[f64], w: &mut Workspace, dy: &mut [f64]) {
         self.rates_at(y, w, dy);
-    }
-
-    fn on_eight(&self) -> &dyn FreedomsOnEight {
-        self
     }
 
     fn attitude(&self) -> Range<usize> {

@@ -136,13 +136,18 @@ fn poly<E: Wide>(c: &[super::f64x2; 6], z: E, z2: E) -> E {
 /// As [`super::sin_cos`], eight at a time.
 #[inline(always)]
 fn sin_cos<E: Wide>(x: E) -> (E, E) {
-    use super::{COS, FAR_RAD, HALF_PI, ROUND, SIN};
+    use super::{COS, FAR_RAD, HALF_PI, ROUND, SIN, WHOLE};
     let splat = E::splat;
     let shifted = x.madd(splat(std::f64::consts::FRAC_2_PI), splat(ROUND));
     let n = splat(ROUND) - shifted;
-    let r = n.madd(of_both(&HALF_PI[0]), x);
-    let r = n.madd(of_both(&HALF_PI[1]), r);
-    let r = n.madd(of_both(&HALF_PI[2]), r);
+    let mut r = x;
+    for part in if E::ONE_ROUNDING {
+        &WHOLE[..]
+    } else {
+        &HALF_PI[..]
+    } {
+        r = n.madd(of_both(part), r);
+    }
     let z = r * r;
     let z2 = z * z;
     let s = (r * z).madd(poly(&SIN, z, z2), r);
@@ -324,6 +329,7 @@ mod x86 {
     );
 
     impl Number for Avx512 {
+        const ONE_ROUNDING: bool = true;
         #[inline(always)]
         fn splat(x: f64) -> Self {
             Avx512(unsafe { _mm512_set1_pd(x) })
@@ -482,6 +488,7 @@ mod x86 {
     }
 
     impl Number for Avx2 {
+        const ONE_ROUNDING: bool = true;
         #[inline(always)]
         fn splat(x: f64) -> Self {
             Avx2(unsafe { [_mm256_set1_pd(x); 2] })

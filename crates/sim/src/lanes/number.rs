@@ -21,10 +21,17 @@ pub trait Number:
     + Mul<f64, Output = Self>
     + Add<f64, Output = Self>
 {
+    /// Whether [`Self::madd`] rounds once.
+    const ONE_ROUNDING: bool = false;
     /// The same number everywhere.
     fn splat(x: f64) -> Self;
     /// self·b + c; with one rounding where the processor does that as fast as with two.
     fn madd(self, b: Self, c: Self) -> Self;
+    /// c − self·b; rounded as [`Self::madd`].
+    #[inline(always)]
+    fn nmadd(self, b: Self, c: Self) -> Self {
+        (-self).madd(b, c)
+    }
     /// The larger; which one where either is not a number is left open.
     fn larger(self, other: Self) -> Self;
     /// |x|

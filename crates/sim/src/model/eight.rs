@@ -85,7 +85,7 @@ impl Model {
         }
         SideBySide {
             layout: &self.layout,
-            freedoms: self.freedoms.on_eight(),
+            freedoms: &*self.freedoms,
             terms: self.terms.each_ref().map(of),
             accounts: self
                 .accounts

@@ -2,13 +2,21 @@
 
 use super::workspace::{All, Block, Pair, Part, Workspace};
 #[cfg(target_arch = "x86_64")]
-use crate::lanes::{Avx2, Avx512};
+use crate::lanes::{Avx2, Avx512, Fused, FusedEach};
 use crate::lanes::{Eight, Moments, Plain8};
 
 /// A part of the right-hand side.
 pub trait Term: Send + Sync {
     /// Adds its part to the workspace at time `t_s`.
     fn apply(&self, t_s: f64, w: &mut Workspace);
+    /// The same by [`Fused`] arithmetic, if it is written for that.
+    ///
+    /// # Safety
+    /// The processor has AVX2 and FMA.
+    #[allow(unsafe_code)]
+    unsafe fn apply_fused(&self, t_s: f64, w: &mut Workspace) {
+        self.apply(t_s, w);
+    }
     /// The same for a block of pairs, if each is treated by itself.
     fn on_block(&self) -> Option<&dyn OnBlock> {
         None
@@ -52,6 +60,12 @@ impl<T: Local> Term for T {
     fn apply(&self, t_s: f64, w: &mut Workspace) {
         self.act(t_s, w, All);
     }
+    #[cfg(target_arch = "x86_64")]
+    #[target_feature(enable = "avx2,fma")]
+    #[allow(unsafe_code)]
+    unsafe fn apply_fused(&self, t_s: f64, w: &mut Workspace) {
+        self.act(FusedEach(t_s), w.fused(), All);
+    }
     fn on_block(&self) -> Option<&dyn OnBlock> {
         Some(self)
     }
@@ -63,6 +77,12 @@ impl<T: Local> Term for T {
 impl<T: Whole> Term for AsWhole<T> {
     fn apply(&self, t_s: f64, w: &mut Workspace) {
         self.0.act(t_s, w);
+    }
+    #[cfg(target_arch = "x86_64")]
+    #[target_feature(enable = "avx2,fma")]
+    #[allow(unsafe_code)]
+    unsafe fn apply_fused(&self, t_s: f64, w: &mut Workspace) {
+        self.0.act(FusedEach(t_s), w.fused());
     }
     fn on_eight(&self) -> Option<&dyn OnEight> {
         Some(self)
@@ -154,6 +174,14 @@ pub struct Power<T = f64> {
 pub trait Account: Send + Sync {
     /// Power at the evaluated state, of `pairs` alone: those from the pair numbered `first` on.
     fn power(&self, w: &Workspace, pairs: &[Pair], first: usize) -> Power;
+    /// The same of all pairs by [`Fused`] arithmetic, if it is written for that.
+    ///
+    /// # Safety
+    /// The processor has AVX2 and FMA.
+    #[allow(unsafe_code)]
+    unsafe fn power_fused(&self, w: &Workspace) -> Power {
+        self.power(w, &w.pair, 0)
+    }
     /// Energy stored in the effect's springs, J.
     fn stored_j(&self, _w: &Workspace) -> f64 {
         0.0
@@ -182,6 +210,17 @@ pub trait Book: Send + Sync {
 impl<T: Book> Account for T {
     fn power(&self, w: &Workspace, pairs: &[Pair], first: usize) -> Power {
         Book::power(self, w, pairs, first)
+    }
+    #[cfg(target_arch = "x86_64")]
+    #[target_feature(enable = "avx2,fma")]
+    #[allow(unsafe_code)]
+    unsafe fn power_fused(&self, w: &Workspace) -> Power {
+        let w = w.as_fused();
+        let power = Book::power::<Fused>(self, w, &w.pair, 0);
+        Power {
+            work_w: power.work_w.0,
+            dissipated_w: power.dissipated_w.0,
+        }
     }
     fn stored_j(&self, w: &Workspace) -> f64 {
         Book::stored_j(self, w)

@@ -1,5 +1,7 @@
 //! The numbers of one evaluation, and which of them a term treats.
 
+#[cfg(target_arch = "x86_64")]
+use crate::lanes::Fused;
 use crate::lanes::{Eight, LANES, Moments, Now, Number, Two, Wide, f64x2};
 use std::ops::Range;
 
@@ -55,11 +57,12 @@ impl<N: Moments> Pair<N> {
 
 /// The numbers of one evaluation and of the present segment.
 #[derive(Clone, Debug)]
+#[repr(C)]
 pub struct Workspace<N: Moments = Now> {
     /// When the present segment began, s.
     pub segment_s: N::Each,
     /// The carriers, two by two: carrier i is lane i mod 2 of pair i / 2.
-    pub pair: Vec<Pair<N>>,
+    pub pair: Box<[Pair<N>]>,
     /// Rows of the rotation body → world; where the freedoms do not need it, set only if something bends.
     pub rotation: [[N::Each; 3]; 3],
     /// Angular velocity in the body, rad/s.
@@ -73,9 +76,9 @@ pub struct Workspace<N: Moments = Now> {
     /// Torque on the body beside that of the handle forces, body axes, N·m.
     pub body_torque: [N::Each; 3],
     /// States of the effects' own.
-    pub extra: Vec<N::Each>,
+    pub extra: Box<[N::Each]>,
     /// Their rates.
-    pub extra_rate: Vec<N::Each>,
+    pub extra_rate: Box<[N::Each]>,
 }
 
 impl<N: Moments> Workspace<N> {
@@ -85,14 +88,14 @@ impl<N: Moments> Workspace<N> {
         let zero = N::Each::splat(0.0);
         Self {
             segment_s: zero,
-            pair: Vec::new(),
+            pair: Box::default(),
             rotation: [[zero; 3]; 3],
             spin: [zero; 3],
             least_load_n: 0.0,
             beat: [zero; 2],
             body_torque: [zero; 3],
-            extra: Vec::new(),
-            extra_rate: Vec::new(),
+            extra: Box::default(),
+            extra_rate: Box::default(),
         }
     }
 
@@ -110,6 +113,24 @@ impl<N: Moments> Workspace<N> {
 }
 
 impl Workspace {
+    /// The same numbers, to be computed with by [`Fused`].
+    #[cfg(target_arch = "x86_64")]
+    #[inline(always)]
+    #[allow(unsafe_code)]
+    pub(crate) fn fused(&mut self) -> &mut Workspace<Fused> {
+        // SAFETY: both are `repr(C)`, their fields in turn the same numbers in the same places.
+        unsafe { &mut *std::ptr::from_mut(self).cast() }
+    }
+
+    /// As [`Self::fused`].
+    #[cfg(target_arch = "x86_64")]
+    #[inline(always)]
+    #[allow(unsafe_code)]
+    pub(crate) fn as_fused(&self) -> &Workspace<Fused> {
+        // SAFETY: as above.
+        unsafe { &*std::ptr::from_ref(self).cast() }
+    }
+
     /// A number of carrier `i`, to be changed.
     #[inline(always)]
     pub fn of_mut(&mut self, i: usize, pick: impl Fn(&mut Pair) -> &mut f64x2) -> &mut f64 {
@@ -131,10 +152,9 @@ impl Workspace {
         let zero = M::Each::splat(0.0);
         to.segment_s = M::Each::splat(self.segment_s);
         to.least_load_n = self.least_load_n;
-        to.extra.resize(self.extra.len(), zero);
-        to.extra_rate.resize(self.extra.len(), zero);
-        to.pair.clear();
-        to.pair.extend(self.pair.iter().map(|p| {
+        to.extra = vec![zero; self.extra.len()].into();
+        to.extra_rate = to.extra.clone();
+        let pair = |p: &Pair| {
             let zero = M::Pair::splat(0.0);
             let rest = p.rest.map(M::always);
             Pair {
@@ -154,7 +174,8 @@ impl Workspace {
                 tangential: [zero; 2],
                 rest,
             }
-        }));
+        };
+        to.pair = self.pair.iter().map(pair).collect();
     }
 }
 
