@@ -459,7 +459,7 @@ impl<E: Together> Abreast<E> {
         while course.sample_due(t_s).is_some() {
             course.sample(&self.column, true, observer)?;
         }
-        course.arrive(t_s, observer)?;
+        course.arrive(t_s, false, observer)?;
         if event {
             course.fire(observer);
         }

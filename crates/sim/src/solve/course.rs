@@ -118,6 +118,12 @@ const CLAMPED_S: f64 = 2.0 * CHATTER_S;
 const LONGEST_CLAMPED_S: f64 = 1e-5;
 const BACK_AT_ONCE: f64 = 32.0;
 
+/// Whether every number is one; without a branch for each.
+#[inline(always)]
+pub fn all_finite(y: &[f64]) -> bool {
+    y.iter().fold(true, |ok, x| ok & x.is_finite())
+}
+
 impl<'m> Course<'m> {
     pub fn new(model: &'m Model, method: &'static str, settings: &Settings, locate: bool) -> Self {
         let scene = &model.scene;
@@ -197,19 +203,20 @@ impl<'m> Course<'m> {
         (due <= t_s + SAME_MOMENT_S).then_some(due)
     }
 
-    /// Hands the state that [`Self::sample_due`] asked for to the observer. `evaluated`: the workspace holds the forces there already.
+    /// Hands the state that [`Self::sample_due`] asked for to the observer. `evaluated`: the workspace holds the forces there already. Returns
+    /// whether it does afterwards.
     pub fn sample(
         &mut self,
         y: &[f64],
         evaluated: bool,
         observer: &mut dyn Observer,
-    ) -> Result<(), Stopped> {
+    ) -> Result<bool, Stopped> {
         self.fresh = false;
         let (who, t_s) = self.next_tick();
         let tick = self.tickers[who].advance();
         if who > 0 {
             observer.tick(who - 1, tick, t_s, y, &mut self.w);
-            return Ok(());
+            return Ok(false);
         }
         if !evaluated {
             self.model.forces(t_s, y, &mut self.w);
@@ -222,7 +229,7 @@ impl<'m> Course<'m> {
             }
         }
         if observer.sample(t_s, y, &self.w) {
-            Ok(())
+            Ok(true)
         } else {
             Err(Stopped::ByObserver { t_s })
         }
@@ -309,12 +316,18 @@ impl<'m> Course<'m> {
         self.margin_n()
     }
 
-    /// Moves to the end of an accepted step.
-    pub fn arrive(&mut self, t_s: f64, observer: &mut dyn Observer) -> Result<(), Stopped> {
+    /// Moves to the end of an accepted step. `evaluated`: the workspace holds the forces there already.
+    pub fn arrive(
+        &mut self,
+        t_s: f64,
+        evaluated: bool,
+        observer: &mut dyn Observer,
+    ) -> Result<(), Stopped> {
         self.t_s = t_s;
         self.stats.steps += 1;
         self.model.freedoms().project(&mut self.y);
-        if let Some(bad) = self.y.iter().position(|x| !x.is_finite()) {
+        if !all_finite(&self.y) {
+            let bad = self.y.iter().position(|x| !x.is_finite()).unwrap_or(0);
             return Err(Stopped::NotFinite {
                 method: self.method,
                 t_s,
@@ -323,7 +336,7 @@ impl<'m> Course<'m> {
         }
         self.check_work()?;
         if !self.locate {
-            self.note_unlocated(observer);
+            self.note_unlocated(evaluated, observer);
         } else if self.on_edge() {
             self.settle();
             self.note_standing(observer);
@@ -490,12 +503,15 @@ impl<'m> Course<'m> {
         }
     }
 
-    fn note_unlocated(&mut self, observer: &mut dyn Observer) {
+    fn note_unlocated(&mut self, evaluated: bool, observer: &mut dyn Observer) {
         if self.touching.is_empty() {
             return;
         }
-        self.fresh = false;
-        self.model.forces(self.t_s, &self.y, &mut self.w);
+        if !evaluated {
+            self.stats.evaluations += 1;
+            self.model.forces(self.t_s, &self.y, &mut self.w);
+        }
+        self.fresh = true;
         for i in 0..self.touching.len() {
             let now = self.w.of(i, |p| p.normal) > 0.0;
             if now != self.touching[i] {

@@ -586,10 +586,9 @@ impl<'m, P: Pair, const EVENTS: bool> Run<'m, P, EVENTS> {
         let switched = t1 >= self.course.stop_s();
         while self.course.sample_due(t1).is_some() {
             self.at.copy_from_slice(&self.course.y);
-            self.course
-                .sample(&self.at, std::mem::take(&mut evaluated), observer)?;
+            evaluated = self.course.sample(&self.at, evaluated, observer)?;
         }
-        self.course.arrive(t1, observer)?;
+        self.course.arrive(t1, evaluated, observer)?;
         if switched {
             return Ok(Moved::Switched);
         }
@@ -653,7 +652,7 @@ impl<'m, P: Pair, const EVENTS: bool> Run<'m, P, EVENTS> {
         };
         interpolate::<P, F>(theta, &self.course.y, &self.dense, &mut self.at);
         std::mem::swap(&mut self.course.y, &mut self.at);
-        self.course.arrive(t0 + theta * h, observer)?;
+        self.course.arrive(t0 + theta * h, false, observer)?;
         self.course.fire(observer);
         Ok(Moved::Event)
     }

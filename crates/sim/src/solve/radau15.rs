@@ -31,7 +31,7 @@ use crate::lanes::{Avx2, Avx512};
 use crate::lanes::{MOMENTS, Plain8};
 use crate::model::{Model, Registers, SideBySide};
 use modes::{Mode, Row, modes};
-use stages::{Demand, Guess, Solved, Stages, Step};
+use stages::{Demand, Guess, Kept, Solved, Stages, Step};
 use tableau::C;
 
 const NAME: &str = "radau15";
@@ -204,6 +204,8 @@ struct Run<'m, E: Registers> {
     /// As [`TRUST`], for samples: errors of what is only looked at do not add up.
     trust: f64,
     stages: Stages<E>,
+    /// The step that is left alone while a sensor's tick within it is solved.
+    kept: Kept<E>,
     /// Slope at the start of the step, and whether the step before has told it, with the margin.
     slope: Vec<f64>,
     slope_known: bool,
@@ -250,6 +252,7 @@ impl<'m, E: Solve> Run<'m, E> {
             asked: settings.tolerance,
             trust: (0.1 * settings.tolerance / tolerance).max(TRUST),
             stages: Stages::new(model),
+            kept: Kept::new(),
             side: model.side_by_side(),
             slope: vec![0.0; size],
             slope_known: false,
@@ -486,7 +489,7 @@ impl<'m, E: Solve> Run<'m, E> {
             }
         }
         let on_edge = self.course.on_edge();
-        self.course.arrive(t1, observer)?;
+        self.course.arrive(t1, false, observer)?;
         self.stages.keep();
         (self.before_s, self.ended) = (h, end_s / h);
         if event.is_some() {
@@ -509,15 +512,16 @@ impl<'m, E: Solve> Run<'m, E> {
 
     /// Puts the state at a part of the step into `at`, by a step that ends there and of which nothing else is kept.
     fn aside(&mut self, theta: f64, h: f64) {
-        let whole = self.stages.clone();
+        self.stages.save(&mut self.kept);
         let solved = self.solve(theta * h, Some(theta), 1.0);
         if solved.converged {
             E::between(&self.stages, &self.course.y, 1.0, &mut self.at);
-        } else {
-            // Shorter than one that did converge, it hardly ever does not; the polynomial is then the best there is.
-            E::between(&whole, &self.course.y, theta, &mut self.at);
         }
-        self.stages = whole;
+        self.stages.restore(&self.kept);
+        if !solved.converged {
+            // Shorter than one that did converge, it hardly ever does not; the polynomial is then the best there is.
+            E::between(&self.stages, &self.course.y, theta, &mut self.at);
+        }
     }
 
     fn too_small(&self, step_s: f64) -> Stopped {

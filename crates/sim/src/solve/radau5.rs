@@ -495,7 +495,7 @@ impl Radau {
                 course.sample(&self.at, false, observer)?;
             }
         }
-        course.arrive(t1, observer)?;
+        course.arrive(t1, false, observer)?;
         course.stats.implicit += 1;
         self.before = Some((tried, error.max(1e-2)));
         self.dense_step_s = Some(h);

@@ -92,7 +92,6 @@ pub struct Demand {
 }
 
 /// (a_ij) seen from its eigenvectors, four real parts and four imaginary parts side by side.
-#[derive(Clone)]
 struct Eigen<E> {
     to: Columns<E>,
     from: Columns<E>,
@@ -104,7 +103,6 @@ struct Eigen<E> {
 }
 
 /// Multiplies by (1 + h d A + h² κ A²)⁻¹ − 1 of a mode, as a complex number for each eigenvalue of A.
-#[derive(Clone)]
 struct Solver<E> {
     mode: Mode,
     /// Its real parts, twice; and its imaginary parts, those that meet imaginary parts with the other sign.
@@ -113,7 +111,6 @@ struct Solver<E> {
 }
 
 /// Stages of a step and what they are computed with.
-#[derive(Clone)]
 pub struct Stages<E: Registers> {
     pub w: Workspace<Eight<E>>,
     /// States at the nodes.
@@ -147,6 +144,22 @@ pub struct Stages<E: Registers> {
     carriers_lead: bool,
     watch: Vec<(Two<E>, Two<E>)>,
     margin: E,
+}
+
+/// A solved step, while another is looked at: stages, slopes, their coefficients and the margins.
+pub struct Kept<E> {
+    all: [Vec<E>; 3],
+    margin: Option<E>,
+}
+
+impl<E> Kept<E> {
+    /// Room for nothing yet.
+    pub fn new() -> Self {
+        Self {
+            all: [Vec::new(), Vec::new(), Vec::new()],
+            margin: None,
+        }
+    }
 }
 
 #[inline(always)]
@@ -589,6 +602,24 @@ impl<E: Registers> Stages<E> {
     /// The step solved last is accepted.
     pub fn keep(&mut self) {
         std::mem::swap(&mut self.parts, &mut self.smooth);
+    }
+
+    /// Puts what is known of the step solved last into `kept`.
+    pub fn save(&self, kept: &mut Kept<E>) {
+        let from = [&self.y, &self.f, &self.parts];
+        for (to, from) in kept.all.iter_mut().zip(from) {
+            to.clone_from(from);
+        }
+        kept.margin = Some(self.margin);
+    }
+
+    /// And back.
+    pub fn restore(&mut self, kept: &Kept<E>) {
+        let to = [&mut self.y, &mut self.f, &mut self.parts];
+        for (to, from) in to.into_iter().zip(&kept.all) {
+            to.copy_from_slice(from);
+        }
+        self.margin = kept.margin.unwrap_or(self.margin);
     }
 
     /// How far the contacts are from an event at each node, N.
