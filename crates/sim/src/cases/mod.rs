@@ -90,12 +90,12 @@ impl Run {
         &self.samples[self.samples.len() - 1]
     }
 
-    /// A bound for methods that control or hardly make errors, and one for those of first order at 1 ms.
-    fn bound(&self, fine: f64, first_order: f64) -> f64 {
-        if self.method.order > 1 {
+    /// A bound for methods that control or hardly make errors, and one for those of low order at 1 ms.
+    fn bound(&self, fine: f64, low_order: f64) -> f64 {
+        if table::precise(self.method) {
             fine
         } else {
-            first_order
+            low_order
         }
     }
 }

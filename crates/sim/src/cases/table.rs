@@ -16,8 +16,8 @@ fn adaptive(m: &Method) -> bool {
     m.adaptive
 }
 /// Beside the adaptive ones the fixed steps that are small and of high order.
-fn precise(m: &Method) -> bool {
-    m.order > 1
+pub(super) fn precise(m: &Method) -> bool {
+    m.order > 3
 }
 /// Those that locate contact events: only they keep the books of a contact that opens and closes to 1e-8. Their blind twins are
 /// there to show what that buys.

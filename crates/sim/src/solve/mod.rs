@@ -1,6 +1,7 @@
 //! Integration methods: one file each, and one line each in [`METHODS`].
 
 pub mod abreast;
+mod adams3;
 mod auto;
 mod course;
 mod dop853;
@@ -248,6 +249,14 @@ pub const METHODS: &[Method] = &[
         adaptive: false,
         locates: false,
         run: fixed::run::<rk4::Rk4>,
+    },
+    Method {
+        name: "adams3",
+        about: "three-step Adams, one evaluation a step, fixed step: cheapest where a percent is enough",
+        order: 3,
+        adaptive: false,
+        locates: false,
+        run: fixed::run::<adams3::Adams3>,
     },
     Method {
         name: "semi-implicit-euler",
