@@ -126,7 +126,7 @@ pub(crate) trait Coordinates: Send + Sync {
     fn rates_at<N: Moments>(&self, y: &[N::Each], w: &Workspace<N>, dy: &mut [N::Each]);
 }
 
-/// [`Freedoms::gaps`] and [`Freedoms::accelerate`] by [fused arithmetic](crate::lanes::Fused), and at eight moments for each kind of registers: see
+/// [`Freedoms::gaps`] and [`Freedoms::accelerate`] by fused arithmetic ([`crate::lanes`]), and at eight moments for each kind of registers: see
 /// [`crate::model::OnEight`].
 #[allow(missing_docs)]
 pub trait FreedomsOnEight {

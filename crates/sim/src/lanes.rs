@@ -2,6 +2,9 @@
 //!
 //! Carrier i sits in lane i mod 2 of pair i / 2. With an odd number of carriers the last lane is padding: its
 //! parameters are zero, so that it exerts nothing.
+//!
+//! Every processor can do what is written for [`Now`]. One that has FMA and AVX2 does the same by fused arithmetic, with one instruction and one
+//! rounding where there are two, so that results differ between the two by rounding alone; several moments at once are [`Eight`].
 
 mod eight;
 #[cfg(target_arch = "x86_64")]
@@ -73,7 +76,8 @@ const ROUND: f64 = 6_755_399_441_055_744.0;
 /// Sine and cosine of both lanes, to 1 ulp of 1 or better (the test holds it to 2⁻⁵²).
 ///
 /// ```text
-/// x = n·π/2 + r,  |r| ≤ π/4;   n from adding 1.5·2⁵², r by subtracting π/2 in three parts of 31, 31 and 53 bits
+/// x = n·π/2 + r,  |r| ≤ π/4;   n from adding 1.5·2⁵², r by subtracting π/2 in three parts of 31, 31 and 53 bits, or in two of 53 where
+///                              products are not rounded
 /// ```
 /// Polynomials are those of Cephes (Moshier 1989), as in Fog's vector class library. Valid for every number; beyond 4·10⁶ rad
 /// libm does it, and what is not finite gives NaN. Source of the reduction: Cody & Waite (1980).

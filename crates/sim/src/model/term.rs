@@ -9,7 +9,7 @@ use crate::lanes::{Eight, Moments, Plain8};
 pub trait Term: Send + Sync {
     /// Adds its part to the workspace at time `t_s`.
     fn apply(&self, t_s: f64, w: &mut Workspace);
-    /// The same by [`Fused`] arithmetic, if it is written for that.
+    /// The same by fused arithmetic ([`crate::lanes`]), if it is written for that.
     ///
     /// # Safety
     /// The processor has AVX2 and FMA.
@@ -174,7 +174,7 @@ pub struct Power<T = f64> {
 pub trait Account: Send + Sync {
     /// Power at the evaluated state, of `pairs` alone: those from the pair numbered `first` on.
     fn power(&self, w: &Workspace, pairs: &[Pair], first: usize) -> Power;
-    /// The same of all pairs by [`Fused`] arithmetic, if it is written for that.
+    /// The same of all pairs by fused arithmetic, if it is written for that.
     ///
     /// # Safety
     /// The processor has AVX2 and FMA.

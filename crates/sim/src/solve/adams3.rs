@@ -5,8 +5,8 @@
 //! ```
 //! Third order where nothing is damped fast, second elsewhere: the formula of order 3 is stable up to hλ = 6/11, that of order 2 up to hλ = 1, and a
 //! velocity that is forgotten so soon adds up no errors. λ is what contacts, holds and straps make ([`Model::damping_per_s`](crate::model::Model::damping_per_s)),
-//! asked at the start of a segment and every 64 steps. A segment begins with a step of the midpoint rule. For scenes where a per cent is
-//! enough: no method of its order costs less. Source: Hairer, Nørsett, Wanner, Solving ODEs I (1993), III.1 and III.3.
+//! asked at the start of a segment and every 64 steps. A segment begins with a step of the midpoint rule. For scenes where a percent is
+//! enough and few moments interrupt: one evaluation a step is the least there can be. Source: Hairer, Nørsett, Wanner, Solving ODEs I (1993), III.1 and III.3.
 
 use super::course::Course;
 use super::fixed::Step;

@@ -11,9 +11,10 @@ use kuva::render::render::render_multiple;
 use sim::accuracy::{Rung, Study};
 use std::sync::Arc;
 
-/// Okabe and Ito's colours, which the colour-blind can tell apart, and a brown; one for each family of methods.
-const COLOURS: [&str; 8] = [
+/// Okabe and Ito's colours, which the colour-blind can tell apart, a brown and a violet; one for each family of methods.
+const COLOURS: [&str; 9] = [
     "#000000", "#0072B2", "#D55E00", "#009E73", "#E69F00", "#CC79A7", "#56B4E9", "#8C564B",
+    "#5D3A9B",
 ];
 /// A method whose name ends so is its family's without located events.
 const BLIND: &str = "-blind";
