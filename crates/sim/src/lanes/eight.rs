@@ -73,6 +73,7 @@ macro_rules! derived {
         }
     };
 }
+pub(super) use derived;
 derived!(Plain8);
 
 macro_rules! plain {

@@ -6,6 +6,7 @@
 //! (`crate::model::Model`).
 #![allow(unsafe_code)]
 
+use super::eight::derived;
 use super::{Moments, Number, Pairwise, f64x2, sin_cos_by};
 use std::arch::x86_64::{__m128d, _mm_fmadd_pd};
 use std::ops::{Add, AddAssign, Div, Mul, Neg, Sub, SubAssign};
@@ -42,54 +43,19 @@ impl FusedEach {
 pub struct FusedPair(pub f64x2);
 
 macro_rules! arithmetic {
-    ($type:ident, $inner:ident) => {
-        arithmetic!($type: Add add, Sub sub, Mul mul, Div div);
-        impl Neg for $type {
-            type Output = Self;
-            #[inline(always)]
-            fn neg(self) -> Self {
-                $type(-self.0)
-            }
-        }
-        impl AddAssign for $type {
-            #[inline(always)]
-            fn add_assign(&mut self, other: Self) {
-                *self = *self + other;
-            }
-        }
-        impl SubAssign for $type {
-            #[inline(always)]
-            fn sub_assign(&mut self, other: Self) {
-                *self = *self - other;
-            }
-        }
-        impl Mul<f64> for $type {
-            type Output = Self;
-            #[inline(always)]
-            fn mul(self, by: f64) -> Self {
-                self * Self::splat(by)
-            }
-        }
-        impl Add<f64> for $type {
-            type Output = Self;
-            #[inline(always)]
-            fn add(self, other: f64) -> Self {
-                self + Self::splat(other)
-            }
-        }
-    };
-    ($type:ident: $($trait:ident $op:ident),*) => {$(
-        impl $trait for $type {
+    ($type:ident: $($trait:ident $op:ident),*) => {
+        derived!($type);
+        $(impl $trait for $type {
             type Output = Self;
             #[inline(always)]
             fn $op(self, other: Self) -> Self {
                 $type($trait::$op(self.0, other.0))
             }
-        }
-    )*};
+        })*
+    };
 }
-arithmetic!(FusedEach, f64);
-arithmetic!(FusedPair, f64x2);
+arithmetic!(FusedEach: Add add, Sub sub, Mul mul, Div div);
+arithmetic!(FusedPair: Add add, Sub sub, Mul mul, Div div);
 
 #[inline(always)]
 fn madd(a: f64x2, b: f64x2, c: f64x2) -> f64x2 {
