@@ -127,11 +127,7 @@ fn sin_cos_by<P: Pairwise>(x: f64x2) -> (f64x2, f64x2) {
     let quadrant: i64x2 = cast(shifted);
     let n = splat(ROUND) - shifted;
     let mut r = x;
-    for part in if P::ONE_ROUNDING {
-        &WHOLE[..]
-    } else {
-        &HALF_PI[..]
-    } {
+    for part in half_pi(P::ONE_ROUNDING) {
         r = madd::<P>(n, *part, r);
     }
     let z = r * r;
@@ -173,6 +169,11 @@ const HALF_PI: [f64x2; 3] = both([
 ]);
 /// π/2 in two parts, for products that are not rounded before they are added: n times the first is then exact however many bits it has.
 const WHOLE: [f64x2; 2] = both([std::f64::consts::FRAC_PI_2, 6.123_233_995_736_766e-17]);
+/// The parts of π/2 for products that are rounded before they are added, or not.
+#[inline(always)]
+fn half_pi(one_rounding: bool) -> &'static [f64x2] {
+    if one_rounding { &WHOLE } else { &HALF_PI }
+}
 const SIN: [f64x2; 6] = both([
     1.589_623_015_765_465_6e-10,
     -2.505_074_776_285_780_7e-8,

@@ -146,7 +146,8 @@ impl Coulomb {
             most.madd(rate[1] * self.per_velocity, hold[1]),
         ];
         let tiny = T::splat(f64::MIN_POSITIVE);
-        let length = (wanted[0].madd(wanted[0], wanted[1].madd(wanted[1], most * most)))
+        let length = wanted[0]
+            .madd(wanted[0], wanted[1].madd(wanted[1], most * most))
             .larger(tiny)
             .sqrt();
         let kept = most / length;

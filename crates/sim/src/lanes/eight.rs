@@ -137,16 +137,12 @@ fn poly<E: Wide>(c: &[super::f64x2; 6], z: E, z2: E) -> E {
 /// As [`super::sin_cos`], eight at a time.
 #[inline(always)]
 fn sin_cos<E: Wide>(x: E) -> (E, E) {
-    use super::{COS, FAR_RAD, HALF_PI, ROUND, SIN, WHOLE};
+    use super::{COS, FAR_RAD, ROUND, SIN, half_pi};
     let splat = E::splat;
     let shifted = x.madd(splat(std::f64::consts::FRAC_2_PI), splat(ROUND));
     let n = splat(ROUND) - shifted;
     let mut r = x;
-    for part in if E::ONE_ROUNDING {
-        &WHOLE[..]
-    } else {
-        &HALF_PI[..]
-    } {
+    for part in half_pi(E::ONE_ROUNDING) {
         r = n.madd(of_both(part), r);
     }
     let z = r * r;

@@ -149,15 +149,15 @@ pub struct Stages<E: Registers> {
 /// A solved step, while another is looked at: stages, slopes, their coefficients and the margins.
 pub struct Kept<E> {
     all: [Vec<E>; 3],
-    margin: Option<E>,
+    margin: E,
 }
 
-impl<E> Kept<E> {
+impl<E: Registers> Kept<E> {
     /// Room for nothing yet.
     pub fn new() -> Self {
         Self {
             all: [Vec::new(), Vec::new(), Vec::new()],
-            margin: None,
+            margin: E::splat(0.0),
         }
     }
 }
@@ -610,7 +610,7 @@ impl<E: Registers> Stages<E> {
         for (to, from) in kept.all.iter_mut().zip(from) {
             to.clone_from(from);
         }
-        kept.margin = Some(self.margin);
+        kept.margin = self.margin;
     }
 
     /// And back.
@@ -619,7 +619,7 @@ impl<E: Registers> Stages<E> {
         for (to, from) in to.into_iter().zip(&kept.all) {
             to.copy_from_slice(from);
         }
-        self.margin = kept.margin.unwrap_or(self.margin);
+        self.margin = kept.margin;
     }
 
     /// How far the contacts are from an event at each node, N.
