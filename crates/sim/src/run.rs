@@ -9,7 +9,8 @@ use crate::solve::{
     Event, METHODS, Method, Observer, Settings, Stats, Stopped, abreast, method, resolve,
 };
 
-/// Everything that is logged at one moment. Carriers and handles in the order of the scene.
+/// Everything that is logged at one moment. Carriers and handles in the order of the scene; from `normal_n` to `handle_m` empty for a listener
+/// that does not look at forces.
 #[derive(Clone, Debug)]
 pub struct Sample {
     /// s
@@ -50,6 +51,10 @@ impl Sample {
 
 /// Who receives samples and events.
 pub trait Listener {
+    /// Whether samples must tell of handles and the forces there, which cost an evaluation each. Asked once, at the start.
+    fn looks_at_forces(&self) -> bool {
+        true
+    }
     /// Called at every log time. Returning `false` stops the run.
     fn sample(&mut self, sample: &Sample) -> bool;
     /// Called with every sample of every virtual sensor.
@@ -155,6 +160,7 @@ struct Bridge<'a> {
     model: &'a Model,
     listener: &'a mut dyn Listener,
     sample: Sample,
+    looks_at_forces: bool,
     at_start_j: Option<f64>,
     belief: Belief,
     /// Energy from nowhere and energy supplied, J, once the first was more.
@@ -169,10 +175,12 @@ impl<'a> Bridge<'a> {
         settings: &Settings,
         listener: &'a mut dyn Listener,
     ) -> Self {
+        let looks_at_forces = listener.looks_at_forces();
         Self {
             model,
             listener,
-            sample: blank(model),
+            sample: blank(model, looks_at_forces),
+            looks_at_forces,
             at_start_j: None,
             belief: Belief::new(&model.scene, method, settings),
             betrayed: None,
@@ -181,8 +189,8 @@ impl<'a> Bridge<'a> {
     }
 }
 
-fn blank(model: &Model) -> Sample {
-    let n = model.carriers();
+fn blank(model: &Model, forces: bool) -> Sample {
+    let n = if forces { model.carriers() } else { 0 };
     Sample {
         t_s: 0.0,
         pose: Pose {
@@ -203,6 +211,10 @@ fn blank(model: &Model) -> Sample {
 }
 
 impl Observer for Bridge<'_> {
+    fn looks_at_forces(&self) -> bool {
+        self.looks_at_forces || self.model.scene.solver.energy
+    }
+
     fn sample(&mut self, t_s: f64, y: &[f64], w: &Workspace) -> bool {
         let (model, s) = (self.model, &mut self.sample);
         let walk = model.scene.carriers.walk_m_per_s;
@@ -215,7 +227,7 @@ impl Observer for Bridge<'_> {
             .filter(|b| b.sounds(t_s))
             .map(|b| b.phase_at(t_s));
         let walked = walk.map(|v| v * t_s);
-        for i in 0..model.carriers() {
+        for i in 0..s.normal_n.len() {
             s.normal_n[i] = w.of(i, |p| p.normal);
             s.tangential_n[i] = [0, 1].map(|a| w.of(i, |p| p.tangential[a]));
             s.compression_m[i] = w.of(i, |p| p.gap[2]);
@@ -250,5 +262,47 @@ impl Observer for Bridge<'_> {
 
     fn ended(&mut self, stats: &Stats, outcome: &Result<(), Stopped>) {
         self.listener.ended(stats, outcome);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::scene::load;
+
+    /// Poses alone, or with forces.
+    struct Seen(bool, Vec<Sample>);
+
+    impl Listener for Seen {
+        fn looks_at_forces(&self) -> bool {
+            self.0
+        }
+        fn sample(&mut self, sample: &Sample) -> bool {
+            self.1.push(sample.clone());
+            true
+        }
+    }
+
+    #[test]
+    fn who_does_not_look_at_forces_sees_the_same_motion_for_less() {
+        let brief = ["duration_s=7.0", "solver.energy=false"].map(str::to_owned);
+        let scene = load("music", &brief).unwrap_or_else(|e| panic!("{e}"));
+        let model = Model::new(&scene);
+        for method in METHODS {
+            let run = |looks: bool| {
+                let mut seen = Seen(looks, Vec::new());
+                let (stats, outcome) = run_model(&model, method, &settings(&scene), &mut seen);
+                assert_eq!(outcome, Ok(()), "{}", method.name);
+                (seen.1, stats.evaluations)
+            };
+            let ((with, more), (without, less)) = (run(true), run(false));
+            assert_eq!(with.len(), without.len());
+            for (a, b) in with.iter().zip(&without) {
+                assert_eq!((a.pose, &a.phase_rad), (b.pose, &b.phase_rad));
+                assert!(!a.normal_n.is_empty() && b.normal_n.is_empty() && b.handle_m.is_empty());
+            }
+            assert!(less <= more, "{}: {less} {more}", method.name);
+            assert!(!method.locates || less < more, "{}", method.name);
+        }
     }
 }

@@ -118,10 +118,14 @@ const CLAMPED_S: f64 = 2.0 * CHATTER_S;
 const LONGEST_CLAMPED_S: f64 = 1e-5;
 const BACK_AT_ONCE: f64 = 32.0;
 
-/// Whether every number is one; without a branch for each.
+/// Whether every number is at most `most` in size; false for what is not a number. Without a branch for each.
 #[inline(always)]
-pub fn all_finite(y: &[f64]) -> bool {
-    y.iter().fold(true, |ok, x| ok & x.is_finite())
+fn within(y: &[f64], most: f64) -> bool {
+    let (pairs, odd) = y.as_chunks();
+    let limit = f64x2::splat(most);
+    let sound = |ok: f64x2, x: &[f64; LANES]| ok & f64x2::new(*x).abs().simd_le(limit);
+    let all = pairs.iter().fold(f64x2::ZERO.simd_le(limit), sound);
+    odd.iter().fold(all.all(), |ok, x| ok & (x.abs() <= most))
 }
 
 impl<'m> Course<'m> {
@@ -218,18 +222,19 @@ impl<'m> Course<'m> {
             observer.tick(who - 1, tick, t_s, y, &mut self.w);
             return Ok(false);
         }
-        if !evaluated {
+        let forces = evaluated || observer.looks_at_forces();
+        if forces && !evaluated {
             self.model.forces(t_s, y, &mut self.w);
             self.stats.evaluations += 1;
         }
         // Within a rounding of an opening, N = N* can be a hair below zero.
-        if self.model.watches_contact() {
+        if forces && self.model.watches_contact() {
             for p in &mut self.w.pair {
                 p.normal = p.normal.fast_max(f64x2::ZERO);
             }
         }
         if observer.sample(t_s, y, &self.w) {
-            Ok(true)
+            Ok(forces)
         } else {
             Err(Stopped::ByObserver { t_s })
         }
@@ -323,17 +328,44 @@ impl<'m> Course<'m> {
         evaluated: bool,
         observer: &mut dyn Observer,
     ) -> Result<(), Stopped> {
-        self.t_s = t_s;
-        self.stats.steps += 1;
         self.model.freedoms().project(&mut self.y);
-        if !all_finite(&self.y) {
-            let bad = self.y.iter().position(|x| !x.is_finite()).unwrap_or(0);
-            return Err(Stopped::NotFinite {
+        self.check(t_s, &self.y, f64::MAX)?;
+        self.arrive_checked(t_s, evaluated, observer)
+    }
+
+    /// Whether all numbers of a state are finite, and those of the body at most `most`.
+    #[inline]
+    pub fn check(&self, t_s: f64, y: &[f64], most: f64) -> Result<(), Stopped> {
+        if within(y, most) {
+            Ok(())
+        } else {
+            self.check_each(t_s, y, most)
+        }
+    }
+
+    #[cold]
+    fn check_each(&self, t_s: f64, y: &[f64], most: f64) -> Result<(), Stopped> {
+        let body = &y[..self.model.layout().body];
+        let bad = y.iter().position(|x| !x.is_finite());
+        match bad.or_else(|| body.iter().position(|x| x.abs() > most)) {
+            None => Ok(()),
+            Some(bad) => Err(Stopped::NotFinite {
                 method: self.method,
                 t_s,
                 state: self.model.state_names().swap_remove(bad),
-            });
+            }),
         }
+    }
+
+    /// As [`Self::arrive`], at a state on its manifold that has been checked.
+    pub fn arrive_checked(
+        &mut self,
+        t_s: f64,
+        evaluated: bool,
+        observer: &mut dyn Observer,
+    ) -> Result<(), Stopped> {
+        self.t_s = t_s;
+        self.stats.steps += 1;
         self.check_work()?;
         if !self.locate {
             self.note_unlocated(evaluated, observer);
@@ -512,6 +544,15 @@ impl<'m> Course<'m> {
             self.model.forces(self.t_s, &self.y, &mut self.w);
         }
         self.fresh = true;
+        let mut changed = false;
+        for (touching, p) in self.touching.chunks(LANES).zip(&self.w.pair) {
+            for (touched, normal_n) in touching.iter().zip(p.normal.as_array()) {
+                changed |= *touched != (*normal_n > 0.0);
+            }
+        }
+        if !changed {
+            return;
+        }
         for i in 0..self.touching.len() {
             let now = self.w.of(i, |p| p.normal) > 0.0;
             if now != self.touching[i] {
@@ -526,9 +567,5 @@ impl<'m> Course<'m> {
                 );
             }
         }
-    }
-
-    pub fn method(&self) -> &'static str {
-        self.method
     }
 }

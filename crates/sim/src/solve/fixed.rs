@@ -3,9 +3,12 @@
 //! Steps are of `step_s`, shortened evenly where a moment (noise grid, onset, end) must be met. Samples between steps come
 //! from the cubic through both ends and their slopes, which is of fourth order.
 
-use super::course::{Course, SAME_MOMENT_S, all_finite};
+use super::course::{Course, SAME_MOMENT_S};
 use super::{Observer, Settings, Stats, Stopped};
 use crate::model::Model;
+
+/// Beyond this the body has blown up, whatever the scene: a step too large for its method.
+const BLOWN_UP: f64 = 1e12;
 
 /// One step of a fixed-step method.
 pub trait Step {
@@ -65,46 +68,22 @@ fn integrate<S: Step>(
                 while let Some(t) = course.sample_due(t1 - 2.0 * SAME_MOMENT_S) {
                     hermite((t - t0) / h, h, &course.y, &f0, &y1, &f1, &mut at);
                     course.model.freedoms().project(&mut at);
-                    finite(course, t, &at)?;
+                    course.check(t, &at, BLOWN_UP)?;
                     course.sample(&at, false, observer)?;
                 }
             }
             // Here and not only on arrival, so that forces that a sample asked for are those of the next step to the last bit.
             course.model.freedoms().project(&mut y1);
-            finite(course, t1, &y1)?;
+            course.check(t1, &y1, BLOWN_UP)?;
             let mut evaluated = false;
             while course.sample_due(t1).is_some() {
                 evaluated = course.sample(&y1, evaluated, observer)?;
             }
             std::mem::swap(&mut course.y, &mut y1);
-            course.arrive(t1, evaluated, observer)?;
+            course.arrive_checked(t1, evaluated, observer)?;
         }
     }
     Ok(())
-}
-
-/// Beyond this a state has blown up, whatever the scene: a step too large for its method.
-const BLOWN_UP: f64 = 1e12;
-
-fn finite(course: &Course, t_s: f64, y: &[f64]) -> Result<(), Stopped> {
-    let body = course.model.layout().body;
-    // Without a branch for each.
-    let sound = |ok: bool, x: &f64| ok & (x.abs() <= BLOWN_UP);
-    if y[..body].iter().fold(true, sound) && all_finite(&y[body..]) {
-        return Ok(());
-    }
-    match y
-        .iter()
-        .enumerate()
-        .position(|(d, x)| !x.is_finite() || (d < body && x.abs() > BLOWN_UP))
-    {
-        None => Ok(()),
-        Some(bad) => Err(Stopped::NotFinite {
-            method: course.method(),
-            t_s,
-            state: course.model.state_names().swap_remove(bad),
-        }),
-    }
 }
 
 /// The cubic with the given ends and slopes.

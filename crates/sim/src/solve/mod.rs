@@ -35,7 +35,11 @@ pub struct Settings {
 
 /// Who watches a run.
 pub trait Observer {
-    /// A sample at a log time; `w` holds the forces there. Returning `false` stops the run.
+    /// Whether samples must come with forces, which cost an evaluation each.
+    fn looks_at_forces(&self) -> bool {
+        true
+    }
+    /// A sample at a log time; `w` holds the forces there, if [`Self::looks_at_forces`]. Returning `false` stops the run.
     fn sample(&mut self, t_s: f64, y: &[f64], w: &Workspace) -> bool;
     /// A tick of one of [`Model::sensor_clocks`]. `w` may be evaluated anew; the next step does not read it.
     fn tick(&mut self, _clock: usize, _tick: u64, _t_s: f64, _y: &[f64], _w: &mut Workspace) {}
