@@ -1,7 +1,7 @@
 //! Integration methods: one file each, and one line each in [`METHODS`].
 
 pub mod abreast;
-mod adams3;
+mod adams4;
 mod auto;
 mod course;
 mod dop853;
@@ -255,12 +255,12 @@ pub const METHODS: &[Method] = &[
         run: fixed::run::<rk4::Rk4>,
     },
     Method {
-        name: "adams3",
-        about: "three-step Adams, one evaluation a step, fixed step: cheapest where a percent is enough",
-        order: 3,
+        name: "adams4",
+        about: "four-step Adams with exact damping, one evaluation a fixed step: cheapest where a percent is enough",
+        order: 4,
         adaptive: false,
         locates: false,
-        run: fixed::run::<adams3::Adams3>,
+        run: fixed::run::<adams4::Adams4>,
     },
     Method {
         name: "semi-implicit-euler",
