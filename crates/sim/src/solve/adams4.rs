@@ -97,11 +97,18 @@ impl Adams4 {
         }
         self.step_s = h;
         self.damping_per_s.clone_from(now);
+        let of = |rate_per_s: f64| {
+            let known = [ORDER - 1, ORDER].map(|known| weights(h, rate_per_s, known));
+            (First::new(h, rate_per_s), known)
+        };
+        // Most states are not damped, and weigh alike.
+        let undamped = of(0.0);
         for (d, first) in self.first.iter_mut().enumerate() {
             let rate_per_s = now.get(d).copied().unwrap_or(0.0);
-            *first = First::new(h, rate_per_s);
-            for (all, known) in self.weights.iter_mut().zip(ORDER - 1..) {
-                let weights = weights(h, rate_per_s, known);
+            let damped = (rate_per_s > 0.0).then(|| of(rate_per_s));
+            let weights;
+            (*first, weights) = damped.unwrap_or(undamped);
+            for (all, weights) in self.weights.iter_mut().zip(weights) {
                 for (to, weight) in all[d / LANES].iter_mut().zip(weights) {
                     to.as_mut_array()[d % LANES] = weight;
                 }
