@@ -1,6 +1,6 @@
 #!/bin/sh
 # Makes what docs/accuracy.md shows: a table and a figure for each scene, the hard cases, the wild scenes. From the workspace's root;
-# about ten minutes on two quiet cores.
+# about fifteen minutes on two quiet cores.
 #   docs/accuracy/make.sh            everything
 #   docs/accuracy/make.sh music      one scene
 set -eu
