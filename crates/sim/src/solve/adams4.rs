@@ -68,7 +68,7 @@ pub struct Adams4 {
     first: Vec<First>,
     /// Where three N are known, and where four are.
     weights: [Vec<Weights>; 2],
-    /// Of which step size and which λ: of the body's velocities, 1/s, behind zeros for its positions.
+    /// Of which step size, none at first, and which λ: of the body's velocities, 1/s, behind zeros for its positions.
     step_s: f64,
     damping_per_s: Vec<f64>,
     /// λ as it stood at the last look, and how many steps ago that was.
@@ -87,7 +87,7 @@ impl Adams4 {
     #[cold]
     fn look(&mut self, course: &Course, h: f64) -> bool {
         self.looked = 0;
-        let same = !self.damping_per_s.is_empty() && self.same(h);
+        let same = self.same(h);
         let (model, now) = (course.model, &mut self.now_per_s);
         now.resize(model.layout().body, 0.0);
         model.damping_per_s(&course.y, &course.w, now);
@@ -186,7 +186,8 @@ impl Step for Adams4 {
         if self.steps < FIRST {
             self.begin(course, h, f0, out);
         }
-        self.steps += 1;
+        // A segment may have more steps than can be counted; only its first ones have to be.
+        self.steps = self.steps.saturating_add(1);
         self.looked += 1;
     }
 }
