@@ -7,7 +7,7 @@
 /// Margins seen at the start and the stages of one step.
 #[derive(Clone)]
 pub struct Looks {
-    seen: [(f64, f64); MOST],
+    seen: [Look; MOST],
     count: usize,
     least: f64,
     most: f64,
@@ -16,7 +16,11 @@ pub struct Looks {
     spoilt: bool,
 }
 
+/// A part of the step, and the margin there, N.
+type Look = (f64, f64);
+
 const MOST: usize = 16;
+const NO_LOOKS: [Look; MOST] = [(0.0, 0.0); MOST];
 /// A least margin above this part of the largest hides no zero between two looks.
 const NEAR: f64 = 0.5;
 /// So far a parabola through three looks may be wrong about how low a dip goes, in parts of the dip.
@@ -25,7 +29,7 @@ const DOUBT: f64 = 0.3;
 impl Looks {
     pub fn new() -> Self {
         Self {
-            seen: [(0.0, 0.0); MOST],
+            seen: NO_LOOKS,
             count: 0,
             least: f64::INFINITY,
             most: 0.0,
@@ -74,17 +78,19 @@ impl Looks {
 
     /// Whether a low margin lies between two higher ones.
     fn dips(&self) -> bool {
-        let (seen, n) = self.sorted();
-        (0..n).any(|i| dip(&seen[..n], i).is_some())
+        let mut room = NO_LOOKS;
+        let seen = self.sorted(&mut room);
+        (0..seen.len()).any(|i| dip(seen, i).is_some())
     }
 
     /// Between which looks the margin falls below zero, unless it may have done so before: for looks that are nearly as true as the margins
     /// which [`where_alike`] then asks for.
     pub fn crossing(&self) -> Option<[(f64, f64); 2]> {
-        let (seen, n) = self.sorted();
-        let beyond = seen[..n].iter().position(|s| s.1 < 0.0)?;
+        let mut room = NO_LOOKS;
+        let seen = self.sorted(&mut room);
+        let beyond = seen.iter().position(|s| s.1 < 0.0)?;
         // A start on a zero may be a hair off it, and so may the first look be.
-        let clear = beyond > 1 && (0..beyond).all(|i| dip(&seen[..n], i).is_none());
+        let clear = beyond > 1 && (0..beyond).all(|i| dip(seen, i).is_none());
         clear.then(|| [seen[beyond - 1], seen[beyond]])
     }
 
@@ -97,38 +103,50 @@ impl Looks {
         self.spoilt
     }
 
-    /// In the order of their times; of two at one time, the one noted last, which is the more accurate.
-    fn sorted(&self) -> ([(f64, f64); MOST], usize) {
+    /// In the order of their times; of two at one time, the one noted last, which is the more accurate. `room`: where to sort them.
+    #[inline]
+    fn sorted<'a>(&'a self, room: &'a mut [Look; MOST]) -> &'a [Look] {
         if self.ordered && self.count <= MOST {
-            return (self.seen, self.count);
+            return &self.seen[..self.count];
         }
-        let (mut seen, mut n) = (self.seen, 0);
+        let mut n = 0;
         for &look in &self.seen[..self.count.min(MOST)] {
-            let at = seen[..n].partition_point(|s| s.0 < look.0);
-            if at == n || seen[at].0 > look.0 {
-                seen.copy_within(at..n, at + 1);
+            let at = room[..n].partition_point(|s| s.0 < look.0);
+            if at == n || room[at].0 > look.0 {
+                room.copy_within(at..n, at + 1);
                 n += 1;
             }
-            seen[at] = look;
+            room[at] = look;
         }
-        (seen, n)
+        &room[..n]
     }
 }
 
 /// The neighbourhood of look `i` if a dip there may reach zero, as (left, lowest, right): around a look between two higher ones, or
 /// at the step's border towards which the margin falls and rises again.
-fn dip(seen: &[(f64, f64)], i: usize) -> Option<[f64; 3]> {
+#[inline]
+fn dip(seen: &[Look], i: usize) -> Option<[f64; 3]> {
     let last = seen.len().checked_sub(1).filter(|&last| last >= 2)?;
+    let low = seen[i].1;
+    let falls = i == 0 || low <= seen[i - 1].1;
+    let rises = i == last || low <= seen[i + 1].1;
+    if falls && rises {
+        dip_around(seen, i)
+    } else {
+        None
+    }
+}
+
+fn dip_around(seen: &[Look], i: usize) -> Option<[f64; 3]> {
+    let last = seen.len() - 1;
     let middle = i.clamp(1, last - 1);
     let [l, m, r] = [seen[middle - 1], seen[middle], seen[middle + 1]];
-    let (from, to) = if i == 0 && l.1 <= m.1 {
+    let (from, to) = if i == 0 {
         (l.0, m.0)
-    } else if i == last && r.1 <= m.1 {
+    } else if i == last {
         (m.0, r.0)
-    } else if i == middle && m.1 <= l.1 && m.1 <= r.1 {
-        (l.0, r.0)
     } else {
-        return None;
+        (l.0, r.0)
     };
     let (at, margin) = lowest(l, m, r)?;
     // The parabola is right to a part of the dip's own depth.
@@ -139,8 +157,8 @@ fn dip(seen: &[(f64, f64)], i: usize) -> Option<[f64; 3]> {
 /// The first zero of `margin` on (0, 1], to `resolution`. The looks say where to search; their states are less accurate than those
 /// that `margin` sees (the first ones are of first order), so both ends of a bracket are looked at again.
 pub fn first(looks: &Looks, resolution: f64, mut margin: impl FnMut(f64) -> f64) -> Option<f64> {
-    let (seen, n) = looks.sorted();
-    let seen = &seen[..n];
+    let mut room = NO_LOOKS;
+    let seen = looks.sorted(&mut room);
     for (i, &(theta, value)) in seen.iter().enumerate() {
         let beyond = if value < 0.0 {
             let b = (theta, margin(theta));
