@@ -18,8 +18,14 @@ pub trait Wide: Number {
     fn as_mut_array(&mut self) -> &mut [f64; MOMENTS];
     /// The last four before the first four.
     fn swapped(self) -> Self;
+    /// The first of each, the second of each, and so on.
+    fn transposed(of: [Self; MOMENTS]) -> [Self; MOMENTS];
     /// The sum of each.
-    fn sums(of: [Self; MOMENTS]) -> Self;
+    #[inline(always)]
+    fn sums(of: [Self; MOMENTS]) -> Self {
+        let [a, b, c, d, e, f, g, h] = Self::transposed(of);
+        ((a + b) + (c + d)) + ((e + f) + (g + h))
+    }
     /// The bits of 2^n for a whole number n within ±1022 that 1.5·2⁵² has been added to.
     #[doc(hidden)]
     fn power_of_two(shifted: Self) -> Self;
@@ -239,11 +245,8 @@ impl Wide for Plain8 {
         Plain8(std::array::from_fn(|l| self.0[(l + 4) % MOMENTS]))
     }
     #[inline(always)]
-    fn sums(of: [Self; MOMENTS]) -> Self {
-        Plain8(std::array::from_fn(|k| {
-            let x = of[k].0;
-            ((x[0] + x[1]) + (x[2] + x[3])) + ((x[4] + x[5]) + (x[6] + x[7]))
-        }))
+    fn transposed(of: [Self; MOMENTS]) -> [Self; MOMENTS] {
+        std::array::from_fn(|k| Plain8(std::array::from_fn(|l| of[l].0[k])))
     }
     #[inline(always)]
     fn power_of_two(shifted: Self) -> Self {
@@ -376,28 +379,35 @@ mod x86 {
             Avx512(unsafe { _mm512_shuffle_f64x2::<0b01_00_11_10>(self.0, self.0) })
         }
         #[inline(always)]
-        fn sums(of: [Self; MOMENTS]) -> Self {
-            // A closure would be a call.
+        fn transposed(of: [Self; MOMENTS]) -> [Self; MOMENTS] {
+            // Quarters 0 and 2 of each, and 1 and 3. A closure would be a call.
             #[inline(always)]
-            fn pairs(a: Avx512, b: Avx512) -> __m512d {
+            fn quarters(a: __m512d, b: __m512d) -> [__m512d; 2] {
                 unsafe {
-                    let (even, odd) = (_mm512_unpacklo_pd(a.0, b.0), _mm512_unpackhi_pd(a.0, b.0));
-                    _mm512_add_pd(even, odd)
+                    [
+                        _mm512_shuffle_f64x2::<0x88>(a, b),
+                        _mm512_shuffle_f64x2::<0xdd>(a, b),
+                    ]
                 }
             }
-            // Of quarters, which the first of two has before the second's; then of halves.
             #[inline(always)]
-            fn neighbours(a: __m512d, b: __m512d) -> __m512d {
-                unsafe {
-                    let even = _mm512_shuffle_f64x2::<0x88>(a, b);
-                    let odd = _mm512_shuffle_f64x2::<0xdd>(a, b);
-                    _mm512_add_pd(even, odd)
-                }
+            fn four(a: Avx512, b: Avx512, c: Avx512, d: Avx512) -> [__m512d; 4] {
+                let (even, odd) = unsafe {
+                    (
+                        quarters(_mm512_unpacklo_pd(a.0, b.0), _mm512_unpacklo_pd(c.0, d.0)),
+                        quarters(_mm512_unpackhi_pd(a.0, b.0), _mm512_unpackhi_pd(c.0, d.0)),
+                    )
+                };
+                // Numbers 0 and 4, 1 and 5, 2 and 6, 3 and 7.
+                [even[0], odd[0], even[1], odd[1]]
             }
             let [a, b, c, d, e, f, g, h] = of;
-            let left = neighbours(pairs(a, b), pairs(c, d));
-            let right = neighbours(pairs(e, f), pairs(g, h));
-            Avx512(neighbours(left, right))
+            let (upper, lower) = (four(a, b, c, d), four(e, f, g, h));
+            let [p, t] = quarters(upper[0], lower[0]);
+            let [q, u] = quarters(upper[1], lower[1]);
+            let [r, v] = quarters(upper[2], lower[2]);
+            let [s, w] = quarters(upper[3], lower[3]);
+            [p, q, r, s, t, u, v, w].map(Avx512)
         }
         #[inline(always)]
         fn power_of_two(shifted: Self) -> Self {
@@ -545,33 +555,39 @@ mod x86 {
             Avx2([self.0[1], self.0[0]])
         }
         #[inline(always)]
-        fn sums(of: [Self; MOMENTS]) -> Self {
-            // A closure would be a call.
+        fn transposed(of: [Self; MOMENTS]) -> [Self; MOMENTS] {
             #[inline(always)]
-            fn four(a: __m256d, b: __m256d, c: __m256d, d: __m256d) -> __m256d {
+            fn four(a: __m256d, b: __m256d, c: __m256d, d: __m256d) -> [__m256d; 4] {
                 unsafe {
-                    let (left, right) = (_mm256_hadd_pd(a, b), _mm256_hadd_pd(c, d));
-                    _mm256_add_pd(
-                        _mm256_permute2f128_pd::<0x20>(left, right),
-                        _mm256_permute2f128_pd::<0x31>(left, right),
-                    )
+                    let (p, q) = (_mm256_unpacklo_pd(a, b), _mm256_unpackhi_pd(a, b));
+                    let (r, s) = (_mm256_unpacklo_pd(c, d), _mm256_unpackhi_pd(c, d));
+                    [
+                        _mm256_permute2f128_pd::<0x20>(p, r),
+                        _mm256_permute2f128_pd::<0x20>(q, s),
+                        _mm256_permute2f128_pd::<0x31>(p, r),
+                        _mm256_permute2f128_pd::<0x31>(q, s),
+                    ]
                 }
             }
             let [a, b, c, d, e, f, g, h] = of;
-            let first = [
+            let (p, q) = (
                 four(a.0[0], b.0[0], c.0[0], d.0[0]),
-                four(a.0[1], b.0[1], c.0[1], d.0[1]),
-            ];
-            let second = [
                 four(e.0[0], f.0[0], g.0[0], h.0[0]),
+            );
+            let (r, s) = (
+                four(a.0[1], b.0[1], c.0[1], d.0[1]),
                 four(e.0[1], f.0[1], g.0[1], h.0[1]),
-            ];
-            unsafe {
-                Avx2([
-                    _mm256_add_pd(first[0], first[1]),
-                    _mm256_add_pd(second[0], second[1]),
-                ])
-            }
+            );
+            [
+                Avx2([p[0], q[0]]),
+                Avx2([p[1], q[1]]),
+                Avx2([p[2], q[2]]),
+                Avx2([p[3], q[3]]),
+                Avx2([r[0], s[0]]),
+                Avx2([r[1], s[1]]),
+                Avx2([r[2], s[2]]),
+                Avx2([r[3], s[3]]),
+            ]
         }
         #[inline(always)]
         fn power_of_two(shifted: Self) -> Self {
@@ -627,6 +643,15 @@ mod tests {
         let swapped = E::load(&edges).swapped();
         assert_eq!(swapped.as_array()[..4], edges[4..]);
         assert_eq!(swapped.as_array()[5..], edges[1..4]);
+        let square: [E; MOMENTS] =
+            std::array::from_fn(|k| E::load(&std::array::from_fn(|l| (MOMENTS * k + l) as f64)));
+        let (turned, sums) = (E::transposed(square), E::sums(square));
+        for k in 0..MOMENTS {
+            for l in 0..MOMENTS {
+                assert_eq!(turned[l].as_array()[k], square[k].as_array()[l]);
+            }
+            assert_eq!(sums.as_array()[k], (64 * k + 28) as f64);
+        }
         assert_eq!(E::splat(2.0).signed_power(3.0).as_array()[0], 8.0);
         assert_eq!((-E::splat(9.0)).signed_power(0.5).as_array()[7], -3.0);
     }

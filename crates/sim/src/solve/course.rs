@@ -255,6 +255,12 @@ impl<'m> Course<'m> {
         self.contacts.iter().filter(resting).count()
     }
 
+    /// Which handles are in contact, as far as contacts open and close: a bit each, of the last 64.
+    pub fn resting(&self) -> u64 {
+        let bit = |bits: u64, c: &Contact| bits << 1 | u64::from(*c == Contact::Closed);
+        self.contacts.iter().fold(0, bit)
+    }
+
     /// Whether a handle sits on its edge, whose law may change at the end of any step.
     pub fn on_edge(&self) -> bool {
         self.contacts.contains(&Contact::Clamped)

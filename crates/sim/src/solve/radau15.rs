@@ -17,6 +17,7 @@
 //! (1996), IV.5 and IV.8; the idea of one long step of order 15 by iteration: Everhart, in Dynamics of Comets (1985), 185; Rein &
 //! Spiegel, MNRAS 446 (2015), 1424.
 
+mod memory;
 mod modes;
 mod stages;
 mod tableau;
@@ -30,6 +31,7 @@ use crate::freedoms::rotation;
 use crate::lanes::{Avx2, Avx512};
 use crate::lanes::{MOMENTS, Plain8};
 use crate::model::{Model, Registers, SideBySide};
+use memory::Memory;
 use modes::{Mode, Row, modes};
 use stages::{Demand, Guess, Kept, Solved, Stages, Step};
 use tableau::C;
@@ -139,17 +141,23 @@ pub fn go<'m>(
 /// Solves a step with the code for a kind of registers.
 trait Solve: Registers {
     fn solve(stages: &mut Stages<Self>, step: &Step<'_>) -> Solved;
-    /// The state at `theta` of the step solved last, which began at `y0`.
+    /// Makes the step solved last, which began at `y0`, ready to be read between its ends.
+    fn lay(stages: &mut Stages<Self>, y0: &[f64]);
+    /// The state at `theta` of it.
     fn between(stages: &Stages<Self>, y0: &[f64], theta: f64, out: &mut [f64]);
     /// The margin there, nearly, with that at the start.
     fn margin_between(stages: &Stages<Self>, start_n: f64, theta: f64) -> f64;
 }
 
 macro_rules! solve {
-    ($type:ident, $solve:ident, $between:ident, $margin:ident $(, $features:literal)?) => {
+    ($type:ident, $solve:ident, $lay:ident, $between:ident, $margin:ident $(, $features:literal)?) => {
         $(#[cfg(target_arch = "x86_64")] #[target_feature(enable = $features)])?
         fn $solve(stages: &mut Stages<$type>, step: &Step<'_>) -> Solved {
             stages.solve_here(step)
+        }
+        $(#[cfg(target_arch = "x86_64")] #[target_feature(enable = $features)])?
+        fn $lay(stages: &mut Stages<$type>, y0: &[f64]) {
+            stages.lay(y0);
         }
         $(#[cfg(target_arch = "x86_64")] #[target_feature(enable = $features)])?
         fn $between(stages: &Stages<$type>, y0: &[f64], theta: f64, out: &mut [f64]) {
@@ -166,6 +174,9 @@ macro_rules! solve {
             fn solve(stages: &mut Stages<Self>, step: &Step<'_>) -> Solved {
                 unsafe { $solve(stages, step) }
             }
+            fn lay(stages: &mut Stages<Self>, y0: &[f64]) {
+                unsafe { $lay(stages, y0) }
+            }
             fn between(stages: &Stages<Self>, y0: &[f64], theta: f64, out: &mut [f64]) {
                 unsafe { $between(stages, y0, theta, out) }
             }
@@ -175,11 +186,19 @@ macro_rules! solve {
         }
     };
 }
-solve!(Plain8, solve_plain, between_plain, margin_plain);
-solve!(Avx2, solve_avx2, between_avx2, margin_avx2, "avx2,fma");
+solve!(Plain8, solve_plain, lay_plain, between_plain, margin_plain);
+solve!(
+    Avx2,
+    solve_avx2,
+    lay_avx2,
+    between_avx2,
+    margin_avx2,
+    "avx2,fma"
+);
 solve!(
     Avx512,
     solve_avx512,
+    lay_avx512,
     between_avx512,
     margin_avx512,
     "avx512f,avx512dq"
@@ -225,6 +244,7 @@ struct Run<'m, E: Registers> {
     /// How many handles rested before and rest after the jump that the next step begins with, and what a first step could be then.
     jumped: Option<[usize; 2]>,
     after_jump: [[f64; 3]; 3],
+    memory: Memory<E>,
     /// How often convergence has limited the steps lately.
     limited: u32,
 }
@@ -244,6 +264,7 @@ impl<'m, E: Solve> Run<'m, E> {
             attitude: [0.0; 4],
             rotation: [[0.0; 3]; 3],
         };
+        let stages = Stages::new(model);
         Self {
             demand: Demand {
                 tolerance,
@@ -251,7 +272,6 @@ impl<'m, E: Solve> Run<'m, E> {
             },
             asked: settings.tolerance,
             trust: (0.1 * settings.tolerance / tolerance).max(TRUST),
-            stages: Stages::new(model),
             kept: Kept::new(),
             side: model.side_by_side(),
             slope: vec![0.0; size],
@@ -269,7 +289,9 @@ impl<'m, E: Solve> Run<'m, E> {
             h_next: 0.0,
             jumped: None,
             after_jump: [[f64::INFINITY; 3]; 3],
+            memory: Memory::new(stages.kept().len()),
             limited: 0,
+            stages,
             course,
         }
     }
@@ -397,7 +419,7 @@ impl<'m, E: Solve> Run<'m, E> {
             None => self.h_next,
         };
         let room = |h: f64| if h == left { FILLS } else { 1.0 };
-        let mut h = self.fitted(wanted, left);
+        let mut h = self.fitted(wanted.min(self.memory.reach_s(t0)), left);
         let mut solved = self.solve(h, None, room(h));
         let mut rejected = false;
         while !(solved.converged && solved.error <= room(h)) {
@@ -425,9 +447,11 @@ impl<'m, E: Solve> Run<'m, E> {
         let factor = (SAFETY * stretch(solved.error.max(1e-14)))
             .clamp(SHRINK, if rejected { 1.0 } else { GROW });
         let proposal = tried * factor;
-        if let Some([before, resting]) = self.jumped.take() {
-            self.after_jump[before][resting] = if tried < wanted && !rejected {
-                proposal.max(wanted)
+        let jumped = self.jumped.take();
+        if let Some([before, resting]) = jumped {
+            let could = &mut self.after_jump[before][resting];
+            *could = if tried < wanted && !rejected {
+                could.max(proposal)
             } else {
                 proposal
             };
@@ -469,12 +493,12 @@ impl<'m, E: Solve> Run<'m, E> {
             if solved.between > self.trust {
                 self.aside(theta, h);
             } else {
-                E::between(&self.stages, &self.course.y, theta, &mut self.at);
+                self.read(theta);
             }
             self.course.model.freedoms().project(&mut self.at);
             self.course.sample(&self.at, false, observer)?;
         }
-        E::between(&self.stages, &self.course.y, end_s / h, &mut self.at);
+        self.read(end_s / h);
         std::mem::swap(&mut self.course.y, &mut self.at);
         let t1 = if h == left && event.is_none() {
             self.course.stop_s()
@@ -492,11 +516,18 @@ impl<'m, E: Solve> Run<'m, E> {
         self.course.arrive(t1, false, observer)?;
         self.stages.keep();
         (self.before_s, self.ended) = (h, end_s / h);
+        if jumped.is_some() {
+            self.memory.note(h, self.stages.kept());
+        }
         if event.is_some() {
-            let resting = |course: &Course<'_>| course.resting_handles().min(2);
-            let before = resting(&self.course);
+            let before = self.course.resting();
             self.course.fire(observer);
-            self.jumped = Some([before, resting(&self.course)]);
+            let resting = [before, self.course.resting()];
+            self.jumped = Some(resting.map(|r| (r.count_ones() as usize).min(2)));
+            if let Some((step_s, slopes)) = self.memory.event(t1, resting) {
+                self.stages.recall(slopes);
+                (self.before_s, self.ended) = (step_s, 0.0);
+            }
         } else if !switched && !on_edge {
             for (slope, f) in self.slope.iter_mut().zip(&self.stages.f) {
                 *slope = f.as_array()[MOMENTS - 1];
@@ -515,13 +546,21 @@ impl<'m, E: Solve> Run<'m, E> {
         self.stages.save(&mut self.kept);
         let solved = self.solve(theta * h, Some(theta), 1.0);
         if solved.converged {
-            E::between(&self.stages, &self.course.y, 1.0, &mut self.at);
+            self.read(1.0);
         }
         self.stages.restore(&self.kept);
         if !solved.converged {
             // Shorter than one that did converge, it hardly ever does not; the polynomial is then the best there is.
-            E::between(&self.stages, &self.course.y, theta, &mut self.at);
+            self.read(theta);
         }
+    }
+
+    /// Puts the state at a part of the step solved last into `at`.
+    fn read(&mut self, theta: f64) {
+        if theta < 1.0 {
+            E::lay(&mut self.stages, &self.course.y);
+        }
+        E::between(&self.stages, &self.course.y, theta, &mut self.at);
     }
 
     fn too_small(&self, step_s: f64) -> Stopped {
@@ -561,6 +600,7 @@ impl<'m, E: Solve> Run<'m, E> {
             fine
         };
         let y0 = std::mem::take(&mut self.course.y);
+        E::lay(&mut self.stages, &y0);
         let (stages, at, course) = (&self.stages, &mut self.at, &mut self.course);
         let mut margin = |theta: f64| {
             E::between(stages, &y0, theta, at);

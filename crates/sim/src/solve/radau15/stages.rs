@@ -42,6 +42,12 @@ fn integrals<T: Number>(x: T) -> [(T, T); REACH] {
     })
 }
 
+/// By eights.
+#[inline(always)]
+fn tiles<T>(of: &[T]) -> &[[T; MOMENTS]] {
+    of.as_chunks().0
+}
+
 /// A matrix by columns.
 type Columns<E> = [E; MOMENTS];
 
@@ -117,11 +123,15 @@ pub struct Stages<E: Registers> {
     pub y: Vec<E>,
     /// Slopes at the nodes.
     pub f: Vec<E>,
-    /// Legendre coefficients of the slopes: of the step solved last, and of the one accepted last.
+    /// Legendre coefficients of the slopes: of the step solved last, and of the one accepted last; with room for whole [`tiles`].
     parts: Vec<E>,
     smooth: Vec<E>,
-    /// Takes an error of a state to units: 1/(unit + |y|).
+    /// Takes an error of a state to units: 1/(unit + |y|); nothing beyond the states.
     pub scale: Vec<f64>,
+    /// How far the states at each node are from those at the start, eight states side by side; whether they are those of the step
+    /// solved last.
+    across: Vec<[E; MOMENTS]>,
+    laid: bool,
     /// Where the body's velocities are; its positions come before them.
     velocities: Range<usize>,
     /// Whether the attitude is a quaternion, in which case the body has all thirteen states.
@@ -238,14 +248,17 @@ impl<E: Registers> Stages<E> {
     #[inline(always)]
     pub fn new(model: &Model) -> Self {
         let size = model.layout().size();
+        let tiled = size.next_multiple_of(MOMENTS);
         let zero = E::splat(0.0);
         Self {
             w: Workspace::blank(),
             y: vec![zero; size],
             f: vec![zero; size],
-            parts: vec![zero; size],
-            smooth: vec![zero; size],
-            scale: vec![0.0; size],
+            parts: vec![zero; tiled],
+            smooth: vec![zero; tiled],
+            scale: vec![0.0; tiled],
+            across: vec![[zero; MOMENTS]; tiled / MOMENTS],
+            laid: false,
             velocities: model.freedoms().positions()..model.layout().body,
             quaternion: model.freedoms().rotation().is_some(),
             a: columns(&TABLEAU.a),
@@ -341,18 +354,14 @@ impl<E: Registers> Stages<E> {
                     ..=5.0 => 3,
                     _ => 1,
                 };
-                let slopes = here.map(|x| x.0);
-                let slopes = E::load(&std::array::from_fn(|k| {
-                    if k < reach { slopes[k] } else { 0.0 }
-                }));
-                let tiles = self.y.chunks_mut(MOMENTS).zip(self.smooth.chunks(MOMENTS));
+                let here = here.map(|x| x.0);
+                let here: [f64; MOMENTS] =
+                    std::array::from_fn(|k| if k < reach { here[k] } else { 0.0 });
+                let here = E::load(&here);
                 let starts = y0.chunks(MOMENTS).zip(slope.chunks(MOMENTS));
+                let tiles = self.y.chunks_mut(MOMENTS).zip(tiles(&self.smooth));
                 for ((y, smooth), (y0, slope)) in tiles.zip(starts) {
-                    let mut slopes = [slopes; MOMENTS];
-                    for (slope, part) in slopes.iter_mut().zip(smooth) {
-                        *slope = *slope * *part;
-                    }
-                    let before = E::sums(slopes);
+                    let before = E::sums(smooth.map(|part| part * here));
                     let each = y.iter_mut().zip(smooth).zip(y0.iter().zip(slope));
                     for (((y, part), (y0, slope)), before) in each.zip(before.as_array()) {
                         let part = part.as_array();
@@ -392,6 +401,7 @@ impl<E: Registers> Stages<E> {
         let ledger = side.layout.ledger_range();
         let watched = ledger.start;
         let phases = side.layout.phase_range();
+        self.laid = false;
         self.step = self.a;
         self.step.iter_mut().for_each(|a| *a = *a * h);
         self.guess(y0, h, slope, guess);
@@ -578,18 +588,17 @@ impl<E: Registers> Stages<E> {
     #[inline(always)]
     fn missed(&self, slope: &[f64], states: usize, h: f64) -> f64 {
         let (mut squares, mut apart) = (E::splat(0.0), E::splat(0.0));
-        let tiles = self.parts[..states].chunks(MOMENTS);
-        let others = slope.chunks(MOMENTS).zip(self.scale.chunks(MOMENTS));
-        for (parts, (slopes, scales)) in tiles.zip(others) {
-            let mut starts = [E::splat(0.0); MOMENTS];
-            let (mut slope, mut scale) = ([0.0; MOMENTS], [0.0; MOMENTS]);
-            for (l, part) in parts.iter().enumerate() {
-                (slope[l], scale[l]) = (slopes[l], scales[l]);
-                let part = *part * scales[l];
-                squares = part.madd(part, squares);
-                starts[l] = part * self.at_start;
-            }
-            let off = E::load(&slope).madd(E::load(&scale), -E::sums(starts));
+        let each = self.parts[..states].iter().zip(&self.scale);
+        for (part, scale) in each {
+            let part = *part * *scale;
+            squares = part.madd(part, squares);
+        }
+        let tiles = tiles(&self.parts).iter().zip(tiles(&self.scale));
+        for ((parts, scale), slopes) in tiles.zip(slope[..states].chunks(MOMENTS)) {
+            let starts = E::sums(parts.map(|part| part * self.at_start));
+            let mut slope = starts;
+            slope.as_mut_array()[..slopes.len()].copy_from_slice(slopes);
+            let off = (slope - starts) * E::load(scale);
             apart = off.madd(off, apart);
         }
         let s = squares.as_array();
@@ -602,6 +611,16 @@ impl<E: Registers> Stages<E> {
     /// The step solved last is accepted.
     pub fn keep(&mut self) {
         std::mem::swap(&mut self.parts, &mut self.smooth);
+    }
+
+    /// Legendre coefficients of the slopes of the step accepted last.
+    pub fn kept(&self) -> &[E] {
+        &self.smooth
+    }
+
+    /// Takes these for the step accepted last.
+    pub fn recall(&mut self, smooth: &[E]) {
+        self.smooth.copy_from_slice(smooth);
     }
 
     /// Puts what is known of the step solved last into `kept`.
@@ -619,6 +638,7 @@ impl<E: Registers> Stages<E> {
         for (to, from) in to.into_iter().zip(&kept.all) {
             to.copy_from_slice(from);
         }
+        self.laid = false;
         self.margin = kept.margin;
     }
 
@@ -637,6 +657,23 @@ impl<E: Registers> Stages<E> {
         self.watch.extend(watch.iter().map(spread));
     }
 
+    /// Makes the step solved last, which began at `y0`, ready for [`Self::between`].
+    #[inline(always)]
+    pub fn lay(&mut self, y0: &[f64]) {
+        if std::mem::replace(&mut self.laid, true) {
+            return;
+        }
+        let tiles = self.y.chunks(MOMENTS).zip(y0.chunks(MOMENTS));
+        for (across, (y, y0)) in self.across.iter_mut().zip(tiles) {
+            let mut rises = [E::splat(0.0); MOMENTS];
+            for (rise, (y, y0)) in rises.iter_mut().zip(y.iter().zip(y0)) {
+                // Differences, so that next to the start nothing is lost.
+                *rise = *y - E::splat(*y0);
+            }
+            *across = E::transposed(rises);
+        }
+    }
+
     /// The state at `theta` of the step solved last, which began at `y0`.
     #[inline(always)]
     pub fn between(&self, y0: &[f64], theta: f64, out: &mut [f64]) {
@@ -647,16 +684,19 @@ impl<E: Registers> Stages<E> {
             return;
         }
         let (_, weights) = self.weights(theta);
-        let tiles = self.y.chunks(MOMENTS).zip(y0.chunks(MOMENTS));
-        for ((y, y0), out) in tiles.zip(out.chunks_mut(MOMENTS)) {
-            let mut parts = [E::splat(0.0); MOMENTS];
-            for ((part, y), y0) in parts.iter_mut().zip(y).zip(y0) {
-                // Differences, so that next to the start nothing is lost.
-                *part = (*y - E::splat(*y0)) * weights;
-            }
-            let rise = E::sums(parts);
-            for ((out, y0), rise) in out.iter_mut().zip(y0).zip(rise.as_array()) {
-                *out = y0 + rise;
+        let tiles = y0.chunks(MOMENTS).zip(out.chunks_mut(MOMENTS));
+        for (across, (y0, out)) in self.across.iter().zip(tiles) {
+            let rise = product(across, &weights, E::splat(0.0));
+            match (y0.try_into(), out.try_into()) {
+                (Ok(y0), Ok(out)) => {
+                    let out: &mut [f64; MOMENTS] = out;
+                    *out = *(E::load(y0) + rise).as_array();
+                }
+                _ => {
+                    for ((out, y0), rise) in out.iter_mut().zip(y0).zip(rise.as_array()) {
+                        *out = y0 + rise;
+                    }
+                }
             }
         }
     }
