@@ -41,6 +41,9 @@ const NAME: &str = "radau15";
 const SHARE: f64 = 0.01;
 /// What the iteration may leave, in units of what a step may err.
 const ITERATION: f64 = 0.02;
+/// Above this tolerance it may leave less, as its fourth root: there steps are as long as contacts let them be, and err less than they may
+/// but for what the sweeps leave.
+const LOOSE: f64 = 5e-6;
 /// A step that leaves nothing before a moment that none may cross may err by so many times as much: it stands for two.
 const FILLS: f64 = 10.0;
 /// Such a step may be so many times as long as another: FILLS in the law of the step size, and a little less.
@@ -256,6 +259,7 @@ impl<'m, E: Solve> Run<'m, E> {
         course.y.truncate(size);
         course.w.least_load_n = f64::NEG_INFINITY;
         let tolerance = (settings.tolerance * SHARE).max(FINEST);
+        let strictness = (LOOSE / settings.tolerance).min(1.0).sqrt().sqrt();
         let springs = 3 * model.carriers();
         let nothing = || Found {
             modes: Vec::with_capacity(springs),
@@ -268,7 +272,7 @@ impl<'m, E: Solve> Run<'m, E> {
         Self {
             demand: Demand {
                 tolerance,
-                iteration: (tolerance * ITERATION).max(FINEST),
+                iteration: (tolerance * ITERATION * strictness).max(FINEST),
             },
             asked: settings.tolerance,
             trust: (0.1 * settings.tolerance / tolerance).max(TRUST),
