@@ -10,6 +10,9 @@
 //! contacts break a run into pieces of tens of milliseconds, most of which are one such step, where an explicit method needs four of twelve
 //! evaluations.
 //!
+//! A load that is carried in step comes by again and again, so what came after events like the last one is remembered ([`memory`]): when the
+//! next is due, and how the slopes went.
+//!
 //! The stages are a polynomial of degree 8, which holds samples and events; where it does not, the step is taken anew to the moment that
 //! is asked for, from what is known of it: for good at a sample of the log or an event, aside for a sensor. Within a step contacts are frozen, as in [`super::pair`].
 //!
@@ -111,12 +114,13 @@ fn stretch(error: f64) -> f64 {
 /// Whether it is the cheapest for a model: one that can be evaluated at eight moments at once, on contacts that damp and drive what is
 /// free.
 pub fn suits(model: &Model) -> bool {
+    if !model.on_eight() {
+        return false;
+    }
     let (mut rows, mut all) = (Vec::new(), Vec::new());
     let (y, w) = (model.initial_state(), model.workspace());
-    model.on_eight() && {
-        modes(model, &y, &w, 2..3, &mut rows, &mut all);
-        !all.is_empty()
-    }
+    modes(model, &y, &w, 2..3, &mut rows, &mut all);
+    !all.is_empty()
 }
 
 /// Goes on from where a course stands: to its end (`true`), or until it turns out that the sweeps limit the steps, or that the model is not
