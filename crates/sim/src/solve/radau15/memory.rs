@@ -101,7 +101,7 @@ impl<E: Copy> Memory<E> {
 mod tests {
     use super::*;
 
-    /// Two handles, one lifting off and coming down again every second, a little later each time, the other between.
+    /// A handle that comes off every second, and down 0.3 s later, beside one that rests.
     fn paced(memory: &mut Memory<f64>, from: u32, to: u32) {
         for second in from..to {
             let t_s = f64::from(second);
