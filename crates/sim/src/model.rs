@@ -34,6 +34,7 @@ use crate::scene::Scene;
 use crate::sensors::drum::Track;
 use crate::sensors::{Clock, Imu};
 use std::ops::Range;
+use term::Staged;
 use workspace::{BLOCK, blocks};
 
 /// Where things are in the state vector.
@@ -90,9 +91,9 @@ pub struct Model {
     has_phases: bool,
     /// Whether anything looks at the carriers or acts on the handles.
     carried: bool,
-    terms: [Vec<Box<dyn Term>>; 7],
+    terms: Staged<Box<dyn Term>>,
     /// Whose each term is, in the same order.
-    owners: [Vec<&'static str>; 7],
+    owners: Staged<&'static str>,
     building: &'static str,
     /// Names and first values of the effects' own states.
     extra: Vec<(String, f64)>,
@@ -202,11 +203,10 @@ impl Model {
         model.layout.phases = if model.has_phases { n } else { 0 };
         model.layout.extra = model.extra.len();
         model.layout.ledger = 2 * model.accounts.len();
-        model.carried = model.has_phases
-            || !model.accounts.is_empty()
-            || model.terms.iter().any(|stage| !stage.is_empty());
+        model.carried =
+            model.has_phases || !model.accounts.is_empty() || !model.terms.all().is_empty();
         // What bends a pole or moves the party is not the affair of one pair.
-        let stage = |stage: Stage| model.terms[stage as usize].iter();
+        let stage = |stage: Stage| model.terms.of(stage).iter();
         model.in_blocks = model.carried
             && pairs(n) > BLOCK
             && stage(Stage::Party).chain(stage(Stage::Bends)).count() == 0
@@ -226,8 +226,8 @@ impl Model {
 
     /// Adds a term to a stage.
     pub(crate) fn add(&mut self, stage: Stage, term: impl Term + 'static) {
-        self.owners[stage as usize].push(self.building);
-        self.terms[stage as usize].push(Box::new(term));
+        self.owners.add(stage, self.building);
+        self.terms.add(stage, Box::new(term));
     }
 
     /// Adds states of an effect's own, by name and first value; returns the place of the first in [`Workspace::extra`].
@@ -713,18 +713,18 @@ impl Model {
         if self.has_phases {
             self.phases::<FUSED>(t_s, y, w);
         }
+        w.body_torque = [0.0; 3];
         if self.in_blocks {
             self.handles_in_blocks(t_s, y, w);
         } else {
             self.handles::<FUSED>(t_s, y, w);
         }
-        w.body_torque = [0.0; 3];
-        self.apply::<FUSED>(Stage::Body, t_s, w);
     }
 
+    /// The terms of the stages from one to another, both included.
     #[inline(always)]
-    fn apply<const FUSED: bool>(&self, stage: Stage, t_s: f64, w: &mut Workspace) {
-        for term in &self.terms[stage as usize] {
+    fn apply<const FUSED: bool>(&self, first: Stage, last: Stage, t_s: f64, w: &mut Workspace) {
+        for term in self.terms.between(first, last) {
             if FUSED {
                 // SAFETY: where this is true the processor was asked.
                 #[allow(unsafe_code)]
@@ -737,24 +737,21 @@ impl Model {
         }
     }
 
-    /// Shoulders, handles and the forces between them.
+    /// Handles, the forces there, and what else turns the body, where the shoulders are known.
     #[inline(always)]
     fn handles<const FUSED: bool>(&self, t_s: f64, y: &[f64], w: &mut Workspace) {
-        if self.has_phases {
-            self.apply::<FUSED>(Stage::Shoulders, t_s, w);
-        }
-        if !self.terms[Stage::Party as usize].is_empty() {
+        if !self.terms.of(Stage::Party).is_empty() {
             self.party(t_s, w);
         }
         self.place::<FUSED>(y, w);
-        let bends = &self.terms[Stage::Bends as usize];
+        let bends = self.terms.of(Stage::Bends);
         if !bends.is_empty() {
             self.freedoms.orient(y, w);
             for term in bends {
                 term.apply(t_s, w);
             }
         }
-        self.apply::<FUSED>(Stage::Handles, t_s, w);
+        self.apply::<FUSED>(Stage::Handles, Stage::Body, t_s, w);
     }
 
     #[inline(always)]
@@ -772,7 +769,7 @@ impl Model {
     #[cold]
     fn handles_in_blocks(&self, t_s: f64, y: &[f64], w: &mut Workspace) {
         let local = |stage: Stage| {
-            let terms = self.terms[stage as usize].iter();
+            let terms = self.terms.of(stage).iter();
             terms.filter_map(|term| term.on_block())
         };
         for block in blocks(w.pair.len()) {
@@ -783,6 +780,7 @@ impl Model {
             self.freedoms.gaps_of(y, w, block.clone());
             local(Stage::Handles).for_each(|term| term.apply_to(t_s, w, block.clone()));
         }
+        self.apply::<false>(Stage::Body, Stage::Body, t_s, w);
     }
 
     #[inline(always)]
@@ -799,8 +797,12 @@ impl Model {
                 pair.stand();
             }
         }
-        self.apply::<FUSED>(Stage::Clock, t_s, w);
-        self.apply::<FUSED>(Stage::Phases, t_s, w);
+        let last = if self.in_blocks {
+            Stage::Phases
+        } else {
+            Stage::Shoulders
+        };
+        self.apply::<FUSED>(Stage::Clock, last, t_s, w);
     }
 
     #[cold]
@@ -808,19 +810,15 @@ impl Model {
         if !self.has_phases {
             w.pair.iter_mut().for_each(Pair::stand);
         }
-        for term in &self.terms[Stage::Party as usize] {
+        for term in self.terms.of(Stage::Party) {
             term.apply(t_s, w);
         }
     }
 
     /// Applies the terms of one effect alone to an evaluated workspace, stage by stage.
     pub fn apply_only(&self, effect: &str, t_s: f64, w: &mut Workspace) {
-        for (terms, owners) in self.terms.iter().zip(&self.owners) {
-            for (term, _) in terms
-                .iter()
-                .zip(owners)
-                .filter(|(_, owner)| **owner == effect)
-            {
+        for (term, owner) in self.terms.all().iter().zip(self.owners.all()) {
+            if *owner == effect {
                 term.apply(t_s, w);
             }
         }

@@ -129,25 +129,26 @@ struct Wave {
 }
 
 impl Wave {
-    /// `turn` gives sin kφ and cos kφ.
+    /// `turn` gives sin kφ, cos kφ and kφ̇.
     #[inline(always)]
     fn add<N: Moments>(
         &self,
         w: &mut Workspace<N>,
         part: &impl Part,
-        turn: impl Fn(&Pair<N>) -> (N::Pair, N::Pair),
+        turn: impl Fn(&Pair<N>) -> [N::Pair; 3],
     ) {
-        let (axis, order) = (self.axis % 3, f64::from(self.order));
+        // Never more than 2: so the compiler knows, too.
+        let axis = self.axis.min(2);
         for (p, &(sine, cosine)) in part
             .of_mut(&mut w.pair)
             .iter_mut()
             .zip(part.of(&self.parts))
         {
-            let (sin, cos) = turn(p);
+            let [sin, cos, rate] = turn(p);
             let (sine, cosine) = (N::always(sine), N::always(cosine));
             p.base[axis] = sine.madd(sin, cosine.madd(cos, p.base[axis]));
             let slope = cosine.nmadd(sin, sine * cos);
-            p.base_rate[axis] = (p.rate * order).madd(slope, p.base_rate[axis]);
+            p.base_rate[axis] = rate.madd(slope, p.base_rate[axis]);
         }
     }
 }
@@ -159,7 +160,7 @@ impl Local for First {
     #[inline(always)]
     fn act<N: Moments>(&self, _t_s: N::Each, w: &mut Workspace<N>, part: impl Part) {
         for wave in &self.0 {
-            wave.add(w, &part, |p| (p.sin, p.cos));
+            wave.add(w, &part, |p| [p.sin, p.cos, p.rate]);
         }
     }
 }
@@ -177,7 +178,7 @@ impl Local for Higher {
                 for _ in 1..wave.order {
                     (s, c) = (s.madd(p.cos, c * p.sin), s.nmadd(p.sin, c * p.cos));
                 }
-                (s, c)
+                [s, c, p.rate * f64::from(wave.order)]
             });
         }
     }

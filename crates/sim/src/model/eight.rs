@@ -1,6 +1,7 @@
 //! The right-hand side at eight moments side by side, for models all of whose parts are written for that.
 
-use super::{Layout, Model, OnEight, Pair, Power, PowerOnEight, Stage, Term, Workspace};
+use super::term::Staged;
+use super::{Layout, Model, OnEight, Pair, Power, PowerOnEight, Stage, Workspace};
 use crate::freedoms::FreedomsOnEight;
 #[cfg(target_arch = "x86_64")]
 use crate::lanes::{Avx2, Avx512};
@@ -64,11 +65,11 @@ registers!(Avx512, avx512, gaps_avx512, rates_avx512);
 impl Model {
     /// Whether the right-hand side can be evaluated at eight moments side by side: few carriers, and every effect written for it.
     pub fn on_eight(&self) -> bool {
-        let empty = |stage: Stage| self.terms[stage as usize].is_empty();
+        let empty = |stage: Stage| self.terms.of(stage).is_empty();
         super::pairs(self.carriers()) <= MOST_PAIRS
             && empty(Stage::Party)
             && empty(Stage::Bends)
-            && self.terms.iter().flatten().all(|t| t.on_eight().is_some())
+            && self.terms.all().iter().all(|t| t.on_eight().is_some())
             && self.accounts.iter().all(|(_, a)| a.on_eight().is_some())
     }
 
@@ -80,13 +81,10 @@ impl Model {
 
     /// The right-hand side for eight moments, where [`Self::on_eight`] says yes.
     pub(crate) fn side_by_side(&self) -> SideBySide<'_> {
-        fn of(stage: &Vec<Box<dyn Term>>) -> Vec<&dyn OnEight> {
-            stage.iter().filter_map(|t| t.on_eight()).collect()
-        }
         SideBySide {
             layout: &self.layout,
             freedoms: &*self.freedoms,
-            terms: self.terms.each_ref().map(of),
+            terms: self.terms.map(|t| t.on_eight()).unwrap_or_default(),
             accounts: self
                 .accounts
                 .iter()
@@ -100,7 +98,7 @@ impl Model {
 pub(crate) struct SideBySide<'m> {
     pub layout: &'m Layout,
     freedoms: &'m dyn FreedomsOnEight,
-    terms: [Vec<&'m dyn OnEight>; 7],
+    terms: Staged<&'m dyn OnEight>,
     accounts: Vec<&'m dyn PowerOnEight>,
 }
 
@@ -116,8 +114,8 @@ pub(crate) struct Octet<'a, E: Registers> {
 
 impl SideBySide<'_> {
     #[inline(always)]
-    fn apply<E: Registers>(&self, stage: Stage, octets: &mut [Octet<'_, E>]) {
-        for term in &self.terms[stage as usize] {
+    fn apply<E: Registers>(&self, first: Stage, last: Stage, octets: &mut [Octet<'_, E>]) {
+        for term in self.terms.between(first, last) {
             for at in octets.iter_mut() {
                 E::apply(*term, at.t_s, at.w);
             }
@@ -127,7 +125,7 @@ impl SideBySide<'_> {
     /// What depends on time alone.
     #[inline(always)]
     pub fn clock<E: Registers>(&self, t_s: E, w: &mut Workspace<Eight<E>>) {
-        for term in &self.terms[Stage::Clock as usize] {
+        for term in self.terms.of(Stage::Clock) {
             E::apply(*term, t_s, w);
         }
     }
@@ -147,7 +145,7 @@ impl SideBySide<'_> {
                 p.rate = p.constant_rate;
             }
         }
-        self.apply(Stage::Phases, octets);
+        self.apply(Stage::Phases, Stage::Phases, octets);
         for at in octets.iter_mut() {
             let rates = at.dy[phases.clone()].chunks_mut(LANES);
             for (p, rate) in at.w.pair.iter().zip(rates) {
@@ -164,7 +162,7 @@ impl SideBySide<'_> {
         for at in octets.iter_mut() {
             at.w.pair.iter_mut().for_each(Pair::stand);
         }
-        self.apply(Stage::Shoulders, octets);
+        self.apply(Stage::Shoulders, Stage::Shoulders, octets);
     }
 
     /// The rates of body and extra states, where the shoulders are known.
@@ -172,12 +170,9 @@ impl SideBySide<'_> {
     pub fn load<E: Registers>(&self, octets: &mut [Octet<'_, E>]) {
         for at in octets.iter_mut() {
             E::gaps(self.freedoms, at.y, at.w);
-        }
-        self.apply(Stage::Handles, octets);
-        for at in octets.iter_mut() {
             at.w.body_torque = [E::splat(0.0); 3];
         }
-        self.apply(Stage::Body, octets);
+        self.apply(Stage::Handles, Stage::Body, octets);
         for at in octets.iter_mut() {
             E::rates(self.freedoms, at.y, at.w, at.dy);
             if !at.w.extra.is_empty() {

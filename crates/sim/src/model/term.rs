@@ -153,6 +153,62 @@ pub enum Stage {
     Body,
 }
 
+/// Things in the order of their stages, side by side: stages that follow each other are gone through in one loop.
+#[derive(Debug)]
+pub(crate) struct Staged<T> {
+    all: Vec<T>,
+    /// Where each stage ends.
+    ends: [usize; Stage::Body as usize + 1],
+}
+
+impl<T> Default for Staged<T> {
+    fn default() -> Self {
+        Self {
+            all: Vec::new(),
+            ends: Default::default(),
+        }
+    }
+}
+
+impl<T> Staged<T> {
+    /// Adds one at the end of its stage.
+    pub fn add(&mut self, stage: Stage, one: T) {
+        self.all.insert(self.ends[stage as usize], one);
+        for end in &mut self.ends[stage as usize..] {
+            *end += 1;
+        }
+    }
+
+    /// Those of one stage.
+    #[inline(always)]
+    pub fn of(&self, stage: Stage) -> &[T] {
+        self.between(stage, stage)
+    }
+
+    /// Those from one stage to another, both included.
+    #[inline(always)]
+    pub fn between(&self, first: Stage, last: Stage) -> &[T] {
+        let start = match first as usize {
+            0 => 0,
+            stage => self.ends[stage - 1],
+        };
+        &self.all[start..self.ends[last as usize]]
+    }
+
+    /// All of them.
+    pub fn all(&self) -> &[T] {
+        &self.all
+    }
+
+    /// What `of` makes of them, if it makes something of each.
+    pub fn map<'a, U>(&'a self, of: impl Fn(&'a T) -> Option<U>) -> Option<Staged<U>> {
+        Some(Staged {
+            all: self.all.iter().map(of).collect::<Option<_>>()?,
+            ends: self.ends,
+        })
+    }
+}
+
 /// Moments, known beforehand, at which the right-hand side may jump.
 pub trait Switch: Send + Sync {
     /// The first such moment after `after_s`, or infinity.
