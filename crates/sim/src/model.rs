@@ -204,7 +204,7 @@ impl Model {
         model.layout.extra = model.extra.len();
         model.layout.ledger = 2 * model.accounts.len();
         model.carried =
-            model.has_phases || !model.accounts.is_empty() || !model.terms.all().is_empty();
+            model.has_phases || !model.accounts.is_empty() || model.terms.all().next().is_some();
         // What bends a pole or moves the party is not the affair of one pair.
         let stage = |stage: Stage| model.terms.of(stage).iter();
         model.in_blocks = model.carried
@@ -721,10 +721,9 @@ impl Model {
         }
     }
 
-    /// The terms of the stages from one to another, both included.
     #[inline(always)]
-    fn apply<const FUSED: bool>(&self, first: Stage, last: Stage, t_s: f64, w: &mut Workspace) {
-        for term in self.terms.between(first, last) {
+    fn apply<const FUSED: bool>(terms: &[Box<dyn Term>], t_s: f64, w: &mut Workspace) {
+        for term in terms {
             if FUSED {
                 // SAFETY: where this is true the processor was asked.
                 #[allow(unsafe_code)]
@@ -740,18 +739,18 @@ impl Model {
     /// Handles, the forces there, and what else turns the body, where the shoulders are known.
     #[inline(always)]
     fn handles<const FUSED: bool>(&self, t_s: f64, y: &[f64], w: &mut Workspace) {
-        if !self.terms.of(Stage::Party).is_empty() {
+        if !self.terms.with(Stage::Party).is_empty() {
             self.party(t_s, w);
         }
         self.place::<FUSED>(y, w);
-        let bends = self.terms.of(Stage::Bends);
+        let bends = self.terms.with(Stage::Bends);
         if !bends.is_empty() {
             self.freedoms.orient(y, w);
             for term in bends {
                 term.apply(t_s, w);
             }
         }
-        self.apply::<FUSED>(Stage::Handles, Stage::Body, t_s, w);
+        Self::apply::<FUSED>(self.terms.with(Stage::Handles), t_s, w);
     }
 
     #[inline(always)]
@@ -780,7 +779,7 @@ impl Model {
             self.freedoms.gaps_of(y, w, block.clone());
             local(Stage::Handles).for_each(|term| term.apply_to(t_s, w, block.clone()));
         }
-        self.apply::<false>(Stage::Body, Stage::Body, t_s, w);
+        Self::apply::<false>(self.terms.of(Stage::Body), t_s, w);
     }
 
     #[inline(always)]
@@ -797,12 +796,13 @@ impl Model {
                 pair.stand();
             }
         }
-        let last = if self.in_blocks {
-            Stage::Phases
+        if self.in_blocks {
+            // The shoulders are moved block by block.
+            Self::apply::<false>(self.terms.of(Stage::Clock), t_s, w);
+            Self::apply::<false>(self.terms.of(Stage::Phases), t_s, w);
         } else {
-            Stage::Shoulders
-        };
-        self.apply::<FUSED>(Stage::Clock, last, t_s, w);
+            Self::apply::<FUSED>(self.terms.with(Stage::Shoulders), t_s, w);
+        }
     }
 
     #[cold]
@@ -817,7 +817,7 @@ impl Model {
 
     /// Applies the terms of one effect alone to an evaluated workspace, stage by stage.
     pub fn apply_only(&self, effect: &str, t_s: f64, w: &mut Workspace) {
-        for (term, owner) in self.terms.all().iter().zip(self.owners.all()) {
+        for (term, owner) in self.terms.all().zip(self.owners.all()) {
             if *owner == effect {
                 term.apply(t_s, w);
             }

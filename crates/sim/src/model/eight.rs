@@ -69,7 +69,7 @@ impl Model {
         super::pairs(self.carriers()) <= MOST_PAIRS
             && empty(Stage::Party)
             && empty(Stage::Bends)
-            && self.terms.all().iter().all(|t| t.on_eight().is_some())
+            && self.terms.all().all(|t| t.on_eight().is_some())
             && self.accounts.iter().all(|(_, a)| a.on_eight().is_some())
     }
 
@@ -114,8 +114,8 @@ pub(crate) struct Octet<'a, E: Registers> {
 
 impl SideBySide<'_> {
     #[inline(always)]
-    fn apply<E: Registers>(&self, first: Stage, last: Stage, octets: &mut [Octet<'_, E>]) {
-        for term in self.terms.between(first, last) {
+    fn apply<E: Registers>(terms: &[&dyn OnEight], octets: &mut [Octet<'_, E>]) {
+        for term in terms {
             for at in octets.iter_mut() {
                 E::apply(*term, at.t_s, at.w);
             }
@@ -145,7 +145,7 @@ impl SideBySide<'_> {
                 p.rate = p.constant_rate;
             }
         }
-        self.apply(Stage::Phases, Stage::Phases, octets);
+        Self::apply(self.terms.of(Stage::Phases), octets);
         for at in octets.iter_mut() {
             let rates = at.dy[phases.clone()].chunks_mut(LANES);
             for (p, rate) in at.w.pair.iter().zip(rates) {
@@ -162,7 +162,7 @@ impl SideBySide<'_> {
         for at in octets.iter_mut() {
             at.w.pair.iter_mut().for_each(Pair::stand);
         }
-        self.apply(Stage::Shoulders, Stage::Shoulders, octets);
+        Self::apply(self.terms.of(Stage::Shoulders), octets);
     }
 
     /// The rates of body and extra states, where the shoulders are known.
@@ -172,7 +172,7 @@ impl SideBySide<'_> {
             E::gaps(self.freedoms, at.y, at.w);
             at.w.body_torque = [E::splat(0.0); 3];
         }
-        self.apply(Stage::Handles, Stage::Body, octets);
+        Self::apply(self.terms.with(Stage::Handles), octets);
         for at in octets.iter_mut() {
             E::rates(self.freedoms, at.y, at.w, at.dy);
             if !at.w.extra.is_empty() {

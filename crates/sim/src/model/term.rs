@@ -153,18 +153,34 @@ pub enum Stage {
     Body,
 }
 
-/// Things in the order of their stages, side by side: stages that follow each other are gone through in one loop.
+impl Stage {
+    /// Which part of an evaluation it is of, and its place there: stages with nothing else between them make a part.
+    #[inline(always)]
+    fn part(self) -> (usize, usize) {
+        match self {
+            Self::Clock => (0, 0),
+            Self::Phases => (0, 1),
+            Self::Shoulders => (0, 2),
+            Self::Party => (1, 0),
+            Self::Bends => (2, 0),
+            Self::Handles => (3, 0),
+            Self::Body => (3, 1),
+        }
+    }
+}
+
+/// Things in the order of their stages, a part's side by side: they are gone through in one loop.
 #[derive(Debug)]
 pub(crate) struct Staged<T> {
-    all: Vec<T>,
-    /// Where each stage ends.
-    ends: [usize; Stage::Body as usize + 1],
+    parts: [Vec<T>; 4],
+    /// Where each stage ends in its part.
+    ends: [[usize; 3]; 4],
 }
 
 impl<T> Default for Staged<T> {
     fn default() -> Self {
         Self {
-            all: Vec::new(),
+            parts: Default::default(),
             ends: Default::default(),
         }
     }
@@ -173,8 +189,9 @@ impl<T> Default for Staged<T> {
 impl<T> Staged<T> {
     /// Adds one at the end of its stage.
     pub fn add(&mut self, stage: Stage, one: T) {
-        self.all.insert(self.ends[stage as usize], one);
-        for end in &mut self.ends[stage as usize..] {
+        let (part, place) = stage.part();
+        self.parts[part].insert(self.ends[part][place], one);
+        for end in &mut self.ends[part][place..] {
             *end += 1;
         }
     }
@@ -182,30 +199,36 @@ impl<T> Staged<T> {
     /// Those of one stage.
     #[inline(always)]
     pub fn of(&self, stage: Stage) -> &[T] {
-        self.between(stage, stage)
+        let (part, place) = stage.part();
+        let start = if place == 0 {
+            0
+        } else {
+            self.ends[part][place - 1]
+        };
+        &self.parts[part][start..self.ends[part][place]]
     }
 
-    /// Those from one stage to another, both included.
+    /// Those of the whole part that a stage is of.
     #[inline(always)]
-    pub fn between(&self, first: Stage, last: Stage) -> &[T] {
-        let start = match first as usize {
-            0 => 0,
-            stage => self.ends[stage - 1],
-        };
-        &self.all[start..self.ends[last as usize]]
+    pub fn with(&self, stage: Stage) -> &[T] {
+        &self.parts[stage.part().0]
     }
 
     /// All of them.
-    pub fn all(&self) -> &[T] {
-        &self.all
+    pub fn all(&self) -> impl Iterator<Item = &T> {
+        self.parts.iter().flatten()
     }
 
-    /// What `of` makes of them, if it makes something of each.
+    /// What `of` makes of them; nothing, if it makes nothing of one.
     pub fn map<'a, U>(&'a self, of: impl Fn(&'a T) -> Option<U>) -> Option<Staged<U>> {
-        Some(Staged {
-            all: self.all.iter().map(of).collect::<Option<_>>()?,
+        let mut made = Staged {
+            parts: Default::default(),
             ends: self.ends,
-        })
+        };
+        for (to, from) in made.parts.iter_mut().zip(&self.parts) {
+            *to = from.iter().map(&of).collect::<Option<_>>()?;
+        }
+        Some(made)
     }
 }
 
