@@ -79,16 +79,19 @@ impl Model {
         self.layout.extra_range().is_empty()
     }
 
-    /// The right-hand side for eight moments, where [`Self::on_eight`] says yes.
+    /// The right-hand side for eight moments.
+    ///
+    /// # Panics
+    /// Where [`Self::on_eight`] says no for a term or an account: it is asked first.
     pub(crate) fn side_by_side(&self) -> SideBySide<'_> {
         SideBySide {
             layout: &self.layout,
             freedoms: &*self.freedoms,
-            terms: self.terms.map(|t| t.on_eight()).unwrap_or_default(),
+            terms: self.terms.map(|t| t.on_eight().expect("written for eight")),
             accounts: self
                 .accounts
                 .iter()
-                .filter_map(|(_, a)| a.on_eight())
+                .map(|(_, a)| a.on_eight().expect("written for eight"))
                 .collect(),
         }
     }

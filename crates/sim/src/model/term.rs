@@ -219,16 +219,13 @@ impl<T> Staged<T> {
         self.parts.iter().flatten()
     }
 
-    /// What `of` makes of them; nothing, if it makes nothing of one.
-    pub fn map<'a, U>(&'a self, of: impl Fn(&'a T) -> Option<U>) -> Option<Staged<U>> {
-        let mut made = Staged {
-            parts: Default::default(),
+    /// What `of` makes of each.
+    pub fn map<'a, U>(&'a self, of: impl Fn(&'a T) -> U) -> Staged<U> {
+        let part = |part: &'a Vec<T>| part.iter().map(&of).collect();
+        Staged {
+            parts: self.parts.each_ref().map(part),
             ends: self.ends,
-        };
-        for (to, from) in made.parts.iter_mut().zip(&self.parts) {
-            *to = from.iter().map(&of).collect::<Option<_>>()?;
         }
-        Some(made)
     }
 }
 
