@@ -298,19 +298,19 @@ impl Coordinates for Six {
     fn rates_at<N: Moments>(&self, y: &[N::Each], w: &Workspace<N>, dy: &mut [N::Each]) {
         let y: &[N::Each; 13] = y.first_chunk().expect("thirteen states");
         let dy: &mut [N::Each; 13] = dy.first_chunk_mut().expect("thirteen states");
+        // What is known before the forces are comes first: τ − ω × Iω, to which their torques are added.
+        let ([wx, wy, wz], further) = (w.spin, w.body_torque);
+        let [lx, ly, lz] = self.inertia.times(w.spin);
+        let mut torque = [
+            wz.madd(ly, wy.nmadd(lz, further[0])),
+            wx.madd(lz, wz.nmadd(lx, further[1])),
+            wy.madd(lx, wx.nmadd(ly, further[2])),
+        ];
         let ([force, t], r) = (pull(&w.pair), &w.rotation);
-        let columns = [0, 1, 2].map(|a| [r[0][a], r[1][a], r[2][a]]);
-        let mut in_body = by_rows(columns, t);
-        for (torque, further) in in_body.iter_mut().zip(w.body_torque) {
-            *torque += further;
+        for a in 0..3 {
+            torque[a] = r[0][a].madd(t[0], r[1][a].madd(t[1], r[2][a].madd(t[2], torque[a])));
         }
-        let [wx, wy, wz] = w.spin;
-        let [lx, ly, lz] = self.inertia.times([wx, wy, wz]);
-        let angular = self.inverse_inertia.times([
-            wz.madd(ly, wy.nmadd(lz, in_body[0])),
-            wx.madd(lz, wz.nmadd(lx, in_body[1])),
-            wy.madd(lx, wx.nmadd(ly, in_body[2])),
-        ]);
+        let angular = self.inverse_inertia.times(torque);
         let [qx, qy, qz, qw] = turn([y[3], y[4], y[5], y[6]], w.spin);
         dy[..7].copy_from_slice(&[y[7], y[8], y[9], qx, qy, qz, qw]);
         for a in 0..3 {
@@ -348,8 +348,8 @@ fn place_handles<N: Moments, A: Arms<N>>(
         let [arm, arm_rate] = arms.of(h);
         for a in 0..3 {
             p.arm[a] = arm[a];
-            p.gap[a] = p.base[a] - position[a] - arm[a];
-            p.gap_rate[a] = p.base_rate[a] - velocity[a] - arm_rate[a];
+            p.gap[a] = p.base[a] - (position[a] + arm[a]);
+            p.gap_rate[a] = p.base_rate[a] - (velocity[a] + arm_rate[a]);
         }
     }
 }
@@ -432,9 +432,9 @@ fn dot<T: Number>(a: [T; 3], b: [T; 3]) -> T {
 #[inline(always)]
 fn cross<T: Number>(a: [T; 3], b: [T; 3]) -> [T; 3] {
     [
-        a[2].nmadd(b[1], a[1] * b[2]),
-        a[0].nmadd(b[2], a[2] * b[0]),
-        a[1].nmadd(b[0], a[0] * b[1]),
+        b[1].nmadd(a[2], a[1] * b[2]),
+        b[2].nmadd(a[0], a[2] * b[0]),
+        b[0].nmadd(a[1], a[0] * b[1]),
     ]
 }
 
@@ -448,7 +448,7 @@ fn pull<N: Moments>(pairs: &[Pair<N>]) -> [[N::Each; 3]; 2] {
         force[0] += fx;
         force[1] += fy;
         force[2] += fz;
-        torque[0] = az.nmadd(fy, ay.madd(fz, torque[0]));
+        torque[0] = ay.madd(fz, az.nmadd(fy, torque[0]));
         torque[1] = ax.nmadd(fz, az.madd(fx, torque[1]));
         torque[2] = ay.nmadd(fx, ax.madd(fy, torque[2]));
     }
