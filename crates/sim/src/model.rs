@@ -111,6 +111,7 @@ pub struct Model {
     straps: [f64; 2],
     watches_contact: bool,
     has_friction: bool,
+    turns_softly: Option<f64>,
     /// Whether there are so many carriers that they are treated block by block.
     in_blocks: bool,
     /// Whether the processor has AVX2 and FMA, and the carriers are not in blocks.
@@ -168,6 +169,7 @@ impl Model {
             extra: Vec::new(),
             watches_contact: false,
             has_friction: false,
+            turns_softly: None,
             in_blocks: false,
             fused: false,
             sensor_clocks: Vec::new(),
@@ -287,6 +289,11 @@ impl Model {
     /// Says that a force turns with the sense of a motion.
     pub(crate) fn expect_friction(&mut self) {
         self.has_friction = true;
+    }
+
+    /// A torque about the body's x axis turns with the sense of the motion, within about this rate, rad/s.
+    pub(crate) fn turn_softly(&mut self, within_rad_per_s: f64) {
+        self.turns_softly = Some(within_rad_per_s);
     }
 
     /// Whether a contact can pull: for effects that come after it in the table.
@@ -426,6 +433,11 @@ impl Model {
     /// Whether a force turns with the sense of a motion, faster than the motion itself changes.
     pub fn has_friction(&self) -> bool {
         self.has_friction
+    }
+
+    /// Within which rate of rolling, rad/s, a friction about the body's x axis turns round, if there is one.
+    pub fn turns_softly(&self) -> Option<f64> {
+        self.turns_softly
     }
 
     /// Whether contacts can open and close.

@@ -51,6 +51,7 @@ impl PoleFriction {
             rate2: self.regularising_rate_rad_per_s.powi(2),
         };
         model.expect_friction();
+        model.turn_softly(self.regularising_rate_rad_per_s);
         model.add(Stage::Body, AsWhole(law.clone()));
         model.add_account("pole_friction", law);
     }

@@ -11,7 +11,8 @@
 //! evaluations.
 //!
 //! A load that is carried in step comes by again and again, so what came after events like the last one is remembered ([`memory`]): when the
-//! next is due, and how the slopes went.
+//! next is due, and how the slopes went. What a first step after a jump could be, and whether one that reaches the next moment which none
+//! may cross is worth trying, is learnt too ([`sizes`]); where friction turns round, how short steps must be is known beforehand ([`turn`]).
 //!
 //! The stages are a polynomial of degree 8, which holds samples and events; where it does not, the step is taken anew to the moment that
 //! is asked for, from what is known of it: for good at a sample of the log or an event, aside for a sensor. Within a step contacts are frozen, as in [`super::pair`].
@@ -22,8 +23,10 @@
 
 mod memory;
 mod modes;
+mod sizes;
 mod stages;
 mod tableau;
+mod turn;
 
 use super::course::{Course, SAME_MOMENT_S};
 use super::events::{self, Looks};
@@ -36,8 +39,10 @@ use crate::lanes::{MOMENTS, Plain8};
 use crate::model::{Model, Registers, SideBySide};
 use memory::Memory;
 use modes::{Mode, Row, modes};
+use sizes::Sizes;
 use stages::{Demand, Guess, Kept, Solved, Stages, Step};
 use tableau::C;
+use turn::{Bend, Turn};
 
 const NAME: &str = "radau15";
 /// What a step may err by its own estimate, in units of the tolerance asked for; as [`pair::Pair::SHARE`].
@@ -58,8 +63,6 @@ const ORDER: i32 = 12;
 const SAFETY: f64 = 0.93;
 const SHRINK: f64 = 0.2;
 const GROW: f64 = 4.0;
-/// No two jumps are alike: a first step after one may be so much of what it could have been the last time.
-const CAUTION: f64 = 0.9;
 const SMALLEST_STEP_S: f64 = 1e-13;
 /// Where a step may end at an event, its polynomial may err by so much of what a step may err: this estimate is hardly more than the error.
 const TRUST: f64 = 0.5;
@@ -248,10 +251,11 @@ struct Run<'m, E: Registers> {
     looks: Looks,
     margin_n: f64,
     h_next: f64,
-    /// How many handles rested before and rest after the jump that the next step begins with, and what a first step could be then.
-    jumped: Option<[usize; 2]>,
-    after_jump: [[f64; 3]; 3],
+    sizes: Sizes,
+    turn: Turn,
     memory: Memory<E>,
+    /// Whether the step before ended with an event.
+    fired: bool,
     /// How often convergence has limited the steps lately.
     limited: u32,
 }
@@ -295,8 +299,9 @@ impl<'m, E: Solve> Run<'m, E> {
             looks: Looks::new(),
             margin_n: 0.0,
             h_next: 0.0,
-            jumped: None,
-            after_jump: [[f64::INFINITY; 3]; 3],
+            sizes: Sizes::new(),
+            turn: Turn::new(),
+            fired: false,
             memory: Memory::new(stages.kept().len()),
             limited: 0,
             stages,
@@ -421,51 +426,61 @@ impl<'m, E: Solve> Run<'m, E> {
         self.look_around();
         let t0 = self.course.t_s;
         let left = self.course.stop_s() - t0;
-        // A jump excites what the step before it has not met: what a first step could be was learnt the last time as many handles rested.
-        let wanted = match self.jumped {
-            Some([before, resting]) => self.h_next.min(CAUTION * self.after_jump[before][resting]),
-            None => self.h_next,
-        };
+        let wanted = self.sizes.wanted_s(self.h_next);
+        let bend = self.bend();
+        let bend_s = bend.map_or(f64::INFINITY, |bend| self.turn.reach_s(&bend));
+        let reach_s = self.memory.reach_s(t0);
+        let bend = bend.filter(|_| bend_s < wanted.min(left));
         let room = |h: f64| if h == left { FILLS } else { 1.0 };
-        let mut h = self.fitted(wanted.min(self.memory.reach_s(t0)), left);
+        // An event leaves no crumb: it begins anew behind it.
+        let fitted = self.fitted(wanted.min(bend_s), left).min(reach_s);
+        let place = self.sizes.place(self.course.resting());
+        let dared =
+            fitted < left && left <= reach_s.min(bend_s) && self.sizes.dares(place, left, wanted);
+        let mut h = if dared { left } else { fitted };
         let mut solved = self.solve(h, None, room(h));
         let mut rejected = false;
         while !(solved.converged && solved.error <= room(h)) {
             self.course.stats.rejected += 1;
             self.course.check_work()?;
-            rejected = true;
-            let factor = if solved.converged {
-                (SAFETY * stretch(solved.error)).clamp(SHRINK, 0.9)
-            } else {
+            let factor = if !solved.converged {
                 0.5
+            } else if let Some(bend) = bend {
+                self.turn.learn(&bend, h, solved.error);
+                (self.turn.reach_s(&bend) / h).clamp(SHRINK, 0.9)
+            } else {
+                (SAFETY * stretch(solved.error)).clamp(SHRINK, 0.9)
             };
-            let shorter = self.fitted(h * factor, left).min(0.95 * h);
+            let mut shorter = self.fitted(h * factor, left).min(0.95 * h);
+            if dared && !rejected {
+                self.sizes.dared(place, false);
+                shorter = shorter.min(fitted);
+            } else if !solved.converged {
+                self.limited += FAILED;
+            }
+            rejected = true;
             if shorter < SMALLEST_STEP_S && shorter < left {
                 return Err(self.too_small(shorter));
             }
             let part = solved.converged.then_some(shorter / h);
-            if !solved.converged {
-                self.limited += FAILED;
-            }
             h = shorter;
             solved = self.solve(h, part, room(h));
         }
         self.limited = self.limited.saturating_sub(1);
+        if dared && !rejected {
+            self.sizes.dared(place, true);
+        }
+        if let Some(bend) = bend {
+            self.turn.learn(&bend, h, solved.error);
+        }
         let tried = h;
         let factor = (SAFETY * stretch(solved.error.max(1e-14)))
             .clamp(SHRINK, if rejected { 1.0 } else { GROW });
         let proposal = tried * factor;
-        let jumped = self.jumped.take();
-        if let Some([before, resting]) = jumped {
-            let could = &mut self.after_jump[before][resting];
-            *could = if tried < wanted && !rejected {
-                could.max(proposal)
-            } else {
-                proposal
-            };
-        }
         // A step that was cut to meet a moment says nothing against a longer one.
-        self.h_next = if tried < wanted && !rejected {
+        let cut = tried < wanted && !rejected;
+        self.sizes.held(proposal, cut);
+        self.h_next = if cut || bend.is_some() {
             proposal.max(wanted)
         } else {
             proposal
@@ -524,14 +539,15 @@ impl<'m, E: Solve> Run<'m, E> {
         self.course.arrive(t1, false, observer)?;
         self.stages.keep();
         (self.before_s, self.ended) = (h, end_s / h);
-        if jumped.is_some() {
+        if std::mem::take(&mut self.fired) {
             self.memory.note(h, self.stages.kept());
         }
         if event.is_some() {
             let before = self.course.resting();
             self.course.fire(observer);
             let resting = [before, self.course.resting()];
-            self.jumped = Some(resting.map(|r| (r.count_ones() as usize).min(2)));
+            self.sizes.event(resting);
+            self.fired = true;
             if let Some((step_s, slopes)) = self.memory.event(t1, resting) {
                 self.stages.recall(slopes);
                 (self.before_s, self.ended) = (step_s, 0.0);
@@ -543,10 +559,22 @@ impl<'m, E: Solve> Run<'m, E> {
             self.margin_n = self.stages.margins()[MOMENTS - 1];
             self.slope_known = true;
         }
+        if event.is_none() && switched {
+            self.sizes.switch(self.course.resting());
+        }
         if (event.is_some() || switched) && !self.course.finished() {
             self.begin();
         }
         Ok(())
+    }
+
+    /// The bend that friction makes where the body turns round, seen from the start of a step.
+    fn bend(&self) -> Option<Bend> {
+        let model = self.course.model;
+        let soft_rad_per_s = model.turns_softly()?;
+        let rate = model.freedoms().pose(&self.course.y).spin_rad_per_s[0];
+        let [_, turning] = model.freedoms().acceleration(&self.course.y, &self.slope);
+        Some(Bend::new(soft_rad_per_s, rate, turning[0]))
     }
 
     /// Puts the state at a part of the step into `at`, by a step that ends there and of which nothing else is kept.
