@@ -469,19 +469,16 @@ fn times<T: Number>(m: &Matrix3<f64>, v: [T; 3]) -> [T; 3] {
 #[inline(always)]
 pub(crate) fn rotation<T: Number>(q: &[T]) -> [[T; 3]; 3] {
     let (x, y, z, w) = (q[0], q[1], q[2], q[3]);
-    let (one, two) = (T::splat(1.0), T::splat(2.0));
-    let s = two / w.madd(w, dot([x, y, z], [x, y, z]));
-    let (sx, sy, sz) = (s * x, s * y, s * z);
-    let (wx, wy, wz) = (sx * w, sy * w, sz * w);
-    let less = sz.nmadd(z, one);
+    let one = T::splat(1.0);
+    // All that does not wait for the division is done beside it.
+    let (xx, zz) = (x * x, z * z);
+    let (yz, zx, xy) = (y.madd(y, zz), x.madd(x, zz), y.madd(y, xx));
+    let s = T::splat(2.0) / (yz + w.madd(w, xx));
+    let (wx, wy, wz) = (w * x, w * y, w * z);
     [
-        [sy.nmadd(y, less), sx.madd(y, -wz), sx.madd(z, wy)],
-        [sx.madd(y, wz), sx.nmadd(x, less), sy.madd(z, -wx)],
-        [
-            sx.madd(z, -wy),
-            sy.madd(z, wx),
-            sy.nmadd(y, sx.nmadd(x, one)),
-        ],
+        [yz.nmadd(s, one), x.madd(y, -wz) * s, x.madd(z, wy) * s],
+        [x.madd(y, wz) * s, zx.nmadd(s, one), y.madd(z, -wx) * s],
+        [x.madd(z, -wy) * s, y.madd(z, wx) * s, xy.nmadd(s, one)],
     ]
 }
 

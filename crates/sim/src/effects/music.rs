@@ -176,11 +176,12 @@ struct Pull {
 impl Whole for Pull {
     #[inline(always)]
     fn act<N: Moments>(&self, _t_s: N::Each, w: &mut Workspace<N>) {
-        // sin(ψ − φ) from the sines and cosines that are there already.
+        // K sin(ψ − φ) from the sines and cosines that are there already, the beat's last, as they are known last.
         let [sin, cos] = w.beat.map(N::both);
         for (p, strength) in w.pair.iter_mut().zip(&self.strength) {
-            let apart = p.sin.nmadd(cos, p.cos * sin);
-            p.rate = N::always(*strength).madd(apart, p.rate);
+            let strength = N::always(*strength);
+            let slowed = (strength * p.sin).nmadd(cos, p.rate);
+            p.rate = (strength * p.cos).madd(sin, slowed);
         }
     }
 }
