@@ -27,7 +27,7 @@ fn content(path: &Path) -> Content {
 
 fn record(folder: &Path) -> Command {
     let mut sim = Command::new(bin("sim"));
-    sim.args(["record", "baseline", "--duration", "120"])
+    sim.args(["record", "baseline", "--duration", "600"])
         .args(["--out", "run.mcap"])
         .current_dir(folder)
         .stdout(Stdio::null())

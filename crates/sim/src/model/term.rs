@@ -339,3 +339,34 @@ impl<T: Book> PowerOnEight for T {
         Book::power(self, w, &w.pair, 0)
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn things_lie_in_the_order_of_their_stages_whatever_comes_first() {
+        use Stage::*;
+        let order = [Clock, Phases, Shoulders, Party, Bends, Handles, Body];
+        let mut staged = Staged::default();
+        for (k, place) in [5, 0, 6, 2, 4, 1, 3, 6, 0, 5, 2].into_iter().enumerate() {
+            staged.add(order[place], (place, k));
+        }
+        let of = |stage: Stage| staged.of(stage).to_vec();
+        assert_eq!(of(Clock), [(0, 1), (0, 8)]);
+        assert_eq!(of(Phases), [(1, 5)]);
+        assert_eq!(of(Shoulders), [(2, 3), (2, 10)]);
+        assert_eq!(of(Body), [(6, 2), (6, 7)]);
+        let all: Vec<_> = staged.all().copied().collect();
+        assert!(all.is_sorted(), "{all:?}");
+        // A part is all its stages, one after the other, and so is what is made of it.
+        let names = staged.map(|(place, _)| order[*place]);
+        assert_eq!(
+            names.with(Phases),
+            [Clock, Clock, Phases, Shoulders, Shoulders]
+        );
+        assert_eq!(names.with(Body), [Handles, Handles, Body, Body]);
+        assert_eq!(names.of(Handles), [Handles; 2]);
+        assert!(Staged::<u8>::default().with(Clock).is_empty());
+    }
+}
