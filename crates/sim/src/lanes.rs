@@ -39,28 +39,23 @@ pub fn pack(values: impl ExactSizeIterator<Item = f64>) -> Vec<f64x2> {
 /// Reads `y` (one number per carrier, contiguous) pair by pair; padding is zero.
 #[inline(always)]
 pub fn load(y: &[f64]) -> impl Iterator<Item = f64x2> {
-    y.chunks(LANES).map(|c| match c.try_into() {
-        Ok(pair) => f64x2::new(pair),
-        Err(_) => half(c),
+    y.chunks(LANES).map(|c| {
+        f64x2::new(if let [a, b] = c {
+            [*a, *b]
+        } else {
+            [c[0], 0.0]
+        })
     })
-}
-
-/// Apart, so that a whole pair is read at once.
-#[cold]
-fn half(last: &[f64]) -> f64x2 {
-    f64x2::new([last[0], 0.0])
 }
 
 /// Writes pairs into `y` (one number per carrier, contiguous).
 #[inline(always)]
 pub fn store(packed: impl Iterator<Item = f64x2>, y: &mut [f64]) {
     for (to, from) in y.chunks_mut(LANES).zip(packed) {
-        match to.try_into() {
-            Ok(pair) => {
-                let pair: &mut [f64; LANES] = pair;
-                *pair = from.to_array();
-            }
-            Err(_) => to[0] = from.to_array()[0],
+        let [a, b] = from.to_array();
+        to[0] = a;
+        if let [_, second] = to {
+            *second = b;
         }
     }
 }

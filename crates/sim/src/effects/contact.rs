@@ -215,12 +215,10 @@ impl Local for SpringDampers {
     fn act<N: Moments>(&self, _t_s: N::Each, w: &mut Workspace<N>, part: impl Part) {
         for (p, &(stiffness, damping)) in part.of_mut(&mut w.pair).iter_mut().zip(part.of(&self.0))
         {
-            let (stiffness, damping) = (N::always(stiffness), N::always(damping));
-            p.unclamped = damping.madd(p.gap_rate[2], stiffness * p.gap[2]);
-            // The gain, 0 or 1, is known before the rate of the gap.
-            let spring = stiffness * p.contact_gain * p.gap[2];
-            let acting = (damping * p.contact_gain).madd(p.gap_rate[2], spring);
-            p.normal = acting.larger(p.contact_floor);
+            let spring = N::always(stiffness) * p.gap[2];
+            let free = N::always(damping).madd(p.gap_rate[2], spring);
+            p.unclamped = free;
+            p.normal = (free * p.contact_gain).larger(p.contact_floor);
         }
     }
 }
