@@ -4,7 +4,10 @@
 //! not exist. A program that is killed leaves at most the temporary file, whose closed chunks can be read. To a stream, nothing
 //! is ever sought.
 //!
-//! The bytes depend on what is written alone: chunks close by size and by the recording's own clock, not by the wall's.
+//! The bytes depend on what is written alone: chunks close by size and by the recording's own clock, not by the wall's, and whether a thread
+//! of its own compresses them changes nothing.
+
+mod beside;
 
 use std::{
     collections::BTreeMap,
@@ -17,6 +20,7 @@ use std::{
 use mcap::{Compression, WriteOptions, records::MessageHeader, write::NoSeek};
 
 use crate::{cdr, read::ChannelInfo, topics::MessageKind};
+use beside::{Batch, Beside};
 
 /// A message larger than this is refused.
 const MAX_MESSAGE_BYTES: usize = 256 << 20;
@@ -30,6 +34,9 @@ pub struct WriterOptions {
     pub chunk_ns: i64,
     /// zstd level, 1 (fast) to 22 (small).
     pub zstd_level: u32,
+    /// Whether messages are compressed and written by a thread of its own, while the caller goes on. What went wrong then comes to light with
+    /// a later message, or at [`RecordingWriter::finish`].
+    pub own_thread: bool,
 }
 
 impl Default for WriterOptions {
@@ -38,6 +45,7 @@ impl Default for WriterOptions {
             chunk_bytes: 512 << 10,
             chunk_ns: 10_000_000_000,
             zstd_level: 1,
+            own_thread: false,
         }
     }
 }
@@ -178,14 +186,36 @@ struct Channel {
     sequence: u32,
 }
 
-/// A recording that is being written.
-pub struct RecordingWriter {
+/// The container, with chunks that close by the recording's own clock.
+struct Container {
     writer: mcap::Writer<NoSeek<Sink>>,
-    target: String,
-    channels: Vec<Channel>,
-    buffer: Vec<u8>,
     chunk_start_ns: Option<i64>,
     chunk_ns: i64,
+}
+
+impl Container {
+    fn message(&mut self, header: &MessageHeader, data: &[u8]) -> mcap::McapResult<()> {
+        let t_ns = header.log_time.cast_signed();
+        let start_ns = *self.chunk_start_ns.get_or_insert(t_ns);
+        self.writer.write_to_known_channel(header, data)?;
+        if t_ns.saturating_sub(start_ns) >= self.chunk_ns {
+            self.chunk_start_ns = None;
+            self.writer.flush()?;
+        }
+        Ok(())
+    }
+}
+
+/// A recording that is being written.
+pub struct RecordingWriter {
+    /// `None` while a thread has it.
+    container: Option<Box<Container>>,
+    beside: Option<Beside>,
+    own_thread: bool,
+    /// What has not been handed over yet.
+    batch: Batch,
+    target: String,
+    channels: Vec<Channel>,
 }
 
 impl RecordingWriter {
@@ -227,13 +257,47 @@ impl RecordingWriter {
             .create(NoSeek::new(sink))
             .map_err(|error| failed(&target, error))?;
         Ok(RecordingWriter {
-            writer,
+            container: Some(Box::new(Container {
+                writer,
+                chunk_start_ns: None,
+                chunk_ns: options.chunk_ns,
+            })),
+            beside: None,
+            own_thread: options.own_thread,
+            batch: Batch::default(),
             target,
             channels: Vec::new(),
-            buffer: Vec::new(),
-            chunk_start_ns: None,
-            chunk_ns: options.chunk_ns,
         })
+    }
+
+    /// Sends what is waiting on its way.
+    fn hand_over(&mut self) -> Result<(), WriteError> {
+        if self.own_thread && self.beside.is_none() {
+            let container = self.container.take().expect("no thread has it");
+            match Beside::start(container) {
+                Ok(beside) => self.beside = Some(beside),
+                Err(container) => self.container = Some(container),
+            }
+        }
+        match &self.beside {
+            Some(beside) if beside.take(&mut self.batch) => Ok(()),
+            _ => self.at_hand().map(drop),
+        }
+    }
+
+    /// The container, with everything in it that has been said so far.
+    fn at_hand(&mut self) -> Result<&mut Container, WriteError> {
+        let mut outcome = Ok(());
+        if let Some(beside) = self.beside.take() {
+            let (container, ended) = beside.end();
+            self.container = Some(container);
+            outcome = ended;
+        }
+        let container = self.container.as_mut().expect("no thread has it");
+        match outcome.and_then(|()| self.batch.write(container)) {
+            Ok(()) => Ok(container),
+            Err(error) => Err(failed(&self.target, error)),
+        }
     }
 
     /// Adds a metadata record.
@@ -246,10 +310,10 @@ impl RecordingWriter {
             name: name.to_owned(),
             metadata: values.clone(),
         };
-        self.chunk_start_ns = None;
-        self.writer
-            .write_metadata(&record)
-            .map_err(|error| failed(&self.target, error))
+        let container = self.at_hand()?;
+        container.chunk_start_ns = None;
+        let result = container.writer.write_metadata(&record);
+        result.map_err(|error| failed(&self.target, error))
     }
 
     /// Attaches a file.
@@ -266,12 +330,12 @@ impl RecordingWriter {
             media_type: media_type.to_owned(),
             data: bytes.into(),
         };
-        self.chunk_start_ns = None;
+        let container = self.at_hand()?;
+        container.chunk_start_ns = None;
         // The library wants the chunk closed before an attachment.
-        self.writer
-            .flush()
-            .and_then(|()| self.writer.attach(&record))
-            .map_err(|error| failed(&self.target, error))
+        let flushed = container.writer.flush();
+        let result = flushed.and_then(|()| container.writer.attach(&record));
+        result.map_err(|error| failed(&self.target, error))
     }
 
     /// Opens a channel for messages of a known kind.
@@ -288,10 +352,11 @@ impl RecordingWriter {
 
     /// Opens a channel that is given by its parts.
     pub fn raw_channel(&mut self, channel: &RawChannel<'_>) -> Result<ChannelId, WriteError> {
+        let writer = &mut self.at_hand()?.writer;
         let schema = if channel.schema_encoding.is_empty() && channel.schema_data.is_empty() {
             Ok(0)
         } else {
-            self.writer.add_schema(
+            writer.add_schema(
                 channel.schema_name,
                 channel.schema_encoding,
                 channel.schema_data,
@@ -299,7 +364,7 @@ impl RecordingWriter {
         };
         let id = schema
             .and_then(|schema| {
-                self.writer.add_channel(
+                writer.add_channel(
                     schema,
                     channel.topic,
                     channel.message_encoding,
@@ -323,8 +388,9 @@ impl RecordingWriter {
         message: &M,
     ) -> Result<(), WriteError> {
         let channel = &mut self.channels[channel.0];
-        self.buffer.clear();
-        message.encode_into(&mut self.buffer);
+        let begin = self.batch.end();
+        self.batch.bytes.truncate(begin);
+        message.encode_into(&mut self.batch.bytes);
         let Ok(time) = u64::try_from(t_ns) else {
             return Err(WriteError::NegativeTime {
                 target: self.target.clone(),
@@ -332,37 +398,35 @@ impl RecordingWriter {
                 t_ns,
             });
         };
-        if self.buffer.len() > MAX_MESSAGE_BYTES {
+        let bytes = self.batch.bytes.len() - begin;
+        if bytes > MAX_MESSAGE_BYTES {
             let (target, topic) = (self.target.clone(), channel.topic.clone());
             return Err(WriteError::TooLarge {
                 target,
                 topic,
-                bytes: self.buffer.len(),
+                bytes,
             });
         }
-        let header = MessageHeader {
+        self.batch.close(MessageHeader {
             channel_id: channel.id,
             sequence: channel.sequence,
             log_time: time,
             publish_time: time,
-        };
+        });
         channel.sequence = channel.sequence.wrapping_add(1);
-        let start_ns = *self.chunk_start_ns.get_or_insert(t_ns);
-        let mut result = self.writer.write_to_known_channel(&header, &self.buffer);
-        if result.is_ok() && t_ns.saturating_sub(start_ns) >= self.chunk_ns {
-            self.chunk_start_ns = None;
-            result = self.writer.flush();
+        if !self.own_thread || self.batch.is_full() {
+            self.hand_over()?;
         }
-        result.map_err(|error| failed(&self.target, error))
+        Ok(())
     }
 
     /// Writes indexes and summary and gives the file its name.
     pub fn finish(mut self) -> Result<(), WriteError> {
-        self.writer
-            .finish()
-            .map_err(|error| failed(&self.target, error))?;
-        let target = self.target;
-        let sink = self.writer.into_inner().into_inner();
+        let result = self.at_hand()?.writer.finish();
+        let (target, container) = (self.target, self.container);
+        result.map_err(|error| failed(&target, error))?;
+        let container = container.expect("no thread has it");
+        let sink = container.writer.into_inner().into_inner();
         sink.commit().map_err(|cause| WriteError::Io {
             target,
             cause: plain(cause),

@@ -15,7 +15,7 @@ use recording::{
     read::{ReadOptions, Recording},
     schema::rath,
     topics::{self, MessageKind},
-    write::{RecordingWriter, WriteError, WriterOptions},
+    write::{RawChannel, RecordingWriter, WriteError, WriterOptions},
 };
 
 fn fill(writer: &mut RecordingWriter, messages: i64) -> Result<(), WriteError> {
@@ -57,6 +57,46 @@ impl Write for Shared {
     fn flush(&mut self) -> io::Result<()> {
         Ok(())
     }
+}
+
+/// By the caller's thread, and by one of its own.
+fn both_ways() -> [WriterOptions; 2] {
+    [false, true].map(|own_thread| WriterOptions {
+        own_thread,
+        ..WriterOptions::default()
+    })
+}
+
+#[test]
+fn a_thread_of_its_own_writes_the_same_bytes() {
+    let [here, beside] = both_ways().map(|options| {
+        let shared = Shared::default();
+        let mut writer = RecordingWriter::to_stream(shared.clone(), &options).expect("begins");
+        // What is no message comes between messages and stays there; some are larger than what waits together.
+        for part in 0..3 {
+            fill(&mut writer, 3000).expect("writes");
+            let name = format!("part {part}");
+            writer.metadata(&name, &BTreeMap::new()).expect("writes");
+            let raw = RawChannel {
+                topic: &name,
+                message_encoding: "",
+                schema_name: "",
+                schema_encoding: "",
+                schema_data: &[],
+                metadata: &BTreeMap::new(),
+            };
+            let raw = writer.raw_channel(&raw).expect("opens");
+            for size in [0, 1, 1 << 20] {
+                let message = vec![7_u8; size];
+                writer.message(raw, 1, &message[..]).expect("writes");
+            }
+        }
+        writer.finish().expect("finishes");
+        std::mem::take(&mut *shared.0.lock().expect("unpoisoned"))
+    });
+    assert!(here == beside);
+    let messages = mcap::MessageStream::new(&beside).expect("opens");
+    assert_eq!(messages.filter(Result::is_ok).count(), 3 * (6000 + 3));
 }
 
 #[test]
@@ -114,15 +154,18 @@ fn nothing_is_left_when_it_fails_or_is_given_up() {
     let folder = tempfile::tempdir().expect("a folder");
     let path = folder.path().join("a.mcap");
     fs::write(&path, "old").expect("writes");
-    let mut writer = RecordingWriter::create(&path, &WriterOptions::default()).expect("begins");
-    fill(&mut writer, 100).expect("writes");
-    drop(writer);
-    assert_eq!(fs::read_dir(folder.path()).expect("lists").count(), 1);
-    assert_eq!(
-        fs::read(&path).expect("reads"),
-        b"old",
-        "what was there stays"
-    );
+    for options in both_ways() {
+        let mut writer = RecordingWriter::create(&path, &options).expect("begins");
+        fill(&mut writer, 5000).expect("writes");
+        assert_eq!(fs::read_dir(folder.path()).expect("lists").count(), 2);
+        drop(writer);
+        assert_eq!(fs::read_dir(folder.path()).expect("lists").count(), 1);
+        assert_eq!(
+            fs::read(&path).expect("reads"),
+            b"old",
+            "what was there stays"
+        );
+    }
 
     let error = RecordingWriter::create(
         Path::new("no/such/folder/a.mcap"),
@@ -145,16 +188,21 @@ fn nothing_is_left_when_it_fails_or_is_given_up() {
 #[cfg(target_os = "linux")]
 #[test]
 fn a_full_disk_is_said() {
-    let result = RecordingWriter::create(Path::new("/dev/full"), &WriterOptions::default())
-        .and_then(|mut writer| {
-            fill(&mut writer, 5000)?;
-            writer.finish()
-        });
-    let error = result.expect_err("there is no room").to_string();
-    assert!(
-        error.starts_with("/dev/full: cannot be written: No space left on device"),
-        "{error}"
-    );
+    for options in both_ways() {
+        // At the end, and at a message long before it.
+        for messages in [10, 100_000_000] {
+            let result =
+                RecordingWriter::create(Path::new("/dev/full"), &options).and_then(|mut writer| {
+                    fill(&mut writer, messages)?;
+                    writer.finish()
+                });
+            let error = result.expect_err("there is no room").to_string();
+            assert!(
+                error.starts_with("/dev/full: cannot be written: No space left on device"),
+                "{error}"
+            );
+        }
+    }
 }
 
 #[test]
@@ -180,8 +228,13 @@ fn child_that_is_killed() {
     let Ok(path) = std::env::var("RATH_TEST_KILLED") else {
         return;
     };
-    let mut writer =
-        RecordingWriter::create(Path::new(&path), &WriterOptions::default()).expect("begins");
+    let [here, beside] = both_ways();
+    let options = if std::env::var_os("RATH_TEST_BESIDE").is_some() {
+        beside
+    } else {
+        here
+    };
+    let mut writer = RecordingWriter::create(Path::new(&path), &options).expect("begins");
     fill(&mut writer, i64::from(u32::MAX)).expect("writes");
 }
 
@@ -189,10 +242,15 @@ fn child_that_is_killed() {
 fn a_killed_writer_leaves_whole_messages_under_another_name() {
     let folder = tempfile::tempdir().expect("a folder");
     let rounds = if cfg!(debug_assertions) { 10 } else { 100 };
-    let mut salvaged = 0;
+    let mut salvaged = [0; 2];
     for round in 0..rounds {
         let path = folder.path().join("a.mcap");
-        let mut child = Command::new(std::env::current_exe().expect("this test"))
+        let way = round as usize % 2;
+        let mut command = Command::new(std::env::current_exe().expect("this test"));
+        if way == 1 {
+            command.env("RATH_TEST_BESIDE", "");
+        }
+        let mut child = command
             .args(["child_that_is_killed", "--exact"])
             .env("RATH_TEST_KILLED", &path)
             .stdout(Stdio::null())
@@ -219,11 +277,14 @@ fn a_killed_writer_leaves_whole_messages_under_another_name() {
                             .enumerate()
                             .all(|(i, y)| *y == -(i as f64))
                     );
-                    salvaged += signal.values.len();
+                    salvaged[way] += signal.values.len();
                 }
             }
             fs::remove_file(part).expect("removes");
         }
     }
-    assert!(salvaged > 0, "some message was salvaged in {rounds} rounds");
+    assert!(
+        salvaged.iter().all(|some| *some > 0),
+        "some message was salvaged either way in {rounds} rounds: {salvaged:?}"
+    );
 }
