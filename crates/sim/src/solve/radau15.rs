@@ -53,9 +53,9 @@ const ITERATION: f64 = 0.02;
 /// but for what the sweeps leave.
 const LOOSE: f64 = 5e-6;
 /// A step that leaves nothing before a moment that none may cross may err by so many times as much: it stands for two.
-const FILLS: f64 = 10.0;
-/// Such a step may be so many times as long as another: FILLS in the law of the step size, and a little less.
-const STRETCH: f64 = 1.3;
+const FILLS: f64 = 30.0;
+/// Such a step is tried if it is at most so many times as long as another would be: what it saves is worth a few in vain.
+const STRETCH: f64 = 1.5;
 /// Below this a step's error estimate is rounding.
 const FINEST: f64 = 1e-14;
 /// Of the error estimate.

@@ -9,10 +9,6 @@ use std::ops::Range;
 
 /// After so many sweeps an iteration that has not ended will not.
 const MOST_SWEEPS: u32 = 16;
-/// From this sweep on the stages are near enough to see that a step is far too long.
-const TELLING: u32 = 3;
-/// An error estimate so many times the tolerance will not fall below it by further sweeps.
-const HOPELESS: f64 = 20.0;
 /// So many times what the next coefficient would be, the slopes' polynomial may miss the slope at the start by.
 const EXPECTED: f64 = 10.0;
 /// A mode that a step hardly moves is left to the sweeps.
@@ -123,9 +119,12 @@ pub struct Stages<E: Registers> {
     pub y: Vec<E>,
     /// Slopes at the nodes.
     pub f: Vec<E>,
-    /// Legendre coefficients of the slopes: of the step solved last, and of the one accepted last; with room for whole [`tiles`].
+    /// Legendre coefficients of the slopes, from the state `first` on: of the step solved last, and of the one accepted last; with room for
+    /// whole [`tiles`].
     parts: Vec<E>,
     smooth: Vec<E>,
+    /// States before this one are integrals of velocities: guessed and judged with them.
+    first: usize,
     /// Takes an error of a state to units: 1/(unit + |y|); nothing beyond the states.
     pub scale: Vec<f64>,
     /// How far the states at each node are from those at the start, eight states side by side; whether they are those of the step
@@ -250,17 +249,22 @@ impl<E: Registers> Stages<E> {
         let size = model.layout().size();
         let tiled = size.next_multiple_of(MOMENTS);
         let zero = E::splat(0.0);
+        let positions = model.freedoms().positions();
+        let quaternion = model.freedoms().rotation().is_some();
+        let first = if quaternion { 3 } else { positions };
+        let rest = (size - first).next_multiple_of(MOMENTS);
         Self {
             w: Workspace::blank(),
             y: vec![zero; size],
             f: vec![zero; size],
-            parts: vec![zero; tiled],
-            smooth: vec![zero; tiled],
-            scale: vec![0.0; tiled],
+            parts: vec![zero; rest],
+            smooth: vec![zero; rest],
+            first,
+            scale: vec![0.0; first + rest],
             across: vec![[zero; MOMENTS]; tiled / MOMENTS],
             laid: false,
-            velocities: model.freedoms().positions()..model.layout().body,
-            quaternion: model.freedoms().rotation().is_some(),
+            velocities: positions..model.layout().body,
+            quaternion,
             a: columns(&TABLEAU.a),
             step: [zero; MOMENTS],
             legendre: columns(&TABLEAU.legendre),
@@ -358,8 +362,10 @@ impl<E: Registers> Stages<E> {
                 let here: [f64; MOMENTS] =
                     std::array::from_fn(|k| if k < reach { here[k] } else { 0.0 });
                 let here = E::load(&here);
+                let (y0, slope) = (&y0[self.first..], &slope[self.first..]);
                 let starts = y0.chunks(MOMENTS).zip(slope.chunks(MOMENTS));
-                let tiles = self.y.chunks_mut(MOMENTS).zip(tiles(&self.smooth));
+                let states = self.y[self.first..].chunks_mut(MOMENTS);
+                let tiles = states.zip(tiles(&self.smooth));
                 for ((y, smooth), (y0, slope)) in tiles.zip(starts) {
                     let before = E::sums(smooth.map(|part| part * here));
                     let each = y.iter_mut().zip(smooth).zip(y0.iter().zip(slope));
@@ -377,7 +383,8 @@ impl<E: Registers> Stages<E> {
                 let weights: [[f64; MOMENTS + 1]; MOMENTS] = C.map(|c| weights(c * part));
                 let start = E::load(&weights.map(|w| w[0]));
                 let rest: Columns<E> = std::array::from_fn(|j| E::load(&weights.map(|w| w[j + 1])));
-                for (y, y0) in self.y.iter_mut().zip(y0) {
+                let states = self.y[self.first..].iter_mut();
+                for (y, y0) in states.zip(&y0[self.first..]) {
                     *y = product(&rest, y, start * E::splat(*y0));
                 }
             }
@@ -456,14 +463,8 @@ impl<E: Registers> Stages<E> {
                 change += largest(&self.follow(y0, self.velocities.end..watched));
             }
             converged = change * rate(change, last) <= enough * watched as f64;
-            let telling = sweeps == TELLING
-                && !converged
-                && self.errors(watched, h, demand.tolerance).0 > HOPELESS;
-            if telling || !change.is_finite() || sweeps >= MOST_SWEEPS {
-                converged |= telling;
-                break;
-            }
-            if converged && ledger.is_empty() {
+            let given_up = !change.is_finite() || sweeps >= MOST_SWEEPS;
+            if given_up || converged && ledger.is_empty() {
                 break;
             }
             last = change;
@@ -561,7 +562,8 @@ impl<E: Registers> Stages<E> {
         self.follow(y0, 0..from)
     }
 
-    /// Errors at the end of the step and between the stages, in units of the tolerance, from the last Legendre coefficients of the slopes.
+    /// Errors at the end of the step and between the stages, in units of the tolerance, from the last Legendre coefficients of the slopes;
+    /// those of what is only an integral of others are smaller.
     ///
     /// The coefficients of a smooth slope fall like ρ^-k: e₅ and e₇ are those of degrees 4, 5 and 6, 7, times h. The polynomial of the stages
     /// leaves out the next, e₇ (e₇/e₅), whose integrals are less than 1/17 of them. At the end of the step Radau's nodes integrate to
@@ -569,14 +571,15 @@ impl<E: Registers> Stages<E> {
     #[inline(always)]
     fn errors(&mut self, states: usize, h: f64, tolerance: f64) -> (f64, f64) {
         let mut squares = E::splat(0.0);
-        let each = self.f[..states].iter().zip(&mut self.parts);
-        for ((f, part), scale) in each.zip(&self.scale) {
+        let each = self.f[self.first..states].iter().zip(&mut self.parts);
+        for ((f, part), scale) in each.zip(&self.scale[self.first..]) {
             *part = product(&self.legendre, f, E::splat(0.0));
             let part = *part * *scale;
             squares = part.madd(part, squares);
         }
         let s = squares.as_array();
-        let size = |k: usize| ((s[k] + s[k + 1]) / states as f64).sqrt() * h;
+        let judged = (states - self.first) as f64;
+        let size = |k: usize| ((s[k] + s[k + 1]) / judged).sqrt() * h;
         let (before, last) = (size(MOMENTS - 4), size(MOMENTS - 2));
         let ratio = (last / before.max(f64::MIN_POSITIVE)).min(1.0);
         let of = |part: f64| last * part / tolerance;
@@ -588,13 +591,15 @@ impl<E: Registers> Stages<E> {
     #[inline(always)]
     fn missed(&self, slope: &[f64], states: usize, h: f64) -> f64 {
         let (mut squares, mut apart) = (E::splat(0.0), E::splat(0.0));
-        let each = self.parts[..states].iter().zip(&self.scale);
+        let judged = states - self.first;
+        let (scale, slope) = (&self.scale[self.first..], &slope[self.first..states]);
+        let each = self.parts[..judged].iter().zip(scale);
         for (part, scale) in each {
             let part = *part * *scale;
             squares = part.madd(part, squares);
         }
-        let tiles = tiles(&self.parts).iter().zip(tiles(&self.scale));
-        for ((parts, scale), slopes) in tiles.zip(slope[..states].chunks(MOMENTS)) {
+        let tiles = tiles(&self.parts).iter().zip(tiles(scale));
+        for ((parts, scale), slopes) in tiles.zip(slope.chunks(MOMENTS)) {
             let starts = E::sums(parts.map(|part| part * self.at_start));
             let mut slope = starts;
             slope.as_mut_array()[..slopes.len()].copy_from_slice(slopes);
@@ -605,7 +610,7 @@ impl<E: Registers> Stages<E> {
         let [before, last] = [s[4] + s[5], s[6] + s[7]].map(f64::sqrt);
         let apart = total(&apart).sqrt();
         let next = last * (last / before.max(f64::MIN_POSITIVE)).min(1.0).sqrt();
-        (apart - EXPECTED * next).max(0.0) * h * C[0] / (states as f64).sqrt()
+        (apart - EXPECTED * next).max(0.0) * h * C[0] / (judged as f64).sqrt()
     }
 
     /// The step solved last is accepted.

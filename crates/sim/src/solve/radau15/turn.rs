@@ -50,7 +50,7 @@ impl Bend {
 
     /// R of a step.
     fn roundness(&self, step_s: f64) -> f64 {
-        let to = |from: f64| (self.ahead_s - from).hypot(self.wide_s);
+        let to = |from: f64| distance(self.ahead_s - from, self.wide_s);
         let k = ((to(0.0) + to(step_s)) / step_s).max(1.0);
         k + (k * k - 1.0).sqrt()
     }
@@ -58,7 +58,7 @@ impl Bend {
     /// The longest step of that R, s.
     fn step_s(&self, roundness: f64) -> f64 {
         let k = 0.5 * (roundness + 1.0 / roundness);
-        let far = self.ahead_s.hypot(self.wide_s);
+        let far = distance(self.ahead_s, self.wide_s);
         let step_s = 2.0 * (k * far - self.ahead_s) / (k * k - 1.0);
         // No bend where the rate stays what it is.
         if step_s.is_nan() {
@@ -67,6 +67,11 @@ impl Bend {
             step_s
         }
     }
+}
+
+/// √(x² + y²), where neither square is beyond what a number holds; where one is, infinite: no bend.
+fn distance(x: f64, y: f64) -> f64 {
+    (x * x + y * y).sqrt()
 }
 
 /// What was learnt of a friction's bends.
