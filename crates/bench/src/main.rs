@@ -5,6 +5,8 @@
 //! tolerances; the cheapest setting that keeps max |roll error| over 60 s below 1e-3, 1e-6, 1e-9 rad counts; in case C the angle
 //! between the orientations below 1e-3, 1e-6, 1e-7 rad, there with energy and momentum to 1e-9. Times are the least of several runs. The ladders go to stderr, what comes of them to stdout.
 //!
+//! Before them: one right-hand side beside one written by hand, and what a run of `music` costs, alone and recorded (medians).
+//!
 //! `cargo run --release --manifest-path crates/bench/Cargo.toml`
 
 mod by_hand;
@@ -12,8 +14,11 @@ mod peers;
 
 use by_hand::Problem;
 use nalgebra::{Quaternion, UnitQuaternion, Vector3};
+use recording::read::{ReadOptions, Recording};
+use recording::write::{RecordingWriter, WriterOptions};
 use sim::model::Model;
-use sim::run::{Listener, Sample, run_model};
+use sim::record::Recorder;
+use sim::run::{Listener, Sample, method_of, run_model, settings};
 use sim::solve::{METHODS, Method, Settings};
 use std::hint::black_box;
 use std::time::Instant;
@@ -62,12 +67,16 @@ fn case(name: &'static str) -> Case {
     }
 }
 
+/// rad
+fn roll([w, x, y, z]: [f64; 4]) -> f64 {
+    (2.0 * (w * x + y * z)).atan2(1.0 - 2.0 * (x * x + y * y))
+}
+
 /// Largest error over the run, rad: of roll, or in case C of the whole orientation. NaN where samples are missing.
 fn error(case: &Case, course: &Course) -> f64 {
     if course.looks.len() != case.truth.len() {
         return f64::NAN;
     }
-    let roll = |[w, x, y, z]: [f64; 4]| (2.0 * (w * x + y * z)).atan2(1.0 - 2.0 * (x * x + y * y));
     let of = |(a, b): (&Look, &[f64; 4])| {
         if case.name != "C" {
             return (roll(a.turn) - roll(*b)).abs();
@@ -178,6 +187,7 @@ struct Rung {
 fn main() {
     let only = std::env::args().nth(1);
     right_hand_sides();
+    music();
     // Four to a factor of ten: the cheapest setting that is good enough lies between coarser ones.
     let tolerances: Vec<f64> = (-8..=52)
         .map(|i| 10f64.powf(-0.25 * f64::from(i)))
@@ -294,4 +304,78 @@ fn right_hand_sides() {
         black_box(&slope);
     });
     println!("                               by hand {least:.1} ns (median {median:.1})\n");
+}
+
+/// A minute of the scene `music` at 1e-6: alone, with its energy ledger, and as `sim record` runs it, from the scene to the file under its name.
+fn music() {
+    let asked = |ledger: bool| {
+        let given = [
+            "solver.tolerance=1e-6".into(),
+            format!("solver.energy={ledger}"),
+        ];
+        sim::scene::load("music", &given).unwrap_or_else(|e| panic!("{e}"))
+    };
+    let median = |run: &mut dyn FnMut()| {
+        let mut all: Vec<f64> = (0..41)
+            .map(|_| {
+                let start = Instant::now();
+                run();
+                start.elapsed().as_secs_f64() * 1e3
+            })
+            .collect();
+        all.sort_by(f64::total_cmp);
+        all[all.len() / 2]
+    };
+    let poses = |model: &Model, method: &Method, settings: &Settings| {
+        let mut poses = Poses(Vec::with_capacity(1801));
+        let (_, outcome) = run_model(model, method, settings, &mut poses);
+        outcome.unwrap_or_else(|stopped| panic!("{stopped}"));
+        poses.0
+    };
+    for ledger in [false, true] {
+        let scene = asked(ledger);
+        let model = Model::new(&scene);
+        let mut seen = Vec::new();
+        let ms = median(&mut || seen = poses(&model, method_of(&scene), &settings(&scene)));
+        let reference = sim::solve::method("dop853").expect("a method of the table");
+        let tight = Settings {
+            tolerance: 1e-11,
+            ..settings(&scene)
+        };
+        let truth = poses(&model, reference, &tight);
+        let both = seen.iter().zip(&truth);
+        let error = both
+            .map(|(a, b)| (roll(a.turn) - roll(b.turn)).abs())
+            .fold(0.0, f64::max);
+        assert!(error < 1e-6, "roll errs by {error:.1e} rad");
+        let what = if ledger {
+            "with its energy ledger"
+        } else {
+            "a minute at 1e-6"
+        };
+        println!("music, {what}: {ms:.1} ms (median), error of roll {error:.1e} rad");
+    }
+    let folder = tempfile::tempdir().expect("a folder");
+    let path = folder.path().join("music.mcap");
+    let ms = median(&mut || {
+        let scene = asked(true);
+        let model = Model::new(&scene);
+        let options = WriterOptions {
+            own_thread: true,
+            ..WriterOptions::default()
+        };
+        let writer = RecordingWriter::create(&path, &options).expect("begins");
+        let mut recorder = Recorder::new(&model, writer).expect("begins");
+        let (_, outcome) = run_model(&model, method_of(&scene), &settings(&scene), &mut recorder);
+        outcome.unwrap_or_else(|stopped| panic!("{stopped}"));
+        recorder.finish().expect("writes");
+    });
+    let recording = Recording::open(&path, &ReadOptions::default()).expect("opens");
+    let states = recording
+        .info()
+        .channels
+        .iter()
+        .find(|c| c.topic == "/rath/state");
+    assert_eq!(states.map(|c| c.messages), Some(1801));
+    println!("music, recorded, from the scene to the file: {ms:.1} ms (median)\n");
 }
