@@ -479,8 +479,11 @@ impl<E: Registers> Stages<E> {
         for d in ledger {
             self.y[d] = product(&self.step, &self.f[d], E::splat(y0[d]));
         }
-        let (error, between) = self.errors(self.y.len(), h, demand.tolerance);
-        let missed = self.missed(slope, watched, h) / demand.tolerance;
+        let all = self.y.len();
+        let motion = self.expand(self.first..watched, E::splat(0.0));
+        let squares = self.expand(watched..all, motion);
+        let (error, between) = Self::errors(&squares, all - self.first, h, demand.tolerance);
+        let missed = self.missed(&motion, slope, watched, h) / demand.tolerance;
         Solved {
             sweeps,
             // An error that is not a number stays one.
@@ -562,24 +565,29 @@ impl<E: Registers> Stages<E> {
         self.follow(y0, 0..from)
     }
 
+    /// Legendre coefficients of the slopes of some states, and the sums of their squares, in units, over the states, on top of `others`.
+    #[inline(always)]
+    fn expand(&mut self, states: Range<usize>, others: E) -> E {
+        let mut squares = others;
+        for d in states {
+            let part = product(&self.legendre, &self.f[d], E::splat(0.0));
+            self.parts[d - self.first] = part;
+            let part = part * self.scale[d];
+            squares = part.madd(part, squares);
+        }
+        squares
+    }
+
     /// Errors at the end of the step and between the stages, in units of the tolerance, from the last Legendre coefficients of the slopes;
-    /// those of what is only an integral of others are smaller.
+    /// those of what is only an integral of others are smaller. `squares`: sums over so many states.
     ///
     /// The coefficients of a smooth slope fall like ρ^-k: e₅ and e₇ are those of degrees 4, 5 and 6, 7, times h. The polynomial of the stages
     /// leaves out the next, e₇ (e₇/e₅), whose integrals are less than 1/17 of them. At the end of the step Radau's nodes integrate to
     /// degree 14, as far beyond again; half of that is claimed: e₇ (e₇/e₅)², of order 12.
     #[inline(always)]
-    fn errors(&mut self, states: usize, h: f64, tolerance: f64) -> (f64, f64) {
-        let mut squares = E::splat(0.0);
-        let each = self.f[self.first..states].iter().zip(&mut self.parts);
-        for ((f, part), scale) in each.zip(&self.scale[self.first..]) {
-            *part = product(&self.legendre, f, E::splat(0.0));
-            let part = *part * *scale;
-            squares = part.madd(part, squares);
-        }
+    fn errors(squares: &E, states: usize, h: f64, tolerance: f64) -> (f64, f64) {
         let s = squares.as_array();
-        let judged = (states - self.first) as f64;
-        let size = |k: usize| ((s[k] + s[k + 1]) / judged).sqrt() * h;
+        let size = |k: usize| ((s[k] + s[k + 1]) / states as f64).sqrt() * h;
         let (before, last) = (size(MOMENTS - 4), size(MOMENTS - 2));
         let ratio = (last / before.max(f64::MIN_POSITIVE)).min(1.0);
         let of = |part: f64| last * part / tolerance;
@@ -588,16 +596,11 @@ impl<E: Registers> Stages<E> {
 
     /// What lies before the first node and no stage has seen, from the slope at the start, which is none: where it is farther from the
     /// polynomial of the slopes than their coefficients let expect, by what the part of the step before the first node makes of that.
+    /// `squares`: sums over the states up to `end`.
     #[inline(always)]
-    fn missed(&self, slope: &[f64], states: usize, h: f64) -> f64 {
-        let (mut squares, mut apart) = (E::splat(0.0), E::splat(0.0));
-        let judged = states - self.first;
-        let (scale, slope) = (&self.scale[self.first..], &slope[self.first..states]);
-        let each = self.parts[..judged].iter().zip(scale);
-        for (part, scale) in each {
-            let part = *part * *scale;
-            squares = part.madd(part, squares);
-        }
+    fn missed(&self, squares: &E, slope: &[f64], end: usize, h: f64) -> f64 {
+        let mut apart = E::splat(0.0);
+        let (scale, slope) = (&self.scale[self.first..], &slope[self.first..end]);
         let tiles = tiles(&self.parts).iter().zip(tiles(scale));
         for ((parts, scale), slopes) in tiles.zip(slope.chunks(MOMENTS)) {
             let starts = E::sums(parts.map(|part| part * self.at_start));
@@ -610,7 +613,7 @@ impl<E: Registers> Stages<E> {
         let [before, last] = [s[4] + s[5], s[6] + s[7]].map(f64::sqrt);
         let apart = total(&apart).sqrt();
         let next = last * (last / before.max(f64::MIN_POSITIVE)).min(1.0).sqrt();
-        (apart - EXPECTED * next).max(0.0) * h * C[0] / (judged as f64).sqrt()
+        (apart - EXPECTED * next).max(0.0) * h * C[0] / (slope.len() as f64).sqrt()
     }
 
     /// The step solved last is accepted.
