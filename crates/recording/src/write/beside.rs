@@ -17,7 +17,7 @@ const BATCH_MESSAGES: usize = 1024;
 /// So much log time, ns, a batch keeps back from the file at most.
 const BATCH_NS: u64 = 1_000_000_000;
 /// So many batches wait for the thread before the caller does.
-const WAITING: usize = 4;
+const WAITING: usize = 64;
 
 /// Messages one after the other.
 #[derive(Default)]
