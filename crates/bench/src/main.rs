@@ -360,10 +360,7 @@ fn music() {
     let ms = median(&mut || {
         let scene = asked(true);
         let model = Model::new(&scene);
-        let options = WriterOptions {
-            own_thread: true,
-            ..WriterOptions::default()
-        };
+        let options = WriterOptions::beside();
         let writer = RecordingWriter::create(&path, &options).expect("begins");
         let mut recorder = Recorder::new(&model, writer).expect("begins");
         let (_, outcome) = run_model(&model, method_of(&scene), &settings(&scene), &mut recorder);

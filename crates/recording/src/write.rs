@@ -39,6 +39,16 @@ pub struct WriterOptions {
     pub own_thread: bool,
 }
 
+impl WriterOptions {
+    /// As usual, by a thread of its own.
+    pub fn beside() -> Self {
+        WriterOptions {
+            own_thread: true,
+            ..WriterOptions::default()
+        }
+    }
+}
+
 impl Default for WriterOptions {
     fn default() -> Self {
         WriterOptions {

@@ -61,10 +61,7 @@ impl Write for Shared {
 
 /// By the caller's thread, and by one of its own.
 fn both_ways() -> [WriterOptions; 2] {
-    [false, true].map(|own_thread| WriterOptions {
-        own_thread,
-        ..WriterOptions::default()
-    })
+    [WriterOptions::default(), WriterOptions::beside()]
 }
 
 #[test]

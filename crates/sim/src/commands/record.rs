@@ -63,10 +63,7 @@ pub fn run(args: &Args) -> Result<()> {
         .out
         .clone()
         .unwrap_or_else(|| PathBuf::from(format!("{}-{}.mcap", scene.name, scene.seed)));
-    let options = WriterOptions {
-        own_thread: true,
-        ..WriterOptions::default()
-    };
+    let options = WriterOptions::beside();
     let writer = if to_stdout {
         RecordingWriter::to_stream(std::io::stdout(), &options)?
     } else {

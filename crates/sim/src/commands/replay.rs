@@ -119,7 +119,7 @@ pub fn run(args: &Args) -> Result<Input> {
         PathBuf::from(format!("{stem}-replay.mcap"))
     });
     let model = Model::new(&replay.scene);
-    let writer = RecordingWriter::create(&out, &WriterOptions::default())?;
+    let writer = RecordingWriter::create(&out, &WriterOptions::beside())?;
     let mut recorder = Recorder::at(&model, writer, replay.epoch_ns)?;
     let measured = Measured::of(&recording, &take, &replay, recorder.writer())?;
     let mut both = Both {
