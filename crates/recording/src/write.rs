@@ -8,57 +8,27 @@
 //! of its own compresses them changes nothing.
 
 mod beside;
+mod container;
+mod options;
+mod sink;
 
 use std::{
     collections::BTreeMap,
-    fs,
     io::{self, BufWriter, Write},
-    path::{Path, PathBuf},
-    sync::Mutex,
+    path::Path,
 };
 
-use mcap::{Compression, WriteOptions, records::MessageHeader, write::NoSeek};
+use mcap::records::MessageHeader;
 
 use crate::{cdr, read::ChannelInfo, topics::MessageKind};
 use beside::{Batch, Beside};
+use container::Container;
+pub use options::WriterOptions;
+use sink::Sink;
+pub use sink::remove_unfinished_files;
 
 /// A message larger than this is refused.
 const MAX_MESSAGE_BYTES: usize = 256 << 20;
-
-/// How a recording is written.
-#[derive(Clone, Debug)]
-pub struct WriterOptions {
-    /// A chunk is closed when it holds this many bytes before compression.
-    pub chunk_bytes: u64,
-    /// A chunk is closed when it spans this much log time, ns, so that a program that is killed loses little.
-    pub chunk_ns: i64,
-    /// zstd level, 1 (fast) to 22 (small).
-    pub zstd_level: u32,
-    /// Whether messages are compressed and written by a thread of its own, while the caller goes on. What went wrong then comes to light with
-    /// a later message, or at [`RecordingWriter::finish`].
-    pub own_thread: bool,
-}
-
-impl WriterOptions {
-    /// As usual, by a thread of its own.
-    pub fn beside() -> Self {
-        WriterOptions {
-            own_thread: true,
-            ..WriterOptions::default()
-        }
-    }
-}
-
-impl Default for WriterOptions {
-    fn default() -> Self {
-        WriterOptions {
-            chunk_bytes: 512 << 10,
-            chunk_ns: 10_000_000_000,
-            zstd_level: 1,
-            own_thread: false,
-        }
-    }
-}
 
 /// What the system said, without the name of the unfinished file that the error may carry.
 fn plain(error: io::Error) -> io::Error {
@@ -196,26 +166,6 @@ struct Channel {
     sequence: u32,
 }
 
-/// The container, with chunks that close by the recording's own clock.
-struct Container {
-    writer: mcap::Writer<NoSeek<Sink>>,
-    chunk_start_ns: Option<i64>,
-    chunk_ns: i64,
-}
-
-impl Container {
-    fn message(&mut self, header: &MessageHeader, data: &[u8]) -> mcap::McapResult<()> {
-        let t_ns = header.log_time.cast_signed();
-        let start_ns = *self.chunk_start_ns.get_or_insert(t_ns);
-        self.writer.write_to_known_channel(header, data)?;
-        if t_ns.saturating_sub(start_ns) >= self.chunk_ns {
-            self.chunk_start_ns = None;
-            self.writer.flush()?;
-        }
-        Ok(())
-    }
-}
-
 /// A recording that is being written.
 pub struct RecordingWriter {
     /// `None` while a thread has it.
@@ -256,22 +206,9 @@ impl RecordingWriter {
     }
 
     fn begin(sink: Sink, target: String, options: &WriterOptions) -> Result<Self, WriteError> {
-        let writer = WriteOptions::new()
-            .compression(Some(Compression::Zstd))
-            .compression_level(options.zstd_level)
-            .compression_threads(0)
-            .chunk_size(Some(options.chunk_bytes))
-            .disable_seeking(true)
-            .profile("")
-            .library(concat!("rath ", env!("CARGO_PKG_VERSION")))
-            .create(NoSeek::new(sink))
-            .map_err(|error| failed(&target, error))?;
+        let container = Container::begin(sink, options).map_err(|error| failed(&target, error))?;
         Ok(RecordingWriter {
-            container: Some(Box::new(Container {
-                writer,
-                chunk_start_ns: None,
-                chunk_ns: options.chunk_ns,
-            })),
+            container: Some(Box::new(container)),
             beside: None,
             own_thread: options.own_thread,
             batch: Batch::default(),
@@ -452,124 +389,5 @@ fn failed(target: &str, error: mcap::McapError) -> WriteError {
             cause: plain(cause),
         },
         cause => WriteError::Format { target, cause },
-    }
-}
-
-/// Temporary files that are being written, for [`remove_unfinished_files`].
-static UNFINISHED: Mutex<Vec<PathBuf>> = Mutex::new(Vec::new());
-
-/// Removes the temporary files of all recordings that are being written: what a program does when it is interrupted, before it exits.
-pub fn remove_unfinished_files() {
-    let mut paths = match UNFINISHED.lock() {
-        Ok(paths) => paths,
-        Err(poisoned) => poisoned.into_inner(),
-    };
-    for path in paths.drain(..) {
-        // Best effort: there is nobody left to tell.
-        let _ = fs::remove_file(path);
-    }
-}
-
-fn forget(path: &Path) {
-    if let Ok(mut paths) = UNFINISHED.lock() {
-        paths.retain(|known| known != path);
-    }
-}
-
-/// Where the bytes go.
-enum Sink {
-    /// A temporary file and the name that it gets.
-    File {
-        file: BufWriter<tempfile::NamedTempFile>,
-        path: PathBuf,
-    },
-    /// Anything else.
-    Stream(BufWriter<Box<dyn Write + Send>>),
-}
-
-impl Sink {
-    fn beside(path: &Path) -> io::Result<Self> {
-        match fs::metadata(path) {
-            Ok(found) if found.is_dir() => {
-                return Err(io::Error::new(
-                    io::ErrorKind::IsADirectory,
-                    "it is a folder",
-                ));
-            }
-            Ok(found) if !found.is_file() => {
-                let device = fs::OpenOptions::new().write(true).open(path)?;
-                return Ok(Sink::Stream(BufWriter::with_capacity(
-                    1 << 16,
-                    Box::new(device),
-                )));
-            }
-            Ok(found) if found.permissions().readonly() => {
-                return Err(io::Error::new(
-                    io::ErrorKind::PermissionDenied,
-                    "the file that is there is read-only",
-                ));
-            }
-            _ => {}
-        }
-        // A link keeps pointing at the file that is replaced.
-        let path = fs::canonicalize(path).unwrap_or_else(|_| path.to_owned());
-        let folder = match path.parent() {
-            Some(parent) if !parent.as_os_str().is_empty() => parent,
-            _ => Path::new("."),
-        };
-        let mut prefix = std::ffi::OsString::from(".");
-        prefix.push(path.file_name().ok_or(io::ErrorKind::InvalidInput)?);
-        prefix.push(".");
-        let mut builder = tempfile::Builder::new();
-        builder.prefix(&prefix).suffix(".part");
-        #[cfg(unix)]
-        {
-            use std::os::unix::fs::PermissionsExt as _;
-            // As any new file: the system takes away what the umask forbids.
-            builder.permissions(fs::Permissions::from_mode(0o666));
-        }
-        let file = builder.tempfile_in(folder)?;
-        if let Ok(mut paths) = UNFINISHED.lock() {
-            paths.push(file.path().to_owned());
-        }
-        Ok(Sink::File {
-            file: BufWriter::with_capacity(1 << 18, file),
-            path,
-        })
-    }
-
-    fn commit(mut self) -> io::Result<()> {
-        self.flush()?;
-        if let Sink::File { file, path } = &mut self {
-            let temporary = file.get_ref().path().to_owned();
-            fs::rename(&temporary, path)?;
-            forget(&temporary);
-        }
-        Ok(())
-    }
-}
-
-impl Drop for Sink {
-    fn drop(&mut self) {
-        if let Sink::File { file, .. } = self {
-            // The temporary file removes itself after this; what was renamed is no longer under that name.
-            forget(file.get_ref().path());
-        }
-    }
-}
-
-impl Write for Sink {
-    fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
-        match self {
-            Sink::File { file, .. } => file.write(bytes),
-            Sink::Stream(stream) => stream.write(bytes),
-        }
-    }
-
-    fn flush(&mut self) -> io::Result<()> {
-        match self {
-            Sink::File { file, .. } => file.flush(),
-            Sink::Stream(stream) => stream.flush(),
-        }
     }
 }

@@ -9,7 +9,7 @@ use std::{
 
 use mcap::{McapResult, records::MessageHeader};
 
-use super::Container;
+use super::container::Container;
 
 /// A batch with so many bytes, or so many messages, goes on its way.
 const BATCH_BYTES: usize = 32 << 10;
