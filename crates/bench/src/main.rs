@@ -67,6 +67,11 @@ fn case(name: &'static str) -> Case {
     }
 }
 
+/// The largest; NaN where one is, which `max` would step over.
+fn worst(of: impl Iterator<Item = f64>) -> f64 {
+    of.fold(0.0, |a, b| if b > a || b.is_nan() { b } else { a })
+}
+
 /// rad
 fn roll([w, x, y, z]: [f64; 4]) -> f64 {
     (2.0 * (w * x + y * z)).atan2(1.0 - 2.0 * (x * x + y * y))
@@ -91,14 +96,7 @@ fn error(case: &Case, course: &Course) -> f64 {
         let part = part.iter().map(|p| p * p).sum::<f64>().sqrt();
         2.0 * part.atan2(real.abs())
     };
-    // `max` would step over a NaN.
-    let worst = |a: f64, b: f64| if b > a || b.is_nan() { b } else { a };
-    course
-        .looks
-        .iter()
-        .zip(&case.truth)
-        .map(of)
-        .fold(0.0, worst)
+    worst(course.looks.iter().zip(&case.truth).map(of))
 }
 
 /// How far energy and angular momentum drift in case C, where both stay, in parts of themselves.
@@ -118,9 +116,9 @@ fn drift(case: &Case, course: &Course) -> f64 {
     };
     let from_first = course.looks.iter().map(of).map(|(e, m)| {
         let energy = (e / energy - 1.0).abs();
-        energy.max((m - momentum).norm() / momentum.norm())
+        worst([energy, (m - momentum).norm() / momentum.norm()].into_iter())
     });
-    from_first.fold(0.0, f64::max)
+    worst(from_first)
 }
 
 fn ours(model: &Model, method: &Method, setting: f64) -> Course {
@@ -326,27 +324,18 @@ fn music() {
         all.sort_by(f64::total_cmp);
         all[all.len() / 2]
     };
-    let poses = |model: &Model, method: &Method, settings: &Settings| {
-        let mut poses = Poses(Vec::with_capacity(1801));
-        let (_, outcome) = run_model(model, method, settings, &mut poses);
-        outcome.unwrap_or_else(|stopped| panic!("{stopped}"));
-        poses.0
-    };
     for ledger in [false, true] {
         let scene = asked(ledger);
         let model = Model::new(&scene);
         let mut seen = Vec::new();
-        let ms = median(&mut || seen = poses(&model, method_of(&scene), &settings(&scene)));
+        let ms = median(&mut || {
+            seen = ours(&model, method_of(&scene), scene.solver.tolerance).looks;
+        });
         let reference = sim::solve::method("dop853").expect("a method of the table");
-        let tight = Settings {
-            tolerance: 1e-11,
-            ..settings(&scene)
-        };
-        let truth = poses(&model, reference, &tight);
-        let both = seen.iter().zip(&truth);
-        let error = both
-            .map(|(a, b)| (roll(a.turn) - roll(b.turn)).abs())
-            .fold(0.0, f64::max);
+        let truth = ours(&model, reference, 1e-11).looks;
+        assert_eq!([seen.len(), truth.len()], [1801; 2], "samples");
+        let apart = |(a, b): (&Look, &Look)| (roll(a.turn) - roll(b.turn)).abs();
+        let error = worst(seen.iter().zip(&truth).map(apart));
         assert!(error < 1e-6, "roll errs by {error:.1e} rad");
         let what = if ledger {
             "with its energy ledger"

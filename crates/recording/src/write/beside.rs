@@ -16,7 +16,7 @@ const BATCH_BYTES: usize = 32 << 10;
 const BATCH_MESSAGES: usize = 1024;
 /// So much log time, ns, a batch keeps back from the file at most.
 const BATCH_NS: u64 = 1_000_000_000;
-/// So many batches wait for the thread before the caller does.
+/// So many batches wait for the thread before the caller does; with a few the two take turns, often on one processor, while another is idle.
 const WAITING: usize = 64;
 
 /// Messages one after the other.
