@@ -14,6 +14,7 @@ mod lane;
 use super::course::{Course, SAME_MOMENT_S};
 use super::dop853::Dop853;
 use super::events::Ahead;
+use super::first_steps::FirstSteps;
 use super::pair::Pair as _;
 use super::{Observer, Settings, Stats, Stopped, auto};
 #[cfg(target_arch = "x86_64")]
@@ -310,8 +311,7 @@ impl<E: Together> Abreast<E> {
             short_before: false,
             tries: 0,
             rejected_before: false,
-            first_s: [[f64::INFINITY; 3]; 2],
-            first: None,
+            first: FirstSteps::new(),
         };
         self.begin(l, &mut lane);
         // A tenth of the time in which the state would change by one unit, at tolerance 1; the error refines it.
@@ -405,11 +405,8 @@ impl<E: Together> Abreast<E> {
         }
         let h = lane.h_s;
         let factor = SAFETY / root;
-        if let Some((event, resting)) = lane.first.take()
-            && !aimed
-        {
-            lane.first_s[event][resting] = h * factor.clamp(SHRINK, GROW);
-        }
+        lane.first
+            .held(|| (!aimed).then(|| h * factor.clamp(SHRINK, GROW)));
         let most = if lane.rejected_before || event || aimed {
             1.0
         } else {
@@ -478,9 +475,8 @@ impl<E: Together> Abreast<E> {
         lane.look_up_stop();
         let course = &lane.course;
         if event || switched {
-            let which = (usize::from(event), course.resting_handles().min(2));
-            lane.h_next_s = lane.h_next_s.min(lane.first_s[which.0][which.1]);
-            lane.first = Some(which);
+            let resting = course.resting_handles();
+            lane.h_next_s = lane.first.after(event, resting, lane.h_next_s);
         }
         let patience = PATIENCE + (PATIENCE_PER_S * course.t_s) as u64;
         Ok(course.stats.evaluations > patience)

@@ -7,6 +7,7 @@ mod course;
 mod dop853;
 mod dopri5;
 mod events;
+mod first_steps;
 mod fixed;
 mod pair;
 mod radau15;

@@ -14,6 +14,7 @@
 
 use super::course::{Course, SAME_MOMENT_S};
 use super::events::{self, Looks};
+use super::first_steps::FirstSteps;
 use super::{Observer, SLOWEST_PER_S, Settings, Stats, Stopped};
 use crate::energy::unit_j;
 use crate::model::Model;
@@ -328,10 +329,7 @@ impl<'m, P: Pair, const EVENTS: bool> Run<'m, P, EVENTS> {
     fn integrate<F: Arithmetic>(&mut self, observer: &mut dyn Observer) -> Result<End, Stopped> {
         self.begin();
         let mut h_next = self.first_step();
-        // What a first step after a switch could have been, the last time that as many handles rested: the jump excites what the step
-        // before it has not met. And what it could have been after an event, where another law begins.
-        let mut first_s = [[f64::INFINITY; 3]; 2];
-        let mut first: Option<(usize, usize)> = None;
+        let mut first = FirstSteps::new();
         let mut ln_error_before = LEAST_ERROR.ln();
         let mut rejected_before = false;
         while !self.course.finished() {
@@ -388,9 +386,7 @@ impl<'m, P: Pair, const EVENTS: bool> Run<'m, P, EVENTS> {
                 }
             };
             let e = error.max(1e-10);
-            if let Some((event, resting)) = first.take() {
-                first_s[event][resting] = h * (SAFETY * e.powf(-P::EXPONENT)).clamp(SHRINK, GROW);
-            }
+            first.held(|| Some(h * (SAFETY * e.powf(-P::EXPONENT)).clamp(SHRINK, GROW)));
             let ln_error = e.ln();
             let factor = SAFETY * (P::EXPONENT * (0.2 * ln_error_before - 0.8 * ln_error)).exp();
             let factor = factor.clamp(
@@ -412,10 +408,8 @@ impl<'m, P: Pair, const EVENTS: bool> Run<'m, P, EVENTS> {
             if moved != Moved::On && !self.course.finished() {
                 self.begin();
                 self.stiff_in_row = 0;
-                let event = usize::from(moved == Moved::Event);
-                let resting = self.course.resting_handles().min(2);
-                h_next = h_next.min(first_s[event][resting]);
-                first = Some((event, resting));
+                let resting = self.course.resting_handles();
+                h_next = first.after(moved == Moved::Event, resting, h_next);
             }
             if self.stiff_in_row > MANY {
                 let (t_s, evaluations) = self.row_began;

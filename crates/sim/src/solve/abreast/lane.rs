@@ -6,6 +6,7 @@ use super::{
     Together,
 };
 use crate::solve::course::Course;
+use crate::solve::first_steps::FirstSteps;
 
 /// One run under way in a lane.
 pub(super) struct Lane<'m> {
@@ -31,10 +32,7 @@ pub(super) struct Lane<'m> {
     pub short_before: bool,
     pub tries: u32,
     pub rejected_before: bool,
-    /// What a first step after a switch, or after an event, could have been, the last time that as many handles rested; see
-    /// `super::pair`. And which of them the step under way will tell.
-    pub first_s: [[f64; 3]; 2],
-    pub first: Option<(usize, usize)>,
+    pub first: FirstSteps,
 }
 
 impl Lane<'_> {
