@@ -182,8 +182,8 @@ pub fn table(conditions: &[Condition]) -> String {
                 }
                 _ => String::new(),
             };
-            out += &format!(
-                "  {:<33}{:>18}{:>18}{:>8}{:>18}{:>8}\n",
+            let line = format!(
+                "  {:<33}{:>18}{:>18}{:>8}{:>18}{:>8}",
                 row.label,
                 here.map_or("–".into(), |s| format!("{:.d$} ± {:.d$}", s.mean, s.sd)),
                 known(row.paper[c]),
@@ -191,6 +191,8 @@ pub fn table(conditions: &[Condition]) -> String {
                 known(row.archive[c]),
                 diff(row.archive[c])
             );
+            out += line.trim_end();
+            out.push('\n');
         }
         let unstable = format!("{}/{}", condition.unstable(), condition.runs.len());
         let theirs = format!("{}/{RUNS}", UNSTABLE[c]);
