@@ -90,6 +90,8 @@ pub trait Freedoms: FreedomsOnEight + Send + Sync {
     fn levers(&self, y: &[f64], handle_m: [f64; 3], axis: usize) -> [f64; 6];
     /// The inverse mass or moment that belongs to each velocity, 1/kg or 1/(kg·m²); products are left out.
     fn inverse_masses(&self, y: &[f64]) -> [f64; 6];
+    /// Angular velocity in the body at a state, rad/s.
+    fn spin_rad_per_s(&self, y: &[f64]) -> [f64; 3];
     /// The pose at a state.
     fn pose(&self, y: &[f64]) -> Pose;
     /// From a state and its rates: acceleration of the centre of mass in the world [m/s²], angular acceleration in the body [rad/s²].
@@ -585,6 +587,10 @@ impl Freedoms for Six {
         [m, m, m, a, b, c]
     }
 
+    fn spin_rad_per_s(&self, y: &[f64]) -> [f64; 3] {
+        [y[10], y[11], y[12]]
+    }
+
     fn pose(&self, y: &[f64]) -> Pose {
         let mut q = [y[3], y[4], y[5], y[6]];
         normalise(&mut q);
@@ -592,7 +598,7 @@ impl Freedoms for Six {
             position_m: [y[0], y[1], y[2]],
             orientation: q,
             velocity_m_per_s: [y[7], y[8], y[9]],
-            spin_rad_per_s: [y[10], y[11], y[12]],
+            spin_rad_per_s: self.spin_rad_per_s(y),
         }
     }
 

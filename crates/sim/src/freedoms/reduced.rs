@@ -123,6 +123,9 @@ impl Freedoms for Pinned {
         self.hold(&mut inverse[..3]);
         inverse
     }
+    fn spin_rad_per_s(&self, y: &[f64]) -> [f64; 3] {
+        self.six.spin_rad_per_s(y)
+    }
     fn pose(&self, y: &[f64]) -> Pose {
         self.six.pose(y)
     }
@@ -449,6 +452,10 @@ impl<T: Turning> Freedoms for Reduced<T> {
         ]
     }
 
+    fn spin_rad_per_s(&self, y: &[f64]) -> [f64; 3] {
+        self.through_columns(y, y)
+    }
+
     fn pose(&self, y: &[f64]) -> Pose {
         let rails = &self.rails;
         let [roll, tilt, yaw] = [3, 4, 5].map(|c| rails.coordinate(c, y));
@@ -457,7 +464,7 @@ impl<T: Turning> Freedoms for Reduced<T> {
             position_m: [0, 1, 2].map(|c| rails.coordinate(c, y)),
             orientation: [q.i, q.j, q.k, q.w],
             velocity_m_per_s: [0, 1, 2].map(|c| rails.rate(c, y)),
-            spin_rad_per_s: self.through_columns(y, y),
+            spin_rad_per_s: self.spin_rad_per_s(y),
         }
     }
 
@@ -470,12 +477,11 @@ impl<T: Turning> Freedoms for Reduced<T> {
     }
 
     fn energy_j(&self, y: &[f64]) -> [f64; 2] {
-        let (rails, pose) = (&self.rails, self.pose(y));
-        let (v, spin) = (
-            Vector3::from(pose.velocity_m_per_s),
-            Vector3::from(pose.spin_rad_per_s),
-        );
+        let rails = &self.rails;
+        let v = Vector3::from([0, 1, 2].map(|c| rails.rate(c, y)));
+        let spin = Vector3::from(self.spin_rad_per_s(y));
         let kinetic = 0.5 * (rails.mass * v.norm_squared() + spin.dot(&(rails.inertia * spin)));
-        [kinetic, -rails.mass * dot(rails.gravity, pose.position_m)]
+        let place_m = [0, 1, 2].map(|c| rails.coordinate(c, y));
+        [kinetic, -rails.mass * dot(rails.gravity, place_m)]
     }
 }

@@ -572,7 +572,7 @@ impl<'m, E: Solve> Run<'m, E> {
     fn bend(&self) -> Option<Bend> {
         let model = self.course.model;
         let soft_rad_per_s = model.turns_softly()?;
-        let rate = model.freedoms().pose(&self.course.y).spin_rad_per_s[0];
+        let [rate, ..] = model.freedoms().spin_rad_per_s(&self.course.y);
         let [_, turning] = model.freedoms().acceleration(&self.course.y, &self.slope);
         Some(Bend::new(soft_rad_per_s, rate, turning[0]))
     }
