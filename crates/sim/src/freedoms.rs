@@ -109,15 +109,7 @@ pub trait Freedoms: FreedomsOnEight + Send + Sync {
     /// What counts as one unit of each state in an error norm.
     fn scales(&self) -> &[f64];
     /// −∂v̇/∂v of each velocity, 1/s, that dampers at the handles (N·s/m, sideways and vertical) make where `contact_gain` lets them act.
-    /// Zero where it is not worth knowing.
-    fn damping_per_s(
-        &self,
-        _y: &[f64],
-        _pairs: &[Pair],
-        _damping: [&[f64x2]; 2],
-        _rates: &mut [f64],
-    ) {
-    }
+    fn damping_per_s(&self, y: &[f64], pairs: &[Pair], damping: [&[f64x2]; 2], rates: &mut [f64]);
 }
 
 /// Coordinates written for any number of moments.

@@ -155,3 +155,68 @@ fn one_free_angle_spins_on() {
         );
     }
 }
+
+/// What dampers are said to take from each velocity is what the equations show: −∂v̇/∂v, by differences. Units of velocities, and with them the
+/// steps that a tolerance asks for, follow from it.
+#[test]
+fn dampers_take_from_every_velocity_what_is_said() {
+    for mask in 1..64_u32 {
+        let free: Vec<Freedom> = (Freedom::ALL.into_iter().enumerate())
+            .filter_map(|(i, f)| (mask >> i & 1 == 1).then_some(f))
+            .collect();
+        // Axes that are not at right angles in the inertia have products, which are left out: roll and yaw meet at no tilt.
+        let oblique = free.contains(&Freedom::Roll) && free.contains(&Freedom::Yaw);
+        let tilt_deg = if oblique { 0.0 } else { 9.0 };
+        let mut scene = scene(&format!(
+            r#"
+            name = "damped"
+            duration_s = 1.0
+            [body]
+            inertia_kg_m2 = {{ xx = 3.0, yy = 14.0, zz = 14.0 }}
+            [carriers]
+            handles_m = [[2.4, 0.3, 0.1], [-2.4, 0.3, 0.1], [0.2, -0.9, 0.2]]
+            [start]
+            height_m = 0.85
+            roll_pitch_yaw_deg = [12.0, {tilt_deg:?}, 30.0]
+            [effects.contact]
+            bilateral = true
+            damping_n_s_per_m = 250.0
+            [effects.hold]
+            damping_n_s_per_m = 90.0
+            "#
+        ));
+        scene.freedom = free.clone();
+        let model = Model::new(&scene);
+        let (start, mut w) = (model.initial_state(), model.workspace());
+        model.begin_segment(0.0, &mut w);
+        let mut rates = |y: &[f64]| {
+            let mut dy = vec![0.0; y.len()];
+            model.rhs(0.0, y, &mut dy, &mut w);
+            dy
+        };
+        let body = model.layout().body;
+        let measured = (model.freedoms().positions()..body).map(|v| {
+            let (mut more, mut less) = (start.clone(), start.clone());
+            (more[v], less[v]) = (more[v] + 0.01, less[v] - 0.01);
+            (rates(&less)[v] - rates(&more)[v]) / 0.02
+        });
+        let measured: Vec<f64> = measured.collect();
+        let mut said = vec![0.0; body];
+        model.damping_per_s(&start, &w, &mut said);
+        let mut sum = 0.0;
+        for (k, (measured, said)) in measured
+            .iter()
+            .zip(&said[model.freedoms().positions()..])
+            .enumerate()
+        {
+            // One that a constraint holds has no rate, whatever the dampers would do.
+            let held = *measured == 0.0;
+            assert!(
+                held || (measured - said).abs() < 1e-9 * (1.0 + said),
+                "{free:?}, velocity {k}: {measured} 1/s, said {said}"
+            );
+            sum += measured;
+        }
+        assert!(sum > 0.5, "{free:?}");
+    }
+}

@@ -9,8 +9,8 @@
 
 use super::reduced::{Rails, Turning};
 use super::{Arms, cross, dot, place_handles, times};
-use crate::lanes::{Moments, Number, f64x2, sum};
-use crate::model::{Pair, Part, Workspace};
+use crate::lanes::{Moments, Number, f64x2};
+use crate::model::{Part, Workspace};
 use nalgebra::{Rotation3, Vector3};
 
 /// With n along the world's axis `AXIS` (0, 1, 2); any other number: anywhere.
@@ -122,30 +122,12 @@ impl<const AXIS: usize> Turning for Hinge<AXIS> {
         }
     }
 
-    fn damping_per_s(
-        &self,
-        rails: &Rails,
-        y: &[f64],
-        pairs: &[Pair],
-        damping: &[f64x2],
-        rates: &mut [f64],
-    ) {
-        let Some(place) = self.place else { return };
-        let (sin, cos) = Number::sin_cos(y[place]);
-        let mut taken = f64x2::ZERO;
-        for ((p, [_, b, c]), damping) in pairs.iter().zip(&self.handles).zip(damping) {
-            let lever = c[2] * cos - b[2] * sin;
-            taken += *damping * p.contact_gain * lever * lever;
-        }
-        rates[rails.free + place] = sum(taken) * self.inverse_moment;
-    }
-
     fn columns(&self, _rails: &Rails, _y: &[f64]) -> [[f64; 3]; 3] {
         [self.in_body; 3]
     }
 
-    fn drag(&self, _rails: &Rails, _y: &[f64]) -> [f64; 3] {
-        [0.0; 3]
+    fn columns_and_drag(&self, _rails: &Rails, _y: &[f64]) -> ([[f64; 3]; 3], [f64; 3]) {
+        ([self.in_body; 3], [0.0; 3])
     }
 }
 

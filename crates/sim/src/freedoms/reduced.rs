@@ -15,7 +15,7 @@ use super::gimbal::Gimbal;
 use super::hinge::{ASKEW, Hinge};
 use super::{Coordinates, Freedoms, Pose, Six, cross, dot, pull, times};
 use crate::body::Body;
-use crate::lanes::{Moments, Number, f64x2, pack, sum};
+use crate::lanes::{LANES, Moments, Number, f64x2, pack};
 use crate::model::{All, Block, Pair, Part, Workspace};
 use crate::scene::{Freedom, Start};
 use nalgebra::{DMatrix, DVector, Matrix3, Rotation3, UnitQuaternion, Vector3};
@@ -166,8 +166,6 @@ pub(super) struct Rails {
     pub free: usize,
     /// The free ones of x, y, z, each with its place.
     translations: Vec<(usize, usize)>,
-    /// Whether that is the height alone, as mostly: what is known to stand still is then not computed.
-    height_alone: bool,
     names: Vec<&'static str>,
     scales: Vec<f64>,
 }
@@ -198,7 +196,6 @@ impl Rails {
             mass: body.mass_kg,
             inverse_mass: 1.0 / body.mass_kg,
             translations: (0..3).filter_map(|c| place[c].map(|p| (c, p))).collect(),
-            height_alone: free[..3] == [false, false, true],
             gravity: body.gravity_m_per_s2.into(),
             inertia: body.inertia_kg_m2,
             held: [x, y, height_m, roll, tilt, yaw],
@@ -211,8 +208,13 @@ impl Rails {
         }
     }
 
-    pub fn coordinate(&self, c: usize, y: &[f64]) -> f64 {
-        self.place[c].map_or(self.held[c], |p| y[p])
+    /// Coordinate c of x, y, z, roll, tilt, yaw.
+    #[inline(always)]
+    fn coordinate<T: Number>(&self, c: usize, y: &[T]) -> T {
+        match self.place[c] {
+            Some(p) => y[p],
+            None => T::splat(self.held[c]),
+        }
     }
 
     /// Its rate, from the state; its second derivative, from the state's rates.
@@ -249,26 +251,17 @@ pub(super) trait Turning: Send + Sync {
         w: &Workspace<N>,
         dy: &mut [N::Each],
     );
-    /// What vertical dampers take from the rate of a free angle, as [`Freedoms::damping_per_s`].
-    fn damping_per_s(
-        &self,
-        _rails: &Rails,
-        _y: &[f64],
-        _pairs: &[Pair],
-        _damping: &[f64x2],
-        _rates: &mut [f64],
-    ) {
-    }
     /// Columns of J: what one rad/s of roll, of tilt, of yaw adds to ω; those of held angles are not read.
     fn columns(&self, rails: &Rails, y: &[f64]) -> [[f64; 3]; 3];
-    /// J̇ (φ̇, θ̇, ψ̇)
-    fn drag(&self, rails: &Rails, y: &[f64]) -> [f64; 3];
+    /// The same, and J̇ (φ̇, θ̇, ψ̇).
+    fn columns_and_drag(&self, rails: &Rails, y: &[f64]) -> ([[f64; 3]; 3], [f64; 3]);
 }
 
 /// Up to two free angles and any translations: one state for each free coordinate, and one for its rate.
 pub(super) struct Reduced<T> {
     rails: Rails,
     turning: T,
+    handles_m: Vec<[f64; 3]>,
 }
 
 impl<T: Turning> Reduced<T> {
@@ -278,12 +271,12 @@ impl<T: Turning> Reduced<T> {
         Self {
             turning: T::new(&rails, handles),
             rails,
+            handles_m: handles_m.to_vec(),
         }
     }
 
     /// J (φ̇, θ̇, ψ̇), or with the rates of a state J (φ̈, θ̈, ψ̈).
-    fn through_columns(&self, y: &[f64], rates_from: &[f64]) -> [f64; 3] {
-        let j = self.turning.columns(&self.rails, y);
+    fn through(&self, j: [[f64; 3]; 3], rates_from: &[f64]) -> [f64; 3] {
         let rates = [3, 4, 5].map(|c| self.rails.rate(c, rates_from));
         [0, 1, 2].map(|a| (0..3).map(|k| j[k][a] * rates[k]).sum())
     }
@@ -292,17 +285,14 @@ impl<T: Turning> Reduced<T> {
 impl<T: Turning> Coordinates for Reduced<T> {
     #[inline(always)]
     fn gaps_at<N: Moments>(&self, y: &[N::Each], w: &mut Workspace<N>, part: impl Part) {
-        let (rails, zero) = (&self.rails, N::Each::splat(0.0));
-        let [x, across, height] = [rails.held[0], rails.held[1], rails.held[2]];
-        let (x, across) = (N::Each::splat(x), N::Each::splat(across));
-        if rails.height_alone {
-            let motion = [[x, across, y[0]], [zero, zero, y[rails.free]]];
-            return self.turning.gaps(rails, y, motion, w, part);
-        }
-        let (mut position, mut velocity) = ([x, across, N::Each::splat(height)], [zero; 3]);
-        for &(c, p) in &rails.translations {
-            (position[c], velocity[c]) = (y[p], y[rails.free + p]);
-        }
+        let rails = &self.rails;
+        // One by one: a loop keeps them in memory.
+        let position = [
+            rails.coordinate(0, y),
+            rails.coordinate(1, y),
+            rails.coordinate(2, y),
+        ];
+        let velocity = [rails.rate(0, y), rails.rate(1, y), rails.rate(2, y)];
         let motion = [position, velocity];
         self.turning.gaps(rails, y, motion, w, part);
     }
@@ -317,10 +307,8 @@ impl<T: Turning> Coordinates for Reduced<T> {
                 dy[k] = y[n + k];
             }
         }
-        if rails.height_alone {
-            dy[n] = force[2] * rails.inverse_mass + rails.gravity[2];
-        } else {
-            for &(c, p) in &rails.translations {
+        for c in 0..3 {
+            if let Some(p) = rails.place[c] {
                 dy[n + p] = force[c] * rails.inverse_mass + rails.gravity[c];
             }
         }
@@ -349,16 +337,22 @@ impl<T: Turning> Freedoms for Reduced<T> {
         &self,
         y: &[f64],
         pairs: &[Pair],
-        [_, damping]: [&[f64x2]; 2],
+        [sideways, vertical]: [&[f64x2]; 2],
         rates: &mut [f64],
     ) {
-        let rails = &self.rails;
-        if let Some(height) = rails.place[2] {
-            let acting = pairs.iter().zip(damping).map(|(p, d)| *d * p.contact_gain);
-            rates[rails.free + height] =
-                sum(acting.fold(f64x2::ZERO, |a, b| a + b)) * rails.inverse_mass;
+        let inverse = self.inverse_masses(y);
+        let rates = &mut rates[self.rails.free..];
+        for (i, handle_m) in self.handles_m.iter().enumerate() {
+            let (pair, lane) = (i / LANES, i % LANES);
+            let gain = pairs[pair].contact_gain;
+            for (axis, damping) in [sideways, sideways, vertical].into_iter().enumerate() {
+                let acting = (damping[pair] * gain).as_array()[lane];
+                let levers = self.levers(y, *handle_m, axis);
+                for ((rate, lever), inverse) in rates.iter_mut().zip(levers).zip(inverse) {
+                    *rate += acting * lever * lever * inverse;
+                }
+            }
         }
-        self.turning.damping_per_s(rails, y, pairs, damping, rates);
     }
 
     fn place(&self, start: &Start, _height_m: f64, y: &mut [f64]) {
@@ -442,10 +436,8 @@ impl<T: Turning> Freedoms for Reduced<T> {
     }
 
     fn acceleration(&self, y: &[f64], dy: &[f64]) -> [[f64; 3]; 2] {
-        let (along, drag) = (
-            self.through_columns(y, dy),
-            self.turning.drag(&self.rails, y),
-        );
+        let (j, drag) = self.turning.columns_and_drag(&self.rails, y);
+        let along = self.through(j, dy);
         [
             [0, 1, 2].map(|c| self.rails.rate(c, dy)),
             [0, 1, 2].map(|a| along[a] + drag[a]),
@@ -453,7 +445,7 @@ impl<T: Turning> Freedoms for Reduced<T> {
     }
 
     fn spin_rad_per_s(&self, y: &[f64]) -> [f64; 3] {
-        self.through_columns(y, y)
+        self.through(self.turning.columns(&self.rails, y), y)
     }
 
     fn pose(&self, y: &[f64]) -> Pose {

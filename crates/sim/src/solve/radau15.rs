@@ -70,7 +70,7 @@ const TRUST: f64 = 0.5;
 const ROUGHLY: f64 = 1e-4;
 /// So much of its unit an energy of the ledger counts in the error.
 const LEDGER: f64 = 0.5;
-/// Modes and units hold until a number of the attitude has changed by so much.
+/// Modes and units hold until a number of the attitude's quaternion, or half an angle, has changed by so much.
 const TURNED: f64 = 0.03;
 /// So many sets of them are remembered.
 const KNOWN: usize = 16;
@@ -356,7 +356,15 @@ impl<'m, E: Solve> Run<'m, E> {
         let (model, y) = (course.model, &course.y);
         let attitude = &y[model.freedoms().attitude()];
         let mut now = [0.0; 4];
-        now[..attitude.len()].copy_from_slice(attitude);
+        // A quaternion changes by half the angle.
+        let part = if attitude.len() == now.len() {
+            1.0
+        } else {
+            0.5
+        };
+        for (now, at) in now.iter_mut().zip(attitude) {
+            *now = part * at;
+        }
         let mut resting = 0;
         for p in &course.w.pair {
             for gain in p.contact_gain.as_array() {
