@@ -148,10 +148,6 @@ impl Turning for Gimbal {
         }
     }
 
-    fn columns(&self, rails: &Rails, y: &[f64]) -> [[f64; 3]; 3] {
-        self.columns_and_drag(rails, y).0
-    }
-
     fn columns_and_drag(&self, rails: &Rails, y: &[f64]) -> ([[f64; 3]; 3], [f64; 3]) {
         let axes = self.axes(&self.rows(rails, y));
         let mut columns = [[0.0; 3]; 3];

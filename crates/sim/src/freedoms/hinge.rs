@@ -122,10 +122,6 @@ impl<const AXIS: usize> Turning for Hinge<AXIS> {
         }
     }
 
-    fn columns(&self, _rails: &Rails, _y: &[f64]) -> [[f64; 3]; 3] {
-        [self.in_body; 3]
-    }
-
     fn columns_and_drag(&self, _rails: &Rails, _y: &[f64]) -> ([[f64; 3]; 3], [f64; 3]) {
         ([self.in_body; 3], [0.0; 3])
     }

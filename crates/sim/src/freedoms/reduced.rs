@@ -252,9 +252,12 @@ pub(super) trait Turning: Send + Sync {
         dy: &mut [N::Each],
     );
     /// Columns of J: what one rad/s of roll, of tilt, of yaw adds to ω; those of held angles are not read.
-    fn columns(&self, rails: &Rails, y: &[f64]) -> [[f64; 3]; 3];
-    /// The same, and J̇ (φ̇, θ̇, ψ̇).
+    /// And J̇ (φ̇, θ̇, ψ̇).
     fn columns_and_drag(&self, rails: &Rails, y: &[f64]) -> ([[f64; 3]; 3], [f64; 3]);
+    /// The columns alone.
+    fn columns(&self, rails: &Rails, y: &[f64]) -> [[f64; 3]; 3] {
+        self.columns_and_drag(rails, y).0
+    }
 }
 
 /// Up to two free angles and any translations: one state for each free coordinate, and one for its rate.
