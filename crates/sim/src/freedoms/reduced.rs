@@ -15,7 +15,7 @@ use super::gimbal::Gimbal;
 use super::hinge::{ASKEW, Hinge};
 use super::{Coordinates, Freedoms, Pose, Six, cross, dot, pull, times};
 use crate::body::Body;
-use crate::lanes::{LANES, Moments, Number, f64x2, pack};
+use crate::lanes::{Moments, Number, f64x2, pack, sum};
 use crate::model::{All, Block, Pair, Part, Workspace};
 use crate::scene::{Freedom, Start};
 use nalgebra::{DMatrix, DVector, Matrix3, Rotation3, UnitQuaternion, Vector3};
@@ -264,18 +264,26 @@ pub(super) trait Turning: Send + Sync {
 pub(super) struct Reduced<T> {
     rails: Rails,
     turning: T,
-    handles_m: Vec<[f64; 3]>,
+    /// In body coordinates, packed two by two, m.
+    handles: Vec<[f64x2; 3]>,
 }
 
 impl<T: Turning> Reduced<T> {
     fn new(rails: Rails, handles_m: &[[f64; 3]]) -> Self {
         let [x, y, z] = [0, 1, 2].map(|a| pack(handles_m.iter().map(|h| h[a])));
-        let handles = (0..x.len()).map(|p| [x[p], y[p], z[p]]).collect();
+        let handles: Vec<_> = (0..x.len()).map(|p| [x[p], y[p], z[p]]).collect();
         Self {
-            turning: T::new(&rails, handles),
+            turning: T::new(&rails, handles.clone()),
             rails,
-            handles_m: handles_m.to_vec(),
+            handles,
         }
+    }
+
+    /// Rows of the rotation.
+    fn rows(&self, y: &[f64]) -> [[f64; 3]; 3] {
+        let [roll, tilt, yaw] = [3, 4, 5].map(|c| self.rails.coordinate(c, y));
+        let turned = Rotation3::from_euler_angles(roll, tilt, yaw);
+        [0, 1, 2].map(|row| [0, 1, 2].map(|column| turned[(row, column)]))
     }
 
     /// J (φ̇, θ̇, ψ̇), or with the rates of a state J (φ̈, θ̈, ψ̈).
@@ -343,18 +351,28 @@ impl<T: Turning> Freedoms for Reduced<T> {
         [sideways, vertical]: [&[f64x2]; 2],
         rates: &mut [f64],
     ) {
-        let inverse = self.inverse_masses(y);
-        let rates = &mut rates[self.rails.free..];
-        for (i, handle_m) in self.handles_m.iter().enumerate() {
-            let (pair, lane) = (i / LANES, i % LANES);
-            let gain = pairs[pair].contact_gain;
+        let rails = &self.rails;
+        let (rows, columns) = (self.rows(y), self.turning.columns(rails, y));
+        let mut taken = [f64x2::ZERO; 6];
+        let dampers = sideways.iter().zip(vertical);
+        for ((p, handle), (sideways, vertical)) in pairs.iter().zip(&self.handles).zip(dampers) {
             for (axis, damping) in [sideways, sideways, vertical].into_iter().enumerate() {
-                let acting = (damping[pair] * gain).as_array()[lane];
-                let levers = self.levers(y, *handle_m, axis);
-                for ((rate, lever), inverse) in rates.iter_mut().zip(levers).zip(inverse) {
-                    *rate += acting * lever * lever * inverse;
+                let acting = *damping * p.contact_gain;
+                if let Some(v) = rails.place[axis] {
+                    taken[v] += acting;
+                }
+                let arm = cross(*handle, rows[axis].map(f64x2::splat));
+                for (column, place) in columns.iter().zip(&rails.place[3..]) {
+                    if let Some(v) = *place {
+                        let lever = dot(column.map(f64x2::splat), arm);
+                        taken[v] += acting * lever * lever;
+                    }
                 }
             }
+        }
+        let inverse = self.inverse_masses(y);
+        for (v, rate) in rates[rails.free..].iter_mut().enumerate() {
+            *rate = sum(taken[v]) * inverse[v];
         }
     }
 
@@ -410,10 +428,7 @@ impl<T: Turning> Freedoms for Reduced<T> {
         if let Some(p) = rails.place[axis] {
             levers[p] = 1.0;
         }
-        let [roll, tilt, yaw] = [3, 4, 5].map(|c| rails.coordinate(c, y));
-        let turned = Rotation3::from_euler_angles(roll, tilt, yaw);
-        let row = [0, 1, 2].map(|column| turned[(axis, column)]);
-        let arm = cross(handle_m, row);
+        let arm = cross(handle_m, self.rows(y)[axis]);
         let j = self.turning.columns(rails, y);
         for (column, place) in j.into_iter().zip(&rails.place[3..]) {
             if let Some(p) = *place {
