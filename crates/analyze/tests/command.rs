@@ -417,12 +417,20 @@ fn bad_input_gets_one_clear_sentence() {
         .unwrap()
         .finish()
         .unwrap();
+    // Every chunk is hit.
+    let spoilt = folder.path().join("spoilt.mcap");
+    let mut bytes = std::fs::read(recording(folder.path())).unwrap();
+    for at in (1000..bytes.len()).step_by(5000) {
+        bytes[at] ^= 4;
+    }
+    std::fs::write(&spoilt, bytes).unwrap();
     for (file, said) in [
         (folder.path().join("nowhere.mcap"), "cannot be read"),
         (no_mcap, "not an MCAP"),
         (empty, "is empty"),
         (folder.path().to_owned(), "folder"),
         (bare, "holds no messages"),
+        (spoilt, "none of its messages can be read; the chunk"),
     ] {
         let out = analyze(&[file.to_str().unwrap()]);
         assert_eq!(out.status.code(), Some(1), "{}", file.display());

@@ -231,6 +231,9 @@ fn nothing(a: &Analysis, request: &Request) -> String {
     if a.messages == 0 {
         return format!("{}: holds no messages{why}", a.file);
     }
+    if a.topics.is_empty() {
+        return format!("{}: none of its messages can be read{why}", a.file);
+    }
     let found: Vec<String> = a
         .topics
         .iter()
