@@ -94,7 +94,7 @@ freedoms() {
     fixed="solver.method=rk4 solver.step_s=0.004 duration_s=10.0"
     for f in '["height"]' '["height","roll"]' '["height","roll","tilt"]' '["y","height","roll","tilt"]' '["y","height","roll","tilt","yaw"]' \
         '["x","y","height","roll","tilt","yaw"]'; do
-        echo "$f | $(($(count "$COST" music $fixed "freedom=$f") / $(evaluations music $fixed "freedom=$f")))"
+        echo "$f | $(($(count "$COST" music $fixed "freedom=$f") / $(evaluations music $fixed "freedom=$f"))) | $(($(count "$COST" music "freedom=$f") / 60))"
     done
 }
 
