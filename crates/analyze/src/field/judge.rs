@@ -2,13 +2,14 @@
 
 use recording::read::Recording;
 
-use super::{Columns, Records, unloadings};
+use super::{Columns, Records};
 use crate::clock::from_signals;
 use crate::filter::{Band, butter, sosfiltfilt};
 use crate::imu::orientation::causal;
 use crate::imu::rath::Motion;
 use crate::imu::track::period_s;
 use crate::imu::truth::{Truth, inclination_error_deg, relative_error};
+use crate::imu::unloading::unloadings;
 use crate::imu::{Track, vertical};
 use crate::metrics::{Datum, Metrics, Value};
 use crate::roles::{Role, Roles};

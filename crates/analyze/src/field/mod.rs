@@ -22,6 +22,7 @@ use crate::examine::Quality;
 use crate::imu::Track;
 use crate::imu::orientation::Options;
 use crate::imu::rath::{self, Motion, Settings};
+use crate::imu::unloading::unloadings;
 use crate::inputs::{Inputs, Window};
 use crate::metrics::{Metrics, Value, metrics_of};
 use crate::roles::{Role, Roles, Sensors, about_the_load};
@@ -393,19 +394,6 @@ impl Field {
     }
 }
 
-/// Moments at which the support ratio falls through 0.05, between samples, s; each after the load was back above 0.15.
-pub fn unloadings(t_s: &[f64], support_ratio: &[f64]) -> Vec<f64> {
-    let (mut loaded, mut out) = (false, Vec::new());
-    for (t, s) in t_s.windows(2).zip(support_ratio.windows(2)) {
-        loaded |= s[0] > 0.15;
-        if loaded && s[0] > crate::metrics::FLOAT_SHARE && s[1] <= crate::metrics::FLOAT_SHARE {
-            out.push(t[0] + (t[1] - t[0]) * (s[0] - crate::metrics::FLOAT_SHARE) / (s[0] - s[1]));
-            loaded = false;
-        }
-    }
-    out
-}
-
 /// What the user says of the samples' age; else those of a simulated sensor are true at their stamps, and others as old as usual.
 fn options(simulated: bool, said: &Sensors) -> Options {
     let usual = if simulated {
@@ -484,17 +472,3 @@ impl Columns {
 
 /// Metadata records by name, as a reader gives them.
 type Records = BTreeMap<String, BTreeMap<String, String>>;
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn unloading_is_timed_between_samples() {
-        let t = [0.0, 0.1, 0.2, 0.3, 0.4];
-        let found = unloadings(&t, &[1.0, 0.15, -0.05, 0.06, 0.0]);
-        // 0.15 → −0.05 passes 0.05 half way; the second dip came without a landing.
-        assert_eq!(found.len(), 1);
-        assert!((found[0] - 0.15).abs() < 1e-12);
-    }
-}

@@ -9,12 +9,14 @@
 //! | [`orientation`] | sensor → earth (z up), causal and batch |
 //! | [`vertical`] | height by drift-free double integration, with its valid band |
 //! | [`rath`] | the body's motion and every metric that rests on it, with intervals |
+//! | [`unloading`] | when the support falls below a share of the weight |
 //! | [`truth`] | errors against a recorded truth |
 
 pub mod orientation;
 pub mod rath;
 pub mod track;
 pub mod truth;
+pub mod unloading;
 pub mod vertical;
 
 pub use track::Track;

@@ -16,6 +16,7 @@
 
 use super::orientation::{self, Estimate, Options};
 use super::track::Track;
+use super::unloading::unloadings;
 use super::vertical;
 use crate::filter::{Band, butter, sosfiltfilt};
 use crate::inputs::{Inputs, Window, interpolate};
@@ -568,7 +569,7 @@ fn beyond_the_budget(name: &str, motion: &Motion, window: Window) -> f64 {
         "t_float" if motion.settings.lever_m != [0.0; 3] => {
             let (t_s, ratio) = (&inputs.t_s[range.clone()], &inputs.support_ratio[range]);
             let length_s = t_s.len().max(1) as f64 * period_s;
-            let edges = 2 * crate::field::unloadings(t_s, ratio).len();
+            let edges = 2 * unloadings(t_s, ratio).len();
             EDGE_SAMPLES * edges as f64 * period_s / length_s
         }
         // The ends have no height. Stretches of their length swing so much more or less than the whole.

@@ -558,7 +558,7 @@ impl<'a> Iterator for Records<'a> {
     fn next(&mut self) -> Option<Self::Item> {
         if self.rest.first() == Some(&0) {
             self.zeros = true;
-            self.rest = &self.rest[leading_zeros(self.rest)..];
+            self.rest = &self.rest[chunk::leading_zeros(self.rest)..];
         }
         let (header, rest) = self.rest.split_first_chunk::<9>()?;
         let length = u64::from_le_bytes(std::array::from_fn(|i| header[1 + i]));
@@ -566,14 +566,6 @@ impl<'a> Iterator for Records<'a> {
         self.rest = rest;
         Some((header[0], body))
     }
-}
-
-/// How many bytes at the beginning are zero.
-pub(super) fn leading_zeros(bytes: &[u8]) -> usize {
-    let (words, _) = bytes.as_chunks::<16>();
-    let whole = 16 * words.iter().take_while(|word| **word == [0; 16]).count();
-    let rest = bytes[whole..].iter().take_while(|byte| **byte == 0);
-    whole + rest.count()
 }
 
 fn lost_chunk(

@@ -5,7 +5,6 @@ use std::io::{self, Read};
 
 use super::{
     ReadOptions,
-    block::leading_zeros,
     container::{ChunkHeader, Fields, chunk_header},
 };
 use crate::finding::Kind;
@@ -244,6 +243,14 @@ pub(super) fn pieces(
         each(&buffer[..filled]);
     }
     Ok(too_long)
+}
+
+/// How many bytes at the beginning are zero.
+pub(super) fn leading_zeros(bytes: &[u8]) -> usize {
+    let (words, _) = bytes.as_chunks::<16>();
+    let whole = 16 * words.iter().take_while(|word| **word == [0; 16]).count();
+    let rest = bytes[whole..].iter().take_while(|byte| **byte == 0);
+    whole + rest.count()
 }
 
 /// How many of the bytes are whole records.
