@@ -276,6 +276,79 @@ fn one_bad_chunk_costs_one_chunk() {
     assert!(damaged.skipped > 0 && damaged.content.len() > whole.len() / 2);
 }
 
+/// A file of noise, which packs badly, that is not finished: one chunk, and what is left of it is what has been written so far.
+fn unfinished(compression: Option<mcap::Compression>, messages: u64) -> Vec<u8> {
+    let options = mcap::WriteOptions::new()
+        .compression(compression)
+        // Several would keep it to themselves for longer.
+        .compression_threads(0)
+        .chunk_size(None);
+    let mut bytes = std::io::Cursor::new(Vec::new());
+    let mut writer = options.create(&mut bytes).expect("begins");
+    let channel = writer
+        .add_channel(0, "/noise", "json", &Default::default())
+        .expect("a channel");
+    let mut random = Random(3);
+    for k in 0..messages {
+        let header = mcap::records::MessageHeader {
+            channel_id: channel,
+            sequence: 0,
+            log_time: k,
+            publish_time: k,
+        };
+        let noise: Vec<String> = (0..64).map(|_| random.below(1 << 30).to_string()).collect();
+        let data = format!("[{}]", noise.join(","));
+        writer
+            .write_to_known_channel(&header, data.as_bytes())
+            .expect("writes");
+    }
+    // A killed program closes nothing.
+    std::mem::forget(writer);
+    bytes.into_inner()
+}
+
+#[test]
+fn what_is_left_of_a_cut_chunk_is_read() {
+    const MESSAGES: u64 = 2000;
+    for compression in [None, Some(mcap::Compression::Zstd)] {
+        let bytes = unfinished(compression, MESSAGES);
+        let mut before = 0;
+        for eighths in [4, 5, 6, 7, 8] {
+            let damaged = read(bytes[..bytes.len() * eighths / 8].to_vec()).expect("reads");
+            let messages = damaged.content.len();
+            let share = messages as f64 / MESSAGES as f64;
+            let part = eighths as f64 / 8.0;
+            // Packed data come in blocks of 128 KiB, of some 1.2 MB in all.
+            assert!(
+                (part - 0.25..=part).contains(&share) && messages > before,
+                "{compression:?}, {eighths}/8: {messages} messages"
+            );
+            before = messages;
+            // Its first messages, without a gap.
+            let times: std::collections::HashSet<i64> =
+                damaged.content.keys().map(|(_, t)| *t).collect();
+            assert!((0..messages as i64).all(|t| times.contains(&t)));
+            let losses: Vec<&Finding> = damaged
+                .findings
+                .iter()
+                .filter(|finding| finding.kind.is_loss())
+                .collect();
+            assert_eq!(losses.len(), 1, "{losses:?}");
+            assert_eq!(losses[0].kind, Kind::Truncated);
+            assert!(losses[0].text.contains("no checksum"), "{losses:?}");
+        }
+    }
+}
+
+#[test]
+fn a_cut_chunk_of_many_pieces_is_read_once() {
+    // Longer than a piece in which chunks are unpacked.
+    let bytes = unfinished(None, 8000);
+    assert!(bytes.len() > 5 << 20);
+    let damaged = read(bytes).expect("reads");
+    assert_eq!(damaged.content.len(), 8000);
+}
+
 /// Puts a record together.
 fn record(opcode: u8, body: &[u8]) -> Vec<u8> {
     let mut record = vec![opcode];

@@ -263,7 +263,9 @@ fn told(q: &Quality) -> String {
 
 fn loss(a: &Analysis) -> String {
     let told: Vec<String> = a.quality.iter().filter(|q| q.loss).map(told).collect();
+    let cut = a.quality.iter().any(|q| q.kind == "truncated");
     let lost = match a.skipped_messages {
+        0 if cut => "its end is missing".to_owned(),
         0 => "no whole message is known to be lost".to_owned(),
         1 => "1 message is lost".to_owned(),
         n => format!("{n} messages are lost"),

@@ -61,7 +61,7 @@ pub(super) struct BlockResult {
     pub times: Option<(i64, i64)>,
     /// Schemas and channels that are defined here otherwise than they are used.
     pub contradictions: u64,
-    /// The chunk is too large to be decoded in one go: the caller reads it in pieces.
+    /// The chunk is too large to be decoded in one go, or cut off: the caller reads it in pieces.
     pub large: bool,
 }
 
@@ -173,6 +173,10 @@ impl<'a> Worker<'a> {
         let mut result = BlockResult::default();
         match block {
             Block::Loose(range) => self.records(&self.recording.data[range.clone()], &mut result),
+            Block::CutChunk(_) => {
+                result.large = true;
+                return result;
+            }
             Block::Chunk { body, indexed } => {
                 let header = match chunk::open(
                     &self.recording.data[body.clone()],
@@ -207,54 +211,49 @@ impl<'a> Worker<'a> {
         result
     }
 
-    /// Decodes a large chunk in pieces and gives each piece's result away at once.
+    /// Decodes a chunk in pieces and gives each piece's result away at once.
     pub fn large(&mut self, block: &Block, give: &mut dyn FnMut(BlockResult)) {
-        let Block::Chunk { body, indexed } = block else {
-            return;
-        };
         let recording = self.recording;
-        let loss = match chunk::open(&recording.data[body.clone()], &recording.options) {
-            Err(loss) => Some(loss),
-            Ok(header) => {
-                let pieces = chunk::pieces(&header, &recording.options, &mut |records| {
-                    let mut result = BlockResult::default();
-                    self.records(records, &mut result);
-                    self.harvest(&mut result);
-                    give(result);
-                });
-                match pieces {
-                    Ok(0) => None,
-                    Ok(count) => {
-                        let text = format!(
-                            "{count} messages are longer than the limit max_message_bytes of {}",
-                            recording.options.max_message_bytes
-                        );
-                        let trouble = Trouble {
-                            channel: None,
-                            kind: Kind::TooLarge,
-                            count,
-                            time: None,
-                            text,
-                            lost: count,
-                        };
-                        give(BlockResult {
-                            troubles: vec![trouble],
-                            messages: count,
-                            ..BlockResult::default()
-                        });
-                        None
-                    }
-                    Err(loss) => Some(loss),
-                }
-            }
+        let (options, packed) = (&recording.options, &recording.data[block.range().clone()]);
+        let mut read = |records: &[u8]| {
+            let mut result = BlockResult::default();
+            self.records(records, &mut result);
+            self.harvest(&mut result);
+            give(result);
         };
-        if let Some(loss) = loss {
-            let trouble = lost_chunk(recording, body, *indexed, loss);
-            give(BlockResult {
-                troubles: vec![trouble],
-                ..BlockResult::default()
-            });
-        }
+        let (too_long, indexed) = match block {
+            Block::Loose(_) => return,
+            Block::Chunk { indexed, .. } => {
+                let header = chunk::open(packed, options);
+                let pieces = header.and_then(|header| chunk::pieces(&header, options, &mut read));
+                (pieces, *indexed)
+            }
+            Block::CutChunk(_) => (chunk::beginning(packed, options, &mut read), None),
+        };
+        let (trouble, messages) = match too_long {
+            Ok(0) => return,
+            Ok(count) => {
+                let text = format!(
+                    "{count} messages are longer than the limit max_message_bytes of {}",
+                    options.max_message_bytes
+                );
+                let trouble = Trouble {
+                    channel: None,
+                    kind: Kind::TooLarge,
+                    count,
+                    time: None,
+                    text,
+                    lost: count,
+                };
+                (trouble, count)
+            }
+            Err(loss) => (lost_chunk(recording, block.range(), indexed, loss), 0),
+        };
+        give(BlockResult {
+            troubles: vec![trouble],
+            messages,
+            ..BlockResult::default()
+        });
     }
 
     /// Reads records that stand one after the other.
@@ -615,21 +614,7 @@ pub(super) fn scan(data: &[u8], blocks: &[Block], options: &ReadOptions) -> (Def
     };
     let mut unpacker = Unpacker::new();
     for block in blocks {
-        match block {
-            Block::Loose(range) => look(&data[range.clone()]),
-            Block::Chunk { body, .. } => match chunk::open(&data[body.clone()], options) {
-                Ok(header) if header.uncompressed <= WHOLE_BYTES => {
-                    if let Ok(records) = unpacker.whole(&header) {
-                        look(records);
-                    }
-                }
-                Ok(header) => {
-                    // Damage is reported when the chunk is read for its messages.
-                    let _ = chunk::pieces(&header, options, &mut look);
-                }
-                Err(_) => {}
-            },
-        }
+        chunk::records(data, block, options, &mut unpacker, &mut look);
     }
     (definitions, tally)
 }

@@ -5,7 +5,7 @@ use std::io::{self, Read};
 
 use super::{
     ReadOptions,
-    container::{ChunkHeader, Fields, chunk_header},
+    container::{Block, ChunkHeader, Fields, begun_chunk_header, chunk_header},
 };
 use crate::finding::Kind;
 
@@ -75,6 +75,10 @@ fn bad(compression: &str, error: &io::Error) -> Loss {
     )
 }
 
+fn misfit() -> Loss {
+    (Kind::BadChunk, "has a header that does not fit".to_owned())
+}
+
 fn check(header: &ChunkHeader<'_>, length: u64, crc: impl FnOnce() -> u32) -> Result<(), Loss> {
     if header.crc != 0 {
         let found = crc();
@@ -142,8 +146,7 @@ impl Read for Lz4<'_> {
 
 /// Reads a chunk's header and holds it against the limits.
 pub(super) fn open<'a>(body: &'a [u8], options: &ReadOptions) -> Result<ChunkHeader<'a>, Loss> {
-    let header = chunk_header(body)
-        .ok_or_else(|| (Kind::BadChunk, "has a header that does not fit".to_owned()))?;
+    let header = chunk_header(body).ok_or_else(misfit)?;
     if header.uncompressed > options.max_chunk_bytes {
         return Err((
             Kind::TooLarge,
@@ -166,6 +169,33 @@ pub(super) fn open<'a>(body: &'a [u8], options: &ReadOptions) -> Result<ChunkHea
     Ok(header)
 }
 
+/// Gives the records of a block that are sound; what is lost is said by who reads it for its messages.
+pub(super) fn records(
+    data: &[u8],
+    block: &Block,
+    options: &ReadOptions,
+    unpacker: &mut Unpacker,
+    each: &mut dyn FnMut(&[u8]),
+) {
+    match block {
+        Block::Loose(range) => each(&data[range.clone()]),
+        Block::Chunk { body, .. } => match open(&data[body.clone()], options) {
+            Ok(header) if header.uncompressed <= WHOLE_BYTES => {
+                if let Ok(records) = unpacker.whole(&header) {
+                    each(records);
+                }
+            }
+            Ok(header) => {
+                let _ = pieces(&header, options, each);
+            }
+            Err(_) => {}
+        },
+        Block::CutChunk(body) => {
+            let _ = beginning(&data[body.clone()], options, each);
+        }
+    }
+}
+
 /// Gives the records of a chunk in pieces that hold whole records; a record longer than `max_message_bytes` is stepped over.
 ///
 /// Returns how many records were too long.
@@ -174,7 +204,32 @@ pub(super) fn pieces(
     options: &ReadOptions,
     each: &mut dyn FnMut(&[u8]),
 ) -> Result<u64, Loss> {
-    // First pass: nothing but the checksum, so that no number of a damaged chunk gets out.
+    verify(header)?;
+    let packed = stream(header.compression, header.records)?;
+    let (unpacked, end) = unpack(packed, options, each);
+    end.map_err(|error| bad(&String::from_utf8_lossy(header.compression), &error))?;
+    if !unpacked.rest.is_empty() {
+        // The caller's walk says what is wrong with the rest.
+        each(&unpacked.rest);
+    }
+    Ok(unpacked.too_long)
+}
+
+/// As [`pieces`], of a chunk that the end of the file cuts off: as far as it can be unpacked, which no checksum vouches for.
+pub(super) fn beginning(
+    body: &[u8],
+    options: &ReadOptions,
+    each: &mut dyn FnMut(&[u8]),
+) -> Result<u64, Loss> {
+    let (header, _) = begun_chunk_header(body).ok_or_else(misfit)?;
+    let packed = stream(header.compression, header.records)?;
+    // It ends where it can be unpacked no further.
+    let (unpacked, _) = unpack(packed.take(options.max_chunk_bytes), options, each);
+    Ok(unpacked.too_long)
+}
+
+/// Unpacks a chunk for nothing but its checksum, so that no number of a damaged one gets out.
+fn verify(header: &ChunkHeader<'_>) -> Result<(), Loss> {
     let name = String::from_utf8_lossy(header.compression);
     let mut packed = stream(header.compression, header.records)?;
     let mut crc = crc32fast::Hasher::new();
@@ -201,14 +256,31 @@ pub(super) fn pieces(
             crc.update(&buffer[..count]);
         }
     }
-    check(header, length, || crc.finalize())?;
+    check(header, length, || crc.finalize())
+}
 
-    let mut packed = stream(header.compression, header.records)?;
+/// What is to be said of a chunk that has been unpacked.
+struct Unpacked {
+    /// Records that were too long.
+    too_long: u64,
+    /// What is left behind the last whole record.
+    rest: Vec<u8>,
+}
+
+/// Gives what a stream holds in pieces of whole records, up to its end or to where it fails.
+fn unpack(
+    mut packed: impl Read,
+    options: &ReadOptions,
+    each: &mut dyn FnMut(&[u8]),
+) -> (Unpacked, io::Result<()>) {
+    let mut end = Ok(());
+    let mut buffer = vec![0; PIECE_BYTES];
     let (mut filled, mut skip, mut too_long) = (0usize, 0u64, 0u64);
     loop {
-        let count = packed
-            .read(&mut buffer[filled..])
-            .map_err(|error| bad(&name, &error))?;
+        let count = packed.read(&mut buffer[filled..]).unwrap_or_else(|error| {
+            end = Err(error);
+            0
+        });
         filled += count;
         if skip > 0 {
             // Inside a record that is stepped over.
@@ -238,11 +310,9 @@ pub(super) fn pieces(
             }
         }
     }
-    if filled > 0 {
-        // The caller's walk says what is wrong with the rest.
-        each(&buffer[..filled]);
-    }
-    Ok(too_long)
+    buffer.truncate(filled);
+    let rest = buffer;
+    (Unpacked { too_long, rest }, end)
 }
 
 /// How many bytes at the beginning are zero.

@@ -299,6 +299,8 @@ pub(super) enum Block {
         body: Range<usize>,
         indexed: Option<u64>,
     },
+    /// What is left of the body of a chunk that the end of the file cuts off.
+    CutChunk(Range<usize>),
     /// Records outside chunks.
     Loose(Range<usize>),
 }
@@ -307,7 +309,7 @@ impl Block {
     /// Where it lies in the file.
     pub fn range(&self) -> &Range<usize> {
         match self {
-            Block::Chunk { body, .. } | Block::Loose(body) => body,
+            Block::Chunk { body, .. } | Block::CutChunk(body) | Block::Loose(body) => body,
         }
     }
 }
@@ -325,6 +327,18 @@ pub(super) struct ChunkHeader<'a> {
 
 /// Reads a chunk's header; `None` where it does not fit into its record.
 pub(super) fn chunk_header(body: &[u8]) -> Option<ChunkHeader<'_>> {
+    let (header, length) = begun_chunk_header(body)?;
+    let mut fields = Fields::new(header.records);
+    let records = fields.take(length)?;
+    Some(ChunkHeader {
+        records,
+        spare: fields.rest.len(),
+        ..header
+    })
+}
+
+/// Reads the header of a chunk whose records may be cut off, with the length that they should have: all that follows is theirs.
+pub(super) fn begun_chunk_header(body: &[u8]) -> Option<(ChunkHeader<'_>, u64)> {
     let mut fields = Fields::new(body);
     let start_time = fields.u64()?;
     fields.u64()?;
@@ -332,15 +346,15 @@ pub(super) fn chunk_header(body: &[u8]) -> Option<ChunkHeader<'_>> {
     let length = fields.u32()?;
     let compression = fields.take(u64::from(length))?;
     let length = fields.u64()?;
-    let records = fields.take(length)?;
-    Some(ChunkHeader {
+    let header = ChunkHeader {
         start_time,
         uncompressed,
         crc,
         compression,
-        records,
-        spare: fields.rest.len(),
-    })
+        records: fields.rest,
+        spare: 0,
+    };
+    Some((header, length))
 }
 
 /// An attachment's place in the file.
@@ -555,8 +569,11 @@ impl Walk<'_> {
                         }
                     }
                 }
-                // What is left of a chunk that is cut off has no checksum that could vouch for it.
-                None if self.cut_chunk(at) => None,
+                None if self.cut_chunk(at) => {
+                    let rest = Block::CutChunk(at + 9..end_of_file);
+                    self.found.blocks.push(rest);
+                    None
+                }
                 None => self.resync(at + 1),
             };
             let Some(next) = next else {
@@ -598,17 +615,16 @@ impl Walk<'_> {
         known && length.is_none_or(beyond)
     }
 
-    /// Whether a chunk begins at `at` that goes on beyond the end of the file: both its lengths say so.
+    /// Whether a chunk begins at `at` that goes on beyond the end of the file: both its lengths say so, or neither is known yet, which a
+    /// writer that packs while it writes (mcap for Rust) says by all bits until the chunk is closed.
     fn cut_chunk(&self, at: usize) -> bool {
         let lengths = || {
             let mut fields = Fields::new(&self.bytes[at..]);
             let (opcode, outer) = (fields.array::<1>()?, fields.u64()?);
-            fields.take(8 + 8 + 8 + 4)?;
-            let compression = u64::from(fields.u32()?);
-            fields.take(compression)?;
-            Some(
-                opcode == [op::CHUNK] && fields.u64()?.checked_add(40 + compression) == Some(outer),
-            )
+            let (header, inner) = begun_chunk_header(fields.rest)?;
+            let whole = (40 + header.compression.len() as u64).checked_add(inner);
+            let open = (outer, inner) == (u64::MAX, u64::MAX);
+            Some(opcode == [op::CHUNK] && (whole == Some(outer) || open))
         };
         lengths() == Some(true)
     }
@@ -630,6 +646,12 @@ impl Walk<'_> {
             (None, 0) => (
                 Kind::Truncated,
                 "the file ends without its closing records; what came after is lost".to_owned(),
+            ),
+            (None, _) if matches!(self.found.blocks.last(), Some(Block::CutChunk(_))) => (
+                Kind::Truncated,
+                format!(
+                    "the file ends inside a chunk: its last {left} bytes, from byte {at} on, were read as far as they unpack, and no checksum vouches for them"
+                ),
             ),
             (None, _) => (
                 Kind::Truncated,

@@ -8,7 +8,7 @@ use std::{
 use super::{
     ReadError, Recording,
     block::{BlockResult, ChannelBatch, Records, Worker},
-    chunk::{self, Unpacker, WHOLE_BYTES},
+    chunk::{self, Unpacker},
     clock::{Clocks, Order, seconds},
     container::{Block, op},
     rows::Selection,
@@ -660,23 +660,14 @@ pub(super) fn raw(
     };
     let mut unpacker = Unpacker::new();
     for block in &recording.container.blocks {
-        match block {
-            Block::Loose(range) => give(&recording.data[range.clone()]),
-            Block::Chunk { body, .. } => {
-                match chunk::open(&recording.data[body.clone()], &recording.options) {
-                    Ok(header) if header.uncompressed <= WHOLE_BYTES => {
-                        if let Ok(records) = unpacker.whole(&header) {
-                            give(records);
-                        }
-                    }
-                    Ok(header) => {
-                        // A damaged chunk is left out, as `stream` says it is.
-                        let _ = chunk::pieces(&header, &recording.options, &mut give);
-                    }
-                    Err(_) => {}
-                }
-            }
-        }
+        // A damaged chunk is left out, as `stream` says it is.
+        chunk::records(
+            &recording.data,
+            block,
+            &recording.options,
+            &mut unpacker,
+            &mut give,
+        );
     }
     Ok(())
 }
