@@ -35,6 +35,10 @@ const USUAL_OCTAVES: f64 = 0.7;
 const BAND: [f64; 2] = [0.6, 1.5];
 /// Less is not analysed, s.
 pub const SHORTEST_S: f64 = 5.0;
+/// Where less than this share of the time was recorded, only the longest stretch without a gap of so many seconds is analysed: a wrong time
+/// stamp must not ask for all memory.
+const LEAST_SHARE: f64 = 0.05;
+const GAP_S: f64 = 10.0;
 /// Steps swing at least this much (RMS), m/s²: a device on a table does not walk.
 const LEAST_SWING_M_PER_S2: f64 = 0.2;
 
@@ -99,6 +103,12 @@ pub fn steps_in(times: &[f64], norm: &[f64]) -> Result<Steps, StepError> {
     if found_hz < 15.0 {
         return Err(StepError::TooSlow { found_hz });
     }
+    if (times.len() as f64) < LEAST_SHARE * found_s * found_hz {
+        let longest = longest_stretch(times);
+        if longest.len() < times.len() {
+            return steps_in(&times[longest.clone()], &norm[longest]);
+        }
+    }
     // Stay clear of the sensor's own half rate.
     let (grid, m) = even(times, norm, RATE_HZ);
     let top_hz = 6.0f64.min(0.4 * found_hz);
@@ -152,11 +162,24 @@ fn norm(t_s: &[f64], accel: [&[f64]; 3]) -> (Vec<f64>, Vec<f64>) {
     (times, out)
 }
 
+/// The longest stretch without a gap.
+fn longest_stretch(t_s: &[f64]) -> std::ops::Range<usize> {
+    let (mut longest, mut start) = (0..0, 0);
+    for end in 1..=t_s.len() {
+        if end == t_s.len() || t_s[end] - t_s[end - 1] > GAP_S {
+            if end - start > longest.len() {
+                longest = start..end;
+            }
+            start = end;
+        }
+    }
+    longest
+}
+
 /// Onto an even grid: averaged where the source is faster, drawn straight where it is slower.
 fn even(t_s: &[f64], x: &[f64], rate_hz: f64) -> (Vec<f64>, Vec<f64>) {
     let (start, end) = (t_s[0], t_s[t_s.len() - 1]);
-    // Ten days at 100 Hz; a wrong time stamp must not ask for all memory.
-    let n = (((end - start) * rate_hz) as usize + 1).min(86_400_000);
+    let n = ((end - start) * rate_hz) as usize + 1;
     let grid: Vec<f64> = (0..n).map(|k| start + k as f64 / rate_hz).collect();
     let mut out = interpolate(t_s, x, &grid);
     let half = 0.5 / rate_hz;
@@ -428,6 +451,20 @@ mod tests {
                 check(hz, rate_hz, 0.8);
             }
         }
+    }
+
+    #[test]
+    fn a_wrong_stamp_costs_nothing_but_itself() {
+        let (mut t, [x, y, z]) = walk(1.8, 100.0, 60.0, 0.3);
+        let found = steps(&t[..5000], [&x[..5000], &y[..5000], &z[..5000]]).unwrap();
+        t[5000..].iter_mut().for_each(|t| *t += 7e9);
+        t[5999] += 1e12;
+        assert_eq!(steps(&t, [&x, &y, &z]).unwrap(), found);
+        // Pairs of samples a long way apart, but no gap.
+        let pairs: Vec<f64> = (0..6000)
+            .map(|k| f64::from(9 * (k / 2)) + 0.01 * f64::from(k % 2))
+            .collect();
+        assert!(steps(&pairs, [&x, &y, &z]).is_err());
     }
 
     #[test]
