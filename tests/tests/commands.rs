@@ -29,6 +29,17 @@ fn a_scene_becomes_a_recording_and_the_recording_findings() {
     assert_eq!(found["metrics"]["mechanism"]["value"], "parametric");
     assert_eq!(found["metrics"]["unstable"]["value"], true);
     assert!(!found.to_string().contains("NaN"));
+    let outside = [
+        "music-1001.mcap",
+        "--window",
+        "100..200",
+        "--format",
+        "json",
+    ];
+    let found = json(&good(run_in(folder.path(), "analyze", &outside)));
+    let warnings = found["recording"]["warnings"].to_string();
+    assert!(warnings.contains("outside the recording"), "{warnings}");
+    assert!(found["metrics"]["rms_roll_deg"]["value"].is_null());
 }
 
 #[test]

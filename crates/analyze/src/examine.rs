@@ -315,6 +315,9 @@ fn window(
             0.0
         }
     };
+    if start_s > duration_s || end_s < 0.0 {
+        warnings.push(format!("the window from {start_s} to {end_s} s is outside the recording, which lasts {duration_s:.3} s: nothing is analysed"));
+    }
     Window { start_s, end_s }
 }
 
