@@ -12,6 +12,7 @@ pub mod load;
 pub mod read;
 pub mod schema;
 pub mod signal;
+pub mod text;
 pub mod topics;
 pub mod whole;
 pub mod write;

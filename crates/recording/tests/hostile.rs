@@ -4,7 +4,7 @@
 
 use std::{
     collections::BTreeMap,
-    io::{self, Write},
+    io::{self, Read, Write},
     path::PathBuf,
     sync::{Arc, Mutex},
     time::Instant,
@@ -255,6 +255,17 @@ fn messages_mean_the_same_among_others() {
 }
 
 /// Definitions that would multiply without end.
+#[test]
+fn a_stream_without_end_that_is_no_recording_is_refused() {
+    for byte in [0, 1, b'x', 0x89] {
+        let mut endless = io::repeat(byte).take(1 << 40);
+        let refused = Recording::from_stream(&mut endless, "pipe", &ReadOptions::default());
+        let error = refused.expect_err("no recording").to_string();
+        assert!(error.contains("pipe: is not an MCAP"), "{error}");
+        assert!(endless.limit() > (1 << 40) - 100);
+    }
+}
+
 #[test]
 fn schemas_that_explode_are_refused() {
     let nest = |depth: usize, brackets: &str| {

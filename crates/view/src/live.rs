@@ -8,7 +8,7 @@ use std::sync::mpsc::{RecvTimeoutError, channel};
 use std::time::{Duration, Instant};
 
 use recording::Finding;
-use recording::read::{ReadError, ReadOptions, Recording};
+use recording::read::{ReadError, ReadOptions, Recording, STDIN};
 
 use crate::blueprint::{self, Play};
 use crate::load::{Detail, load};
@@ -102,7 +102,7 @@ impl Shown {
         if recording.info().messages == 0 {
             return Ok(());
         }
-        let (mut take, _) = load("standard input", &recording, Detail::Whole)?;
+        let (mut take, _) = load(STDIN, &recording, Detail::Whole)?;
         let settled_s = take.duration_s() - SETTLE_S;
         take.events.retain(|event| event.t_s <= settled_s);
         // What looks like damage is only what has not come yet.
@@ -112,7 +112,7 @@ impl Shown {
 
     fn last(mut self, bytes: Vec<u8>, sink: &mut dyn Sink) -> anyhow::Result<(Take, Vec<Finding>)> {
         let recording = Recording::from_bytes(bytes, &ReadOptions::default())?;
-        let (take, findings) = load("standard input", &recording, Detail::Whole)?;
+        let (take, findings) = load(STDIN, &recording, Detail::Whole)?;
         self.show(&recording, &take, sink)?;
         Ok((take, findings))
     }

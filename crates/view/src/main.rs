@@ -10,7 +10,7 @@ use std::time::Duration;
 use anyhow::{Context, anyhow, bail};
 use clap::Parser;
 use recording::Finding;
-use recording::read::{ReadError, ReadOptions, Recording};
+use recording::read::{ReadError, ReadOptions, Recording, STDIN};
 use view::load::{Detail, load};
 use view::store::{Encoded, Sink};
 use view::take::Take;
@@ -100,18 +100,15 @@ fn open(file: &Path) -> anyhow::Result<Recording> {
     if !is_stdin(file) {
         return Ok(Recording::open(file, &ReadOptions::default())?);
     }
-    let mut bytes = Vec::new();
-    std::io::stdin()
-        .lock()
-        .read_to_end(&mut bytes)
-        .context("standard input: cannot be read")?;
-    Ok(Recording::from_bytes(bytes, &ReadOptions::default())?)
+    let mut input = std::io::stdin().lock();
+    let options = ReadOptions::default();
+    Ok(Recording::from_stream(&mut input, STDIN, &options)?)
 }
 
 /// Name for people: the file's, without folders.
 fn name(file: &Path) -> String {
     if is_stdin(file) {
-        return "standard input".to_owned();
+        return STDIN.to_owned();
     }
     file.file_stem().map_or_else(
         || file.display().to_string(),
@@ -138,7 +135,7 @@ fn source(file: &Path) -> anyhow::Result<Source> {
             .lock()
             .take(MAGIC_BYTES)
             .read_to_end(&mut begin)
-            .context("standard input: cannot be read")?;
+            .with_context(|| format!("{STDIN}: cannot be read"))?;
         match Recording::from_bytes(begin.clone(), &ReadOptions::default()) {
             Err(error @ ReadError::NotMcap { .. }) => return Err(error.into()),
             Err(error) if begin.is_empty() => return Err(error.into()),

@@ -1,13 +1,13 @@
 //! `analyze FILE...`
 
-use std::io::{Read, Write};
+use std::io::Write;
 use std::path::Path;
 
 use analyze::examine::{Analysis, Quality, Request, examine};
 use analyze::report;
 use analyze::roles::RolesFile;
 use anyhow::{Context, bail};
-use recording::read::{ReadOptions, Recording};
+use recording::read::{ReadOptions, Recording, STDIN};
 
 use super::{AnalyzeArgs, Done, Format, Limits, annotate, complain, print};
 
@@ -81,7 +81,7 @@ fn request(args: &AnalyzeArgs) -> anyhow::Result<Request> {
 
 fn roles(path: &Path) -> anyhow::Result<RolesFile> {
     let name = path.display();
-    let text = std::fs::read_to_string(path)
+    let text = recording::text::read_text(path)
         .with_context(|| format!("{name}: the roles cannot be read"))?;
     toml::from_str(&text).with_context(|| format!("{name}: is not a roles file"))
 }
@@ -95,12 +95,8 @@ fn open(path: &Path, limits: &Limits) -> anyhow::Result<Recording> {
         ..ReadOptions::default()
     };
     if path.as_os_str() == "-" {
-        let mut bytes = Vec::new();
-        std::io::stdin()
-            .lock()
-            .read_to_end(&mut bytes)
-            .context("standard input cannot be read")?;
-        return Ok(Recording::from_bytes(bytes, &options)?);
+        let mut input = std::io::stdin().lock();
+        return Ok(Recording::from_stream(&mut input, STDIN, &options)?);
     }
     let opened = Recording::open(path, &options);
     if opened.is_err()
@@ -120,7 +116,7 @@ fn open(path: &Path, limits: &Limits) -> anyhow::Result<Recording> {
 fn one(path: &Path, args: &AnalyzeArgs, request: &Request) -> anyhow::Result<Analysis> {
     let mut recording = open(path, &args.limits)?;
     let name = if path.as_os_str() == "-" {
-        "standard input".to_owned()
+        STDIN.to_owned()
     } else {
         path.display().to_string()
     };

@@ -25,6 +25,7 @@ use super::{
     imu::{self, Log, STANDARD_GRAVITY, Sample},
     table::Table,
 };
+use crate::text::read_text;
 
 /// Layouts that come with the program.
 pub const BUILT_IN: &[(&str, &str)] = &[
@@ -105,7 +106,7 @@ pub(super) fn find(name: &str) -> Result<Layout, ImportError> {
     let text = match BUILT_IN.iter().find(|(known, _)| *known == name) {
         Some((_, text)) => (*text).to_owned(),
         None if Path::new(name).exists() => {
-            std::fs::read_to_string(name).map_err(|cause| ImportError::Io {
+            read_text(Path::new(name)).map_err(|cause| ImportError::Io {
                 name: name.to_owned(),
                 cause,
             })?

@@ -300,6 +300,23 @@ fn open(path: &Path) -> Result<Files, ImportError> {
         name: name.clone(),
         cause,
     };
+    let content = |problem: String| ImportError::Content {
+        name: name.clone(),
+        problem,
+    };
+    let mut left = MAX_TEXT_BYTES;
+    let mut text = |from: &mut dyn Read, what: &str| -> Result<String, ImportError> {
+        let mut bytes = Vec::new();
+        from.take(left + 1)
+            .read_to_end(&mut bytes)
+            .map_err(|error| content(format!("{what} cannot be read: {error}")))?;
+        left = left.checked_sub(bytes.len() as u64).ok_or_else(|| {
+            content(format!(
+                "holds more than {MAX_TEXT_BYTES} bytes of text, the limit"
+            ))
+        })?;
+        Ok(String::from_utf8_lossy(&bytes).into_owned())
+    };
     let mut texts = Vec::new();
     if path.is_dir() {
         // Apps put at most one level of folders (`meta`) beside their tables.
@@ -316,11 +333,9 @@ fn open(path: &Path) -> Result<Files, ImportError> {
                 .iter()
                 .filter(|entry| is_text(&entry.file_name().to_string_lossy()))
             {
-                let text = fs::read(entry.path()).map_err(io)?;
-                texts.push((
-                    entry.path().display().to_string(),
-                    String::from_utf8_lossy(&text).into_owned(),
-                ));
+                let what = entry.path().display().to_string();
+                let mut file = fs::File::open(entry.path()).map_err(io)?;
+                texts.push((what.clone(), text(&mut file, &what)?));
             }
         }
         return Ok(Files { name, texts });
@@ -330,13 +345,8 @@ fn open(path: &Path) -> Result<Files, ImportError> {
     let read = file.read(&mut head).map_err(io)?;
     io::Seek::rewind(&mut file).map_err(io)?;
     if &head[..read] == b"PK\x03\x04" {
-        let content = |problem: String| ImportError::Content {
-            name: name.clone(),
-            problem,
-        };
         let mut zip = zip::ZipArchive::new(io::BufReader::new(file))
             .map_err(|error| content(format!("is no zip: {error}")))?;
-        let mut left = MAX_TEXT_BYTES;
         for position in 0..zip.len() {
             let mut entry = zip
                 .by_index(position)
@@ -345,36 +355,16 @@ fn open(path: &Path) -> Result<Files, ImportError> {
             if !is_text(&entry_name) {
                 continue;
             }
-            let mut bytes = Vec::new();
-            entry
-                .by_ref()
-                .take(left + 1)
-                .read_to_end(&mut bytes)
-                .map_err(|error| content(format!("{entry_name} cannot be unpacked: {error}")))?;
-            left = left.checked_sub(bytes.len() as u64).ok_or_else(|| {
-                content(format!(
-                    "holds more than {MAX_TEXT_BYTES} bytes of text, the limit"
-                ))
-            })?;
-            texts.push((entry_name, String::from_utf8_lossy(&bytes).into_owned()));
+            let read = text(&mut entry, &entry_name)?;
+            texts.push((entry_name, read));
         }
         return Ok(Files { name, texts });
     }
-    let mut bytes = Vec::new();
-    file.take(MAX_TEXT_BYTES + 1)
-        .read_to_end(&mut bytes)
-        .map_err(io)?;
-    if bytes.len() as u64 > MAX_TEXT_BYTES {
-        let problem = format!("holds more than {MAX_TEXT_BYTES} bytes, the limit for texts");
-        return Err(ImportError::Content { name, problem });
+    let read = text(&mut file, "it")?;
+    if read.trim().is_empty() {
+        return Err(content("is empty; expected a log".to_owned()));
     }
-    if bytes.iter().all(u8::is_ascii_whitespace) {
-        return Err(ImportError::Content {
-            name,
-            problem: "is empty; expected a log".to_owned(),
-        });
-    }
-    texts.push((name.clone(), String::from_utf8_lossy(&bytes).into_owned()));
+    texts.push((name.clone(), read));
     Ok(Files { name, texts })
 }
 

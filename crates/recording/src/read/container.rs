@@ -416,6 +416,17 @@ struct Walk<'a> {
     unknown: BTreeMap<u8, u64>,
 }
 
+/// By so many bytes an MCAP is known.
+pub(super) const HEAD_BYTES: usize = MAGIC.len() + 9;
+
+/// Whether these can be the first bytes of an MCAP: its magic, or, since a damaged first byte should not cost the file, the beginning of a
+/// header behind it, of less than four gigabytes.
+pub(super) fn begins(bytes: &[u8]) -> bool {
+    let header = bytes.get(MAGIC.len()..HEAD_BYTES);
+    bytes.starts_with(MAGIC)
+        || header.is_some_and(|record| record[0] == op::HEADER && record[5..] == [0; 4])
+}
+
 /// Walks over a whole file, which must not be empty; `None` if nothing in it looks like an MCAP. `forget` hears of stretches that
 /// are not needed for now.
 pub(super) fn walk(bytes: &[u8], forget: &dyn Fn(&Range<usize>)) -> Option<Container> {
@@ -434,9 +445,8 @@ pub(super) fn walk(bytes: &[u8], forget: &dyn Fn(&Range<usize>)) -> Option<Conta
         unknown: BTreeMap::new(),
     };
     if !magic {
-        // A damaged first byte should not cost the file: the header record behind it must be sound then.
-        let header = bytes.get(8) == Some(&op::HEADER) && walk.possible(8).is_some();
-        if !header {
+        // The header record must be sound then.
+        if !begins(bytes) || walk.possible(MAGIC.len()).is_none() {
             return None;
         }
         walk.damage(

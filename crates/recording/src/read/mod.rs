@@ -64,6 +64,9 @@ impl Default for ReadOptions {
     }
 }
 
+/// What standard input is called.
+pub const STDIN: &str = "standard input";
+
 /// Why a file could not be read at all. Damage inside an MCAP is no such reason.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
@@ -243,16 +246,35 @@ impl Recording {
             let map = unsafe { memmap2::Mmap::map(&file) }.map_err(io)?;
             Data::Mapped(map)
         } else {
-            let mut bytes = Vec::new();
-            file.read_to_end(&mut bytes).map_err(io)?;
-            Data::Held(bytes)
+            return Self::from_stream(&mut file, &name, options);
         };
         Self::begin(data, &name, options)
     }
 
+    /// Reads a stream, such as standard input, to its end; `name` is what errors call it. One that does not begin as a recording does is not
+    /// read any further: it may have no end.
+    pub fn from_stream(
+        stream: &mut dyn Read,
+        name: &str,
+        options: &ReadOptions,
+    ) -> Result<Self, ReadError> {
+        let io = |cause| ReadError::Io {
+            name: name.to_owned(),
+            cause,
+        };
+        let mut bytes = Vec::new();
+        let head = container::HEAD_BYTES as u64;
+        stream.take(head).read_to_end(&mut bytes).map_err(io)?;
+        if !bytes.is_empty() && !container::begins(&bytes) {
+            return Err(not_mcap(name, &bytes));
+        }
+        stream.read_to_end(&mut bytes).map_err(io)?;
+        Self::begin(Data::Held(bytes), name, options)
+    }
+
     /// Opens bytes in memory, such as what came through standard input.
     pub fn from_bytes(bytes: Vec<u8>, options: &ReadOptions) -> Result<Self, ReadError> {
-        Self::begin(Data::Held(bytes), "standard input", options)
+        Self::begin(Data::Held(bytes), STDIN, options)
     }
 
     fn begin(data: Data, name: &str, options: &ReadOptions) -> Result<Self, ReadError> {
@@ -262,15 +284,7 @@ impl Recording {
             });
         }
         let Some(container) = container::walk(&data, &|stretch| data.forget(stretch)) else {
-            let found = data
-                .iter()
-                .take(8)
-                .map(|&byte| std::ascii::escape_default(byte).to_string())
-                .collect::<String>();
-            return Err(ReadError::NotMcap {
-                name: name.to_owned(),
-                found: format!("\"{found}\""),
-            });
+            return Err(not_mcap(name, &data));
         };
         let trusted = trusted(&container);
         Ok(Self::known(data, container, trusted, options))
@@ -410,6 +424,14 @@ impl Recording {
 
     fn damage(&self) -> &[Damage] {
         &self.container.damage
+    }
+}
+
+fn not_mcap(name: &str, data: &[u8]) -> ReadError {
+    let begin = data[..data.len().min(container::MAGIC.len())].escape_ascii();
+    ReadError::NotMcap {
+        name: name.to_owned(),
+        found: format!("\"{begin}\""),
     }
 }
 

@@ -1,6 +1,7 @@
 //! Text → [`Scene`], with errors that point at the line.
 
 use super::{BUILTIN, Scene, builtin, check};
+use recording::text::read_text;
 use std::path::Path;
 
 /// Why a scene cannot be used: one sentence that says where, what was found and what to do.
@@ -42,7 +43,7 @@ pub fn load(name_or_path: &str, settings: &[String]) -> Result<Scene, SceneError
     let path = Path::new(name_or_path);
     let looks_like_a_path =
         path.extension().is_some() || name_or_path.contains(std::path::MAIN_SEPARATOR);
-    match std::fs::read_to_string(path) {
+    match read_text(path) {
         Ok(text) => parse(name_or_path, &text, settings),
         Err(e) if looks_like_a_path => Err(SceneError::NotFound(format!(
             "cannot read the scene {name_or_path}: {e}"

@@ -72,7 +72,7 @@ impl Plan {
     /// One sentence: the file, the place in it, what is wrong and what was expected.
     pub fn load(path: &Path) -> Result<Self, String> {
         let origin = path.display().to_string();
-        let text = std::fs::read_to_string(path)
+        let text = recording::text::read_text(path)
             .map_err(|e| format!("cannot read the study {origin}: {e}"))?;
         let mut spec = spec::parse(&origin, &text)?;
         if spec.name.is_empty() {
