@@ -247,17 +247,26 @@ fn parts_of_another_study_are_not_mixed_in() {
     );
     let at = folder.path();
     study(at, &["a.toml", "--out", "x"]);
-    std::fs::write(
-        at.join("b.toml"),
+    let table = std::fs::read(at.join("x/runs.parquet")).expect("a table");
+    // With other runs its parts have other names, but the folder is still the first one's.
+    for other in [
         "scene = \"music\"\nset.duration_s = 2.0\nseeds = 2\n",
-    )
-    .expect("written");
-    let out = run_in(at, "study", &["b.toml", "--out", "x", "--resume"]);
-    let said = String::from_utf8_lossy(&out.stderr);
-    assert!(
-        out.status.code() == Some(1) && said.contains("another"),
-        "{said}"
-    );
+        "scene = \"music\"\nset.duration_s = 1.0\nseeds = 3\n",
+    ] {
+        std::fs::write(at.join("b.toml"), other).expect("written");
+        for resume in [None, Some("--resume")] {
+            let args: Vec<&str> = ["b.toml", "--out", "x"].into_iter().chain(resume).collect();
+            let out = run_in(at, "study", &args);
+            let said = String::from_utf8_lossy(&out.stderr);
+            assert!(
+                out.status.code() == Some(1) && said.contains("another"),
+                "{said}"
+            );
+        }
+    }
+    let kept = std::fs::read(at.join("x/runs.parquet")).expect("a table");
+    assert!(kept == table);
+    study(at, &["a.toml", "--out", "x", "--resume"]);
 }
 
 #[test]

@@ -83,9 +83,10 @@ impl<'p> Store<'p> {
     /// Makes the folder and writes the study into it.
     ///
     /// # Errors
-    /// What the system says.
+    /// What the system says; that the folder holds parts of another study.
     pub fn create(&self) -> Outcome<()> {
         let parts = self.folder.join("parts");
+        let held = std::fs::read_dir(&parts).is_ok_and(|mut entries| entries.next().is_some());
         std::fs::create_dir_all(&parts)
             .map_err(|e| format!("{}: cannot be made: {e}", parts.display()))?;
         for (name, text) in [
@@ -93,6 +94,12 @@ impl<'p> Store<'p> {
             ("scene.toml", self.plan.scene_text().to_owned()),
         ] {
             let path = self.folder.join(name);
+            if held && std::fs::read(&path).is_ok_and(|found| found != text.as_bytes()) {
+                return Err(format!(
+                    "{}: is of another study, whose parts are there; choose another --out, or delete the folder",
+                    path.display()
+                ));
+            }
             write_whole(&path, |file| Ok(file.write_all(text.as_bytes())?))?;
         }
         if self.plan.spec.recordings {
