@@ -89,6 +89,8 @@ pub struct Inputs {
     pub phase_rad: Vec<Vec<f64>>,
     /// Phase of the beat on the phases' time (rad); NaN where no beat sounds.
     pub beat_phase_rad: Vec<f64>,
+    /// Steps per second of each carrier who wears a sensor and walks, and half its 95 % interval (Hz).
+    pub cadence_hz: Vec<[f64; 2]>,
     /// Mass of what is carried (kg).
     pub mass_kg: Option<f64>,
     /// Gravity [m/s²].
@@ -115,6 +117,7 @@ impl Default for Inputs {
             phase_t_s: Vec::new(),
             phase_rad: Vec::new(),
             beat_phase_rad: Vec::new(),
+            cadence_hz: Vec::new(),
             mass_kg: None,
             gravity_m_per_s2: 9.80665,
             phases_are_measured: false,

@@ -9,7 +9,7 @@ use crate::imu::rath::{ENDS, Motion};
 use crate::imu::track::period_s;
 use crate::imu::vertical::height;
 use crate::inputs::interpolate;
-use crate::metrics::{Datum, Metrics, Value};
+use crate::metrics::{Datum, Metrics};
 use crate::phase::hilbert;
 use crate::spectrum::Complex64;
 use crate::steps::{StepError, Steps, steps_in};
@@ -335,32 +335,10 @@ impl Carriers {
         }
     }
 
-    /// Steps per second: mean over carriers, `per` carrier.
-    pub fn step_rate(&self) -> Option<Value> {
-        let walking: Vec<&Steps> = self
-            .0
-            .iter()
-            .filter_map(|w| w.steps.as_ref().ok())
-            .collect();
-        if walking.is_empty() {
-            return None;
-        }
-        let n = walking.len() as f64;
-        let mean = walking.iter().map(|s| s.cadence_hz).sum::<f64>() / n;
-        let half = walking
-            .iter()
-            .map(|s| s.cadence_ci95_hz.powi(2))
-            .sum::<f64>()
-            .sqrt()
-            / n;
-        let value = Value::number(mean)
-            .per(walking.iter().map(|s| s.cadence_hz).collect())
-            .source("imu")
-            .ci95(mean - half, mean + half);
-        Some(Value {
-            unit: "Hz",
-            ..value
-        })
+    /// Steps per second of each who walks, and half the 95 % interval, Hz.
+    pub fn cadence_hz(&self) -> Vec<[f64; 2]> {
+        let steps = self.0.iter().filter_map(|w| w.steps.as_ref().ok());
+        steps.map(|s| [s.cadence_hz, s.cadence_ci95_hz]).collect()
     }
 
     /// Steps of the first who walks, s.

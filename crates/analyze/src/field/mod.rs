@@ -255,6 +255,7 @@ impl Field {
             inputs.heave_m = self.carriers.heave_m(&inputs.t_s, corner_hz);
             self.filled.motion = true;
         }
+        inputs.cadence_hz = self.carriers.cadence_hz();
         if inputs.phase_rad.is_empty()
             && let Some((t_s, phases)) = self.carriers.phases()
         {
@@ -274,7 +275,7 @@ impl Field {
         inputs.phase_t_s = t_s;
     }
 
-    /// Adds to the metrics what only the sensors know: intervals, reasons, step rate, and errors against the truth.
+    /// Adds to the metrics what only the sensors know: intervals, reasons, and errors against the truth.
     pub fn finish(&self, metrics: &mut Metrics, window: Window) {
         let asked = self.filled.motion
             || self.filled.phases
@@ -311,9 +312,6 @@ impl Field {
                 .find(|(name, value)| *name == "beat_hz" && value.as_f64().is_none())
         {
             *value = v.clone();
-        }
-        if let Some(rate) = self.carriers.step_rate() {
-            metrics.0.push(("step_rate_hz", rate));
         }
         if let Some(judge) = &self.judge {
             judge.errors(

@@ -26,6 +26,8 @@ pub enum Need {
     Phases,
     /// Phase of the beat.
     Beat,
+    /// Steps of the carriers.
+    Steps,
 }
 
 /// One column in the window, finite.
@@ -235,6 +237,7 @@ impl<'a> Context<'a> {
                 !self.beat().is_empty(),
                 "beat",
             ),
+            Need::Steps => empty(!i.cadence_hz.is_empty(), true, "carrier's steps"),
         }
     }
 
@@ -247,6 +250,7 @@ impl<'a> Context<'a> {
             Need::Forces | Need::Support => &s.forces,
             Need::Phases => &s.phases,
             Need::Beat => &s.beat,
+            Need::Steps => "imu",
         }
         .to_string()
     }

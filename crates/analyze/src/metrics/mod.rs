@@ -238,6 +238,15 @@ pub const METRICS: &[Metric] = &[
         definition: "Mean over handles of the fraction of samples in W with N_i ≤ 0; `per` lists the handles.",
     },
     Metric {
+        name: "step_rate_hz",
+        unit: "Hz",
+        label: "step rate",
+        needs: &[Need::Steps],
+        compute: together::step_rate_hz,
+        origin: "docs/field.md",
+        definition: "Steps per second: one over the mean interval between steps, pauses left out; the mean of the carriers, `per` lists them. Over the whole recording.",
+    },
+    Metric {
         name: "synchrony",
         unit: "1",
         label: "synchrony",

@@ -32,6 +32,22 @@ pub fn synchrony_chance(c: &Context) -> Value {
     Value::number(chance.mean).per(chance.band.to_vec())
 }
 
+pub fn step_rate_hz(c: &Context) -> Value {
+    let steps = &c.inputs.cadence_hz;
+    let n = steps.len() as f64;
+    let rates: Vec<f64> = steps.iter().map(|[rate, _]| *rate).collect();
+    let half = steps
+        .iter()
+        .map(|[_, half]| half * half)
+        .sum::<f64>()
+        .sqrt()
+        / n;
+    let rate = mean(&rates);
+    Value::number(rate)
+        .per(rates)
+        .ci95(rate - half, rate + half)
+}
+
 pub fn plv(c: &Context) -> Value {
     let pairs = phase::pairs(&c.phases().slices());
     if pairs.is_empty() {
