@@ -103,11 +103,13 @@ pub fn steps_in(times: &[f64], norm: &[f64]) -> Result<Steps, StepError> {
     if found_hz < 15.0 {
         return Err(StepError::TooSlow { found_hz });
     }
-    if (times.len() as f64) < LEAST_SHARE * found_s * found_hz {
+    let mean_hz = times.len() as f64 / found_s;
+    if mean_hz < LEAST_SHARE * found_hz {
         let longest = longest_stretch(times);
-        if longest.len() < times.len() {
-            return steps_in(&times[longest.clone()], &norm[longest]);
+        if longest.len() == times.len() {
+            return Err(StepError::TooSlow { found_hz: mean_hz });
         }
+        return steps_in(&times[longest.clone()], &norm[longest]);
     }
     // Stay clear of the sensor's own half rate.
     let (grid, m) = even(times, norm, RATE_HZ);
@@ -464,7 +466,10 @@ mod tests {
         let pairs: Vec<f64> = (0..6000)
             .map(|k| f64::from(9 * (k / 2)) + 0.01 * f64::from(k % 2))
             .collect();
-        assert!(steps(&pairs, [&x, &y, &z]).is_err());
+        assert!(matches!(
+            steps(&pairs, [&x, &y, &z]),
+            Err(StepError::TooSlow { .. })
+        ));
     }
 
     #[test]
