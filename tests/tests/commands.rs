@@ -115,6 +115,11 @@ fn bad_input_gets_one_sentence_and_leaves_nothing() {
             "triangle inequality",
         ),
         (
+            &["record", "--duration", "-5"],
+            None,
+            "duration_s: found -5, expected a number above zero",
+        ),
+        (
             &["record", "--out", "no/such/folder/x.mcap"],
             None,
             "no/such/folder/x.mcap",

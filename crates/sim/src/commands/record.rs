@@ -21,13 +21,13 @@ pub struct Args {
     #[arg(default_value = "music")]
     scene: String,
     /// Seed of everything random.
-    #[arg(long)]
+    #[arg(long, allow_negative_numbers = true)]
     seed: Option<u64>,
     /// Where to write; `-` is standard output. Default: SCENE-SEED.mcap here.
     #[arg(long, short, value_name = "FILE.mcap")]
     out: Option<PathBuf>,
     /// Simulated time, s.
-    #[arg(long, value_name = "S")]
+    #[arg(long, value_name = "S", allow_negative_numbers = true)]
     duration: Option<f64>,
     /// Change a value of the scene; `effects.NAME=false` takes an effect away. May be repeated.
     #[arg(long, value_name = "KEY=VALUE")]
@@ -36,7 +36,7 @@ pub struct Args {
     #[arg(long)]
     method: Option<String>,
     /// Tolerance of an adaptive method.
-    #[arg(long, value_name = "X")]
+    #[arg(long, value_name = "X", allow_negative_numbers = true)]
     tolerance: Option<f64>,
 }
 

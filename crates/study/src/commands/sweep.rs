@@ -18,7 +18,7 @@ pub struct Args {
     /// The study file (docs/studies.md).
     file: PathBuf,
     /// Runs of every point, instead of the file's own `seeds`.
-    #[arg(long, value_name = "N")]
+    #[arg(long, value_name = "N", allow_negative_numbers = true)]
     seeds: Option<u64>,
     /// Threads; 0 is one per core. The result does not depend on it.
     #[arg(long, value_name = "N", default_value_t = 0)]
