@@ -11,6 +11,7 @@ use crate::field::Field;
 use crate::inputs::{Inputs, Window, interpolate};
 use crate::metrics::{self, Metrics};
 use crate::peaks::SpectrumSummary;
+use crate::quality::Quality;
 use crate::quaternion::Quaternions;
 use crate::roles::{Role, Roles, RolesFile, matches};
 use crate::summary::{Stream, Summary, Times, segment};
@@ -40,24 +41,6 @@ impl Request {
         (self.topics.is_empty() || self.topics.iter().any(|p| matches(p, topic)))
             && (self.signals.is_empty() || self.signals.iter().any(|p| matches(p, path)))
     }
-}
-
-/// One remark on the quality of the data.
-#[derive(Clone, Debug, PartialEq, serde::Serialize)]
-pub struct Quality {
-    /// Topic; empty where the whole file is meant.
-    pub topic: String,
-    /// Kind, one word.
-    pub kind: &'static str,
-    /// How often.
-    pub count: u64,
-    /// When first (s).
-    pub t_s: Option<f64>,
-    /// One line for people.
-    pub text: String,
-    /// Whether something that the file once held is lost.
-    #[serde(skip)]
-    pub loss: bool,
 }
 
 /// What a topic holds.
@@ -164,17 +147,7 @@ pub fn examine(
     let mut pass = Pass::new(recording, request, &roles);
     let select = |path: &str| wanted(path, request, &roles);
     let findings = recording.stream(&select, &mut |batch| pass.take(batch))?;
-    let mut quality: Vec<Quality> = findings
-        .into_iter()
-        .map(|f| Quality {
-            topic: f.topic,
-            kind: f.kind.word(),
-            count: f.count,
-            t_s: f.t_s,
-            text: f.text,
-            loss: f.kind.is_loss(),
-        })
-        .collect();
+    let mut quality: Vec<Quality> = findings.into_iter().map(Quality::from).collect();
     quality.sort_by(|a, b| (&a.topic, a.kind).cmp(&(&b.topic, b.kind)));
 
     let mut warnings = info.warnings.clone();

@@ -22,6 +22,7 @@ mod median;
 pub mod metrics;
 pub mod peaks;
 pub mod phase;
+pub mod quality;
 pub mod quaternion;
 mod random;
 pub mod report;

@@ -1,7 +1,8 @@
 //! Estimates from sensors against what was measured beside them: the BROAD trials (optical truth) and the Oxford walks (foot switches).
 //! They are others' to ship; the tests run where `../shared/imu` lies beside the workspace.
 
-use analyze::examine::{Analysis, Quality, Request, examine};
+use analyze::examine::{Analysis, Request, examine};
+use analyze::quality::Quality;
 use recording::import::{ImportOptions, ingest};
 use recording::read::{ReadOptions, Recording};
 use recording::write::{RecordingWriter, WriterOptions};

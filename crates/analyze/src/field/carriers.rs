@@ -1,7 +1,6 @@
 //! The carriers' own sensors: steps, gait phases on one clock, how sure they are.
 
 use crate::events::Event;
-use crate::examine::Quality;
 use crate::filter::{Band, butter, sosfiltfilt};
 use crate::imu::Track;
 use crate::imu::orientation::{Options, batch};
@@ -11,11 +10,10 @@ use crate::imu::vertical::height;
 use crate::inputs::interpolate;
 use crate::metrics::{Datum, Metrics};
 use crate::phase::hilbert;
+use crate::quality::Quality;
 use crate::spectrum::Complex64;
 use crate::steps::{StepError, Steps, steps_in};
 use nalgebra::{UnitQuaternion, Vector3};
-
-use super::remark;
 
 /// How far clocks have to part to be put right, and half the 95 % interval of what is found (s), by twins: with the tilt of a pole that two
 /// carry, and with the heave alone. Less cannot be told from a true lag between steps.
@@ -155,7 +153,7 @@ impl Carriers {
         for (worn, offset_s) in self.0.iter_mut().zip(offsets_s) {
             let Some(offset_s) = offset_s else { continue };
             worn.ahead_s = offset_s;
-            out.push(remark(
+            out.push(Quality::remark(
                 &worn.topic,
                 "clock_offset",
                 format!(
@@ -371,7 +369,7 @@ impl Carriers {
     /// Who does not walk, and why.
     pub fn quality(&self) -> Vec<Quality> {
         let silent = |w: &Worn| {
-            Some(remark(
+            Some(Quality::remark(
                 &w.topic,
                 "no_steps",
                 w.steps.as_ref().err()?.to_string(),

@@ -3,10 +3,8 @@
 //! The clock of the rath's own sensor is everybody's. A device keeps its own where too little is shared, and that is said.
 
 use crate::clock::{Clock, ClockError, from_events, from_signals, taps};
-use crate::examine::Quality;
 use crate::imu::Track;
-
-use super::remark;
+use crate::quality::Quality;
 
 /// Fewer taps than this set no clock: two may be chance.
 const FEWEST: usize = 3;
@@ -91,7 +89,7 @@ impl Clocks {
                 ),
             ),
         };
-        self.remarks.push(remark(topic, kind, text));
+        self.remarks.push(Quality::remark(topic, kind, text));
     }
 
     /// Puts the beats that were heard on the rath's clock, and leaves out those that are taps; `onset_s` is everything that begins in the sound.
@@ -153,7 +151,7 @@ impl Clocks {
             }
             Err(_) => "none are found here".to_owned(),
         };
-        self.remarks.push(remark(
+        self.remarks.push(Quality::remark(
             topic,
             "no_taps",
             format!(
@@ -178,7 +176,7 @@ impl Clocks {
     }
 
     fn say(&mut self, topic: &str, clock: &Clock, ahead: [f64; 2]) {
-        self.remarks.push(remark(
+        self.remarks.push(Quality::remark(
             topic,
             "clock_offset",
             format!(

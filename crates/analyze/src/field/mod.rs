@@ -18,13 +18,13 @@ use recording::signal::{Signal, seconds_since};
 use crate::beat::lock::beat_phase;
 use crate::beat::tempo_of;
 use crate::events::Event;
-use crate::examine::Quality;
 use crate::imu::Track;
 use crate::imu::orientation::Options;
 use crate::imu::rath::{self, Motion, Settings};
 use crate::imu::unloading::unloadings;
 use crate::inputs::{Inputs, Window};
 use crate::metrics::{Metrics, Value, metrics_of};
+use crate::quality::Quality;
 use crate::roles::{Role, Roles, Sensors, about_the_load};
 use carriers::Carriers;
 use clocks::Clocks;
@@ -97,7 +97,7 @@ impl Field {
         let factors = match thin::factors(recording, roles) {
             Ok(factors) => factors,
             Err(samples) => {
-                field.quality.push(remark(
+                field.quality.push(Quality::remark(
                     "",
                     "too_long",
                     format!("motion is not estimated from {samples} inertial samples, which would take too much memory: name fewer sensors in a roles file"),
@@ -120,7 +120,7 @@ impl Field {
         let (mut signals, _) = recording.signals(&wanted)?;
         signals.extend(thin::read(recording, &factors)?);
         for (topic, factor) in factors.iter().filter(|(_, factor)| **factor > 1) {
-            field.quality.push(remark(
+            field.quality.push(Quality::remark(
                 topic,
                 "thinned",
                 format!("motion is estimated from means over {factor} samples each, so that memory stays small"),
@@ -198,7 +198,7 @@ impl Field {
         } = heard;
         let said = remarks.into_iter();
         self.quality
-            .extend(said.map(|text| remark(&topic, "sound", text)));
+            .extend(said.map(|text| Quality::remark(&topic, "sound", text)));
         match beats {
             Ok(found) => {
                 self.beat_s = found.beat_s;
@@ -206,7 +206,7 @@ impl Field {
             }
             Err(error) => self
                 .quality
-                .push(remark(&topic, "no_beat", error.to_string())),
+                .push(Quality::remark(&topic, "no_beat", error.to_string())),
         }
         Ok(Some((topic, onset_s)))
     }
@@ -385,7 +385,7 @@ impl Field {
     pub fn quality(&mut self) -> Vec<Quality> {
         let mut out = std::mem::take(&mut self.quality);
         if let (Some(topic), Some(why)) = (&self.topic, &self.no_motion) {
-            out.push(remark(topic, "absent_field", why.clone()));
+            out.push(Quality::remark(topic, "absent_field", why.clone()));
         }
         out.extend(self.carriers.quality());
         out
@@ -403,17 +403,6 @@ fn options(simulated: bool, said: &Sensors) -> Options {
         latency_s: said.gyro_age_s.unwrap_or(usual.latency_s),
         accel_latency_s: said.accel_age_s.unwrap_or(usual.accel_latency_s),
         ..usual
-    }
-}
-
-pub(super) fn remark(topic: &str, kind: &'static str, text: String) -> Quality {
-    Quality {
-        topic: topic.to_owned(),
-        kind,
-        count: 1,
-        t_s: None,
-        text,
-        loss: false,
     }
 }
 
