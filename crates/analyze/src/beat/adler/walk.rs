@@ -2,9 +2,10 @@
 
 use super::unknowns::{BUILD_UP, ERROR, NOISE, OFFSET, OWN, PULL, SHARED, place};
 use crate::imu::track::period_s;
+use crate::median::median;
 use crate::phase::unwrap;
 use nalgebra::{DVector, Matrix3, Vector3};
-use std::f64::consts::TAU;
+use std::f64::consts::{PI, TAU};
 
 /// Step of the equation, s: short for any pull that is looked for.
 const STEP_S: f64 = 0.2;
@@ -24,6 +25,8 @@ const ENDS_S: f64 = 2.0;
 /// the archive's carriers, and a twin's detector errs by about as much.
 const LEAST: [f64; 2] = [5e-4, 5e-4];
 const LEAST_MEASURED: [f64; 2] = [0.01, 0.01];
+/// Over lost messages so long a steady beat's turns are still known, s.
+const COUNTED_S: f64 = 5.0;
 /// Fewer phases say nothing.
 const FEWEST: usize = 20;
 
@@ -67,6 +70,26 @@ impl Walk {
         let from = t_s.partition_point(|t| *t < t_s[onset] - BEFORE_S);
         let to = t_s.partition_point(|t| *t <= t_s[onset] + AFTER_S);
         let step_s = period_s(&t_s[from..to]).ok_or(TOO_LITTLE)?;
+        if t_s[from..to].windows(2).any(|t| t[1] - t[0] > 1.5 * step_s) {
+            let t_s = &t_s[from..to];
+            let place = |t: f64| ((t - t_s[0]) / step_s).round() as usize;
+            let n = place(t_s[t_s.len() - 1]) + 1;
+            if n > 2 * t_s.len() {
+                return Err(TOO_LITTLE);
+            }
+            let even: Vec<f64> = (0..n).map(|k| t_s[0] + k as f64 * step_s).collect();
+            let placed = |x: &[f64]| {
+                let mut out = vec![f64::NAN; n];
+                t_s.iter()
+                    .zip(&x[from..to])
+                    .for_each(|(t, x)| out[place(*t)] = *x);
+                out
+            };
+            let phases: Vec<Vec<f64>> = phase_rad.iter().map(|p| placed(p)).collect();
+            let phases: Vec<&[f64]> = phases.iter().map(|p| &p[..]).collect();
+            let beat = played_on(t_s, &beat_rad[from..to], &even);
+            return Walk::new(&even, &phases, &beat, measured);
+        }
         let hop = (STEP_S / step_s).round().max(1.0) as usize;
         let first = onset - (onset - from) / hop * hop;
         let pick = |x: &[f64]| -> Vec<f64> { x.iter().step_by(hop).copied().collect() };
@@ -196,6 +219,30 @@ fn onset(t_s: &[f64], beat_rad: &[f64]) -> Result<usize, &'static str> {
         }
     }
     Err("no beat that lasts for 4 s")
+}
+
+/// The beat's phase on an even axis, rad: through messages that were lost between two of a beat it goes on at its usual rate, to the nearest
+/// turn. NaN where none sounds, and in holes longer than [`COUNTED_S`].
+fn played_on(t_s: &[f64], beat_rad: &[f64], even: &[f64]) -> Vec<f64> {
+    let wrapped = |x: f64| (x + PI).rem_euclid(TAU) - PI;
+    let pairs = || t_s.windows(2).zip(beat_rad.windows(2));
+    let rate = |(t, b): (&[f64], &[f64])| wrapped(b[1] - b[0]) / (t[1] - t[0]);
+    let mut rates: Vec<f64> = pairs().map(rate).filter(|r| r.is_finite()).collect();
+    let usual = median(&mut rates).unwrap_or(f64::NAN);
+    let mut out = vec![f64::NAN; even.len()];
+    let mut k = 0;
+    for (t, b) in pairs() {
+        let width = t[1] - t[0];
+        let turned = usual * width + wrapped(b[1] - b[0] - usual * width);
+        while k < even.len() && even[k] <= t[1] {
+            let share = (even[k] - t[0]) / width;
+            if width <= COUNTED_S {
+                out[k] = b[0] + share * turned;
+            }
+            k += 1;
+        }
+    }
+    out
 }
 
 /// A measured phase in the middle of each window, at the step on which the window ends; NaN between them and near the phase's ends.
