@@ -136,8 +136,8 @@ pub fn from_signals(
         return Err(ClockError::TooShort { found_s: 0.0 });
     };
     let (start, end) = (a.0.min(b.0), a.1.max(b.1));
-    let found_s = a.1.min(b.1) - a.0.max(b.0) + search_s;
-    if found_s < 5.0 || a.1 - a.0 < 5.0 || b.1 - b.0 < 5.0 {
+    let found_s = a.1.min(b.1) - a.0.max(b.0);
+    if found_s + search_s < 5.0 || a.1 - a.0 < 5.0 || b.1 - b.0 < 5.0 {
         return Err(ClockError::TooShort {
             found_s: found_s.max(0.0),
         });
@@ -172,7 +172,16 @@ pub fn from_signals(
         first += width / 2;
     }
     if points.is_empty() {
-        points.push((0.5 * (a.0 + a.1), lag / RATE_HZ));
+        // Two clocks may part by this much from one end of what they share to the other, unseen.
+        let unseen_s = 1e-6 * PRIOR_PPM * 0.5 * found_s.max(0.0);
+        return Ok(Clock {
+            offset_s: lag / RATE_HZ,
+            offset_sd_s: TOP_SD_S.hypot(unseen_s),
+            drift_ppm: 0.0,
+            drift_sd_ppm: None,
+            at_s: 0.5 * (a.0 + a.1),
+            points: 1,
+        });
     }
     // Windows overlap by half: two of them count as one and a half measurements at best.
     let clock = line(&points, 1.5, 0.0);

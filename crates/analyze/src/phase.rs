@@ -235,7 +235,8 @@ pub fn pairs(phases_rad: &[&[f64]]) -> Vec<(usize, usize, Circular)> {
 /// What mean r the same phases give when each carrier is shifted in time by a random, circular amount: the chance level of *measured*
 /// phases, with their own drifts and wobbles.
 ///
-/// Returns the `draws` surrogate means, ascending. Deterministic in `seed`. Shifts keep at least a tenth of the window between carriers' clocks.
+/// Returns the `draws` surrogate means, ascending. Deterministic in `seed`. Shifts keep at least a tenth of the window between
+/// the first carrier's clock and each other's; two others may be shifted alike, which can only raise the level.
 /// Carriers that keep one steady tempo stay locked when they are shifted: their surrogates then scatter over 0 … 1, and say so.
 /// Source: time-shifted surrogates, Moulder et al., Psychol. Methods 23 (2018) 757 ("data sliding").
 pub fn surrogate_synchrony(phases_rad: &[&[f64]], draws: usize, seed: u64) -> Vec<f64> {

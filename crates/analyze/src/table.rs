@@ -147,19 +147,19 @@ fn collect(recording: &Recording, request: &Request, downsample: u64) -> Result<
         request.window.0.is_none_or(|a| seconds(t) >= a)
             && request.window.1.is_none_or(|b| seconds(t) <= b)
     };
+    let step = usize::try_from(downsample).unwrap_or(usize::MAX).max(1);
     let mut time_ns: Vec<i64> = Vec::new();
     let mut axes: Vec<*const i64> = Vec::new();
     for s in &signals {
-        // Signals of one topic share their axis: take it once.
+        // Signals of one topic share their axis: take it once, and thin it by itself so that every topic keeps rows.
         if !axes.contains(&s.times_ns.as_ptr()) {
             axes.push(s.times_ns.as_ptr());
-            time_ns.extend(s.times_ns.iter().filter(|t| inside(**t)));
+            let inside = s.times_ns.iter().filter(|t| inside(**t));
+            time_ns.extend(inside.step_by(step));
         }
     }
     time_ns.sort_unstable();
     time_ns.dedup();
-    let step = usize::try_from(downsample).unwrap_or(usize::MAX).max(1);
-    let time_ns: Vec<i64> = time_ns.into_iter().step_by(step).collect();
     Ok(Table {
         time_ns,
         start_ns,

@@ -165,13 +165,15 @@ impl Clocks {
 
     /// A clock beside that of the rath's sensor, in words.
     fn against(&self, clock: &Clock, [ahead_s, fast_ppm]: [f64; 2]) -> String {
+        let fast = match clock.drift_sd_ppm {
+            Some(sd_ppm) => format!("{fast_ppm:+.0} ± {:.0} ppm fast", 1.96 * sd_ppm),
+            None => "too short to tell how fast".to_owned(),
+        };
         format!(
-            "runs {:+.1} ± {:.1} ms off {} and {:+.0} ± {:.0} ppm fast",
+            "runs {:+.1} ± {:.1} ms off {} and {fast}",
             1e3 * ahead_s,
             1.96e3 * clock.offset_sd_s,
             self.rath,
-            fast_ppm,
-            1.96 * clock.drift_sd_ppm.unwrap_or_default(),
         )
     }
 

@@ -87,7 +87,12 @@ pub fn force_correlation(c: &Context) -> Value {
                 .map(|(a, b)| (a - ma) * (b - mb))
                 .sum::<f64>()
                 / a.len() as f64;
-            per.push(shared / (variance(a) * variance(b)).sqrt());
+            let still = |x: &[f64], mean: f64| variance(x).sqrt() <= 1e-12 * mean.abs();
+            per.push(match still(a, ma) || still(b, mb) {
+                // What remains of a constant is rounding.
+                true => f64::NAN,
+                false => shared / (variance(a) * variance(b)).sqrt(),
+            });
         }
     }
     Value::number(mean(&per)).per(per)
