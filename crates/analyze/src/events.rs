@@ -1,7 +1,7 @@
 //! What happened when: contact lost and regained, jumps, the beat, the onset of instability.
 
-use crate::inputs::{Inputs, Window};
-use crate::metrics::onset_s;
+use crate::inputs::{Inputs, Window, stretches};
+use crate::metrics::Context;
 use crate::phase;
 
 /// One event.
@@ -29,13 +29,10 @@ const FLIGHT: f64 = crate::metrics::FLOAT_SHARE;
 pub fn events(inputs: &Inputs, window: Window) -> Vec<Event> {
     let mut out = Vec::new();
     contact(inputs, &mut out);
-    jumps(inputs, &mut out);
+    jumps(inputs, window, &mut out);
     beat(inputs, &mut out);
     locking(inputs, &mut out);
-    let range = window.range(&inputs.t_s);
-    if inputs.roll_rad.len() == inputs.t_s.len()
-        && let Some(t_s) = onset_s(&inputs.t_s[range.clone()], &inputs.roll_rad[range])
-    {
+    if let Some(t_s) = Context::new(inputs, window).onset() {
         out.push(Event {
             t_s,
             kind: "onset",
@@ -74,38 +71,50 @@ fn contact(inputs: &Inputs, out: &mut Vec<Event>) {
 }
 
 /// Stretches of at least two samples in which nothing holds the weight.
-fn jumps(inputs: &Inputs, out: &mut Vec<Event>) {
-    let (t_s, ratio) = match inputs.mass_kg {
-        Some(mass_kg) if !inputs.normal_n.is_empty() => {
-            let weight_n = mass_kg * inputs.gravity_m_per_s2;
-            (
-                inputs.force_times(),
-                inputs
-                    .total_force_n()
-                    .iter()
-                    .map(|n| n / weight_n)
-                    .collect(),
-            )
-        }
-        _ => (&inputs.t_s[..], inputs.support_ratio.clone()),
-    };
-    let mut start: Option<usize> = None;
-    for k in 0..=ratio.len().min(t_s.len()) {
-        let flies = ratio.get(k).is_some_and(|r| *r <= FLIGHT);
-        match (start, flies) {
-            (None, true) => start = Some(k),
-            (Some(from), false) => {
-                if k - from >= 2 {
-                    let last = t_s[(k).min(t_s.len() - 1)];
-                    out.push(Event {
-                        t_s: t_s[from],
-                        kind: "jump",
-                        what: format!("nothing holds it for {:.2} s", last - t_s[from]),
-                    });
-                }
-                start = None;
+fn jumps(inputs: &Inputs, window: Window, out: &mut Vec<Event>) {
+    let (t_s, ratio) = if inputs.normal_n.is_empty() {
+        (&inputs.t_s[..], inputs.support_ratio.clone())
+    } else {
+        let total_n = inputs.total_force_n();
+        let weight_n = match inputs.mass_kg {
+            Some(mass_kg) => mass_kg * inputs.gravity_m_per_s2,
+            // As the metric: over many strides what is carried neither rises nor falls.
+            None => {
+                let range = window.range(inputs.force_times());
+                let some = total_n.get(range).unwrap_or(&total_n).iter();
+                let known: Vec<f64> = some.copied().filter(|n| n.is_finite()).collect();
+                known.iter().sum::<f64>() / known.len() as f64
             }
-            _ => {}
+        };
+        let ratio = total_n.iter().map(|n| n / weight_n).collect();
+        (inputs.force_times(), ratio)
+    };
+    if ratio.len() != t_s.len() {
+        return;
+    }
+    // None goes on through a hole.
+    for stretch in stretches(t_s, 0.0) {
+        let last = stretch.end - 1;
+        let mut start: Option<usize> = None;
+        for k in stretch.start..=stretch.end {
+            let flies = k < stretch.end && ratio[k] <= FLIGHT;
+            match (start, flies) {
+                (None, true) => start = Some(k),
+                (Some(from), false) => {
+                    if k - from >= 2 {
+                        out.push(Event {
+                            t_s: t_s[from],
+                            kind: "jump",
+                            what: format!(
+                                "nothing holds it for {:.2} s",
+                                t_s[k.min(last)] - t_s[from]
+                            ),
+                        });
+                    }
+                    start = None;
+                }
+                _ => {}
+            }
         }
     }
 }
@@ -152,17 +161,19 @@ fn locking(inputs: &Inputs, out: &mut Vec<Event>) {
         return;
     };
     let m = ((LOCK_STRETCH_S / step_s).round() as usize).max(1);
-    let mut sum = 0.0;
+    let (mut sum, mut first) = (0.0, 0);
     let mut loose = false;
     for k in 0..r.len().min(t_s.len()) {
+        // Where somebody's phase is not known the stretch begins anew.
         if !r[k].is_finite() {
-            return;
+            (sum, first) = (0.0, k + 1);
+            continue;
         }
         sum += r[k];
-        if k >= m {
+        if k >= first + m {
             sum -= r[k - m];
         }
-        if k + 1 < m {
+        if k + 1 < first + m {
             continue;
         }
         let mean = sum / m as f64;
@@ -204,6 +215,15 @@ mod tests {
             mass_kg: Some(60.0),
             ..Inputs::default()
         };
+        // Without a mass the mean support is the weight.
+        let unweighed = Inputs {
+            mass_kg: None,
+            ..inputs.clone()
+        };
+        assert_eq!(
+            events(&unweighed, Window::ALL),
+            events(&inputs, Window::ALL)
+        );
         let told: Vec<(f64, &str)> = events(&inputs, Window::ALL)
             .iter()
             .map(|e| (e.t_s, e.kind))
@@ -232,11 +252,15 @@ mod tests {
             t_s,
             ..Inputs::default()
         };
-        let events = events(&inputs, Window::ALL);
-        assert_eq!(events.len(), 1);
-        assert!(
-            events[0].kind == "locked" && (11.0..15.0).contains(&events[0].t_s),
-            "{events:?}"
-        );
+        let mut late = inputs.clone();
+        late.phase_rad[0][..45].fill(f64::NAN);
+        for inputs in [inputs, late] {
+            let events = events(&inputs, Window::ALL);
+            assert_eq!(events.len(), 1);
+            assert!(
+                events[0].kind == "locked" && (11.0..15.0).contains(&events[0].t_s),
+                "{events:?}"
+            );
+        }
     }
 }

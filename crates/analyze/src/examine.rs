@@ -1,6 +1,7 @@
 //! A recording in one pass: a line per signal, the roles' columns, what is odd; then metrics, spectra and events.
 
 use std::collections::{HashMap, HashSet};
+use std::f64::consts::{PI, TAU};
 
 use rayon::prelude::*;
 use recording::read::{Batch, ReadError, Recording};
@@ -8,9 +9,10 @@ use recording::read::{Batch, ReadError, Recording};
 use crate::envelope::Envelope;
 use crate::events::{Event, events};
 use crate::field::Field;
-use crate::inputs::{Inputs, Window, interpolate};
+use crate::inputs::{Inputs, Window, between};
 use crate::metrics::{self, Metrics};
 use crate::peaks::SpectrumSummary;
+use crate::phase::unwrap;
 use crate::quality::Quality;
 use crate::quaternion::Quaternions;
 use crate::roles::{Role, Roles, RolesFile, matches};
@@ -159,6 +161,7 @@ pub fn examine(
     let duration_s = ((i128::from(info.end_ns) - i128::from(info.start_ns)) as f64 / 1e9).max(0.0);
     let said = request.roles.as_ref();
     let mut inputs = pass.inputs(&metadata, said);
+    let window = window(request, &metadata, said, duration_s, &mut warnings);
     let mut field = match estimates(recording, &roles, request) {
         Ok(()) => Field::read(
             recording,
@@ -166,6 +169,7 @@ pub fn examine(
             inputs.gravity_m_per_s2,
             request.truth,
             request.one_clock,
+            window,
         )?,
         Err(why) => {
             warnings.extend(why);
@@ -174,7 +178,6 @@ pub fn examine(
     };
     field.fill(&mut inputs);
     quality.extend(field.quality());
-    let window = window(request, &metadata, said, duration_s, &mut warnings);
     let mut metrics = metrics::metrics(&inputs, window);
     field.finish(&mut metrics, window);
     let f_hz = metrics
@@ -649,7 +652,10 @@ impl<'a> Pass<'a> {
             let x = if t_s == inputs.t_s {
                 x
             } else {
-                interpolate(&t_s, &x, &inputs.t_s)
+                match role {
+                    Role::Yaw => wrapped(&t_s, &x, &inputs.t_s),
+                    _ => between(&t_s, &x, &inputs.t_s),
+                }
             };
             match role {
                 Role::Roll => inputs.roll_rad = x,
@@ -665,7 +671,11 @@ impl<'a> Pass<'a> {
             if inputs.phase_t_s.is_empty() {
                 inputs.phase_t_s.clone_from(&t_s);
             }
-            inputs.beat_phase_rad = at_times(&t_s, &psi, &inputs.phase_t_s);
+            let beside = self.players(Role::Phases).next();
+            inputs.beat_phase_rad = match beside.is_none_or(|p| p.channel == entry.channel) {
+                true => at_times(&t_s, &psi, &inputs.phase_t_s),
+                false => wrapped(&t_s, &psi, &inputs.phase_t_s),
+            };
         }
         let ours = self
             .players(Role::Roll)
@@ -695,11 +705,21 @@ impl<'a> Pass<'a> {
             columns.push(match (t_s == axis, entry.channel == first.channel) {
                 (true, _) => x,
                 (false, true) => at_times(&t_s, &x, &axis),
-                (false, false) => interpolate(&t_s, &x, &axis),
+                (false, false) if role == Role::Phases => wrapped(&t_s, &x, &axis),
+                (false, false) => between(&t_s, &x, &axis),
             });
         }
         (axis, columns)
     }
+}
+
+/// An angle (rad), wrapped or not, at other times, by the shorter way between samples; −π … π, NaN beyond the ends and in holes.
+fn wrapped(t_s: &[f64], x: &[f64], axis: &[f64]) -> Vec<f64> {
+    let known = t_s.iter().zip(x).filter(|(_, x)| x.is_finite());
+    let (t_s, x): (Vec<f64>, Vec<f64>) = known.unzip();
+    let angle = |x: f64| (x + PI).rem_euclid(TAU) - PI;
+    let straight = between(&t_s, &unwrap(&x), axis);
+    straight.into_iter().map(angle).collect()
 }
 
 /// The values at exactly the times of `axis`; NaN where there is none.

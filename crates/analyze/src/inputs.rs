@@ -1,6 +1,7 @@
 //! What the metrics are computed from: plain columns, from a recording or from a run in memory.
 
 use std::borrow::Cow;
+use std::ops::Range;
 
 /// A stretch of time (s), both ends included.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -27,7 +28,7 @@ impl Window {
     }
 
     /// The indices of an ascending time axis that lie in the window.
-    pub fn range(&self, t_s: &[f64]) -> std::ops::Range<usize> {
+    pub fn range(&self, t_s: &[f64]) -> Range<usize> {
         let start = t_s.partition_point(|t| *t < self.start_s);
         let end = t_s.partition_point(|t| *t <= self.end_s);
         start..end.max(start)
@@ -89,8 +90,8 @@ pub struct Inputs {
     pub phase_rad: Vec<Vec<f64>>,
     /// Phase of the beat on the phases' time (rad); NaN where no beat sounds.
     pub beat_phase_rad: Vec<f64>,
-    /// Steps per second of each carrier who wears a sensor and walks, and half its 95 % interval (Hz).
-    pub cadence_hz: Vec<[f64; 2]>,
+    /// Times of the steps of each carrier who wears a sensor and walks (s).
+    pub step_s: Vec<Vec<f64>>,
     /// Mass of what is carried (kg).
     pub mass_kg: Option<f64>,
     /// Gravity [m/s²].
@@ -117,7 +118,7 @@ impl Default for Inputs {
             phase_t_s: Vec::new(),
             phase_rad: Vec::new(),
             beat_phase_rad: Vec::new(),
-            cadence_hz: Vec::new(),
+            step_s: Vec::new(),
             mass_kg: None,
             gravity_m_per_s2: 9.80665,
             phases_are_measured: false,
@@ -158,11 +159,64 @@ impl Inputs {
     }
 }
 
-/// Mean step of an ascending time axis (s); `None` below two samples or for a step that is not positive.
+/// A step so many times one that 95 % of them do not exceed is a hole: single samples may be missing, or late, without one.
+const HOLE: f64 = 2.5;
+
+/// The longest step of an ascending time axis that is no hole (s); infinite below two samples.
+pub fn longest_step_s(t_s: &[f64]) -> f64 {
+    let mut steps: Vec<f64> = t_s.windows(2).map(|w| w[1] - w[0]).collect();
+    if steps.is_empty() {
+        return f64::INFINITY;
+    }
+    let k = (steps.len() - 1) * 19 / 20;
+    HOLE * *steps.select_nth_unstable_by(k, f64::total_cmp).1
+}
+
+/// The parts of an ascending time axis between its holes, as ranges of samples; steps up to `least_s` are never one.
+pub fn stretches(t_s: &[f64], least_s: f64) -> Vec<Range<usize>> {
+    let longest_s = longest_step_s(t_s).max(least_s);
+    let mut out = Vec::new();
+    let mut start = 0;
+    for end in 1..=t_s.len() {
+        if end == t_s.len() || t_s[end] - t_s[end - 1] > longest_s {
+            out.push(start..end);
+            start = end;
+        }
+    }
+    out
+}
+
+/// Mean step of an ascending time axis, holes left out (s); `None` below two samples or for a step that is not positive.
 pub fn mean_step_s(t_s: &[f64]) -> Option<f64> {
-    let (first, last) = (t_s.first()?, t_s.last()?);
-    let step = (last - first) / (t_s.len().checked_sub(1)? as f64);
+    let (mut span_s, mut steps) = (0.0, 0);
+    for part in stretches(t_s, 0.0) {
+        span_s += t_s[part.end - 1] - t_s[part.start];
+        steps += part.len() - 1;
+    }
+    let step = span_s / steps as f64;
     (step > 0.0 && step.is_finite()).then_some(step)
+}
+
+/// `x` about its mean on an even axis, 0 in the holes of `t_s`, and the step (s): a transform of it has its lines where they are, though
+/// samples are missing. Where more is missing than is there, of the longest part without a hole. `None` as [`mean_step_s`].
+pub fn about_mean(t_s: &[f64], x: &[f64]) -> Option<(Vec<f64>, f64)> {
+    let step_s = mean_step_s(t_s)?;
+    let mean = x.iter().sum::<f64>() / x.len() as f64;
+    let parts = stretches(t_s, 0.0);
+    if parts.len() == 1 {
+        return Some((x.iter().map(|x| x - mean).collect(), step_s));
+    }
+    let place = |t: f64| ((t - t_s[0]) / step_s).round() as usize;
+    let n = place(t_s[t_s.len() - 1]).saturating_add(1);
+    if n > 2 * x.len() {
+        let longest = parts.into_iter().max_by_key(ExactSizeIterator::len)?;
+        return about_mean(&t_s[longest.clone()], &x[longest]);
+    }
+    let mut out = vec![0.0; n];
+    for (t, x) in t_s.iter().zip(x) {
+        out[place(*t)] = x - mean;
+    }
+    Some((out, step_s))
 }
 
 /// `x(t)` at the times `at_s` by straight lines between samples; held beyond the ends. Both time axes ascend.
@@ -184,6 +238,27 @@ pub fn interpolate(t_s: &[f64], x: &[f64], at_s: &[f64]) -> Vec<f64> {
             x[k] + share * (x[k + 1] - x[k])
         })
         .collect()
+}
+
+/// As [`interpolate`], but NaN before the first sample, behind the last, and in holes.
+pub fn between(t_s: &[f64], x: &[f64], at_s: &[f64]) -> Vec<f64> {
+    let mut out = interpolate(t_s, x, at_s);
+    let longest_s = longest_step_s(t_s);
+    for (y, at) in out.iter_mut().zip(at_s) {
+        let k = t_s.partition_point(|t| t < at);
+        let there = match (k.checked_sub(1), t_s.get(k)) {
+            (_, Some(t)) if t == at => true,
+            (Some(before), Some(t)) => t - t_s[before] <= longest_s,
+            _ => false,
+        };
+        if !there {
+            *y = f64::NAN;
+        }
+    }
+    if out.is_empty() {
+        out.resize(at_s.len(), f64::NAN);
+    }
+    out
 }
 
 #[cfg(test)]
@@ -228,5 +303,54 @@ mod tests {
         let t: Vec<f64> = (455..1819).map(|i| f64::from(33 * i) / 1e3).collect();
         assert!((mean_step_s(&t).unwrap() / 0.033 - 1.0).abs() < 1e-15);
         assert_eq!(mean_step_s(&[1.0]), None);
+    }
+
+    /// A sine of 1 Hz at 20 Hz for 30 s, but for 10 … 13 s.
+    fn holed() -> (Vec<f64>, Vec<f64>) {
+        let t: Vec<f64> = (0..600).map(|k| f64::from(k) / 20.0).collect();
+        let t: Vec<f64> = t
+            .into_iter()
+            .filter(|t| !(10.0..13.0).contains(t))
+            .collect();
+        let x = t
+            .iter()
+            .map(|t| (std::f64::consts::TAU * t).sin())
+            .collect();
+        (t, x)
+    }
+
+    #[test]
+    fn holes_part_an_axis_and_single_missing_samples_do_not() {
+        let (t, x) = holed();
+        assert_eq!(stretches(&t, 0.0), [0..200, 200..540]);
+        assert_eq!(stretches(&t, 5.0).len(), 1);
+        assert!((mean_step_s(&t).unwrap() - 0.05).abs() < 1e-12);
+        assert_eq!(stretches(&[0.0, 1.0, 2.0, 4.0, 5.0], 0.0).len(), 1);
+        assert!(stretches(&[], 0.0).is_empty());
+        assert_eq!(stretches(&[3.0], 0.0).len(), 1);
+        let (even, step_s) = about_mean(&t, &x).unwrap();
+        assert_eq!(even.len(), 600);
+        assert!(even[200..260].iter().all(|x| *x == 0.0) && (step_s - 0.05).abs() < 1e-12);
+        assert!((even[265] - 1.0).abs() < 0.05);
+        // A sample years later asks for no memory.
+        let late: Vec<f64> = t.iter().copied().chain([1e9]).collect();
+        let x: Vec<f64> = x.iter().copied().chain([0.0]).collect();
+        assert_eq!(about_mean(&late, &x).unwrap().0.len(), 340);
+    }
+
+    #[test]
+    fn nothing_is_drawn_through_holes() {
+        let (t, x) = holed();
+        let y = between(
+            &t,
+            &x,
+            &[-1.0, 0.0, 9.95, 9.975, 11.0, 12.99, 13.0, 29.95, 30.0],
+        );
+        let known: Vec<bool> = y.iter().map(|y| y.is_finite()).collect();
+        assert_eq!(
+            known,
+            [false, true, true, false, false, false, true, true, false]
+        );
+        assert!(between(&[], &[], &[1.0])[0].is_nan());
     }
 }

@@ -1,6 +1,8 @@
 //! What drives the roll: the support that modulates the pendulum's gravity, or a force at the roll's own frequency.
 
+use crate::metrics::FEWEST_PERIODS;
 use std::fmt;
+use std::ops::Range;
 
 /// RMS roll below which there is nothing to explain (deg).
 pub const QUIET_DEG: f64 = 1.0;
@@ -39,13 +41,13 @@ impl Verdict {
 /// ```text
 /// θ̈ = −a·N_tot·sin θ − b·θ̇  (+ Σ c_i (N_i − N̄))
 /// ```
-/// θ roll (rad), N_tot summed normal force (N), a [1/(kg·m)], b [1/s], N̄ the handles' mean force, c_i [1/(kg·m²)·m]. R² is that of the
+/// θ roll (rad), N_tot summed normal force (N), or that on one kilogram of the load [m/s²], a [1/(kg·m)], or [1/m], b [1/s], N̄ the handles' mean force, c_i [1/(kg·m²)·m]. R² is that of the
 /// part without brackets; `delta_n_gain` is by how much the bracket raises it: the strength of a drive by force differences (ΔN).
 /// θ̇ and θ̈ are those of the natural cubic interpolant with not-a-knot ends, four samples left out at each end: on the
 /// archive's music logs that gives a = 0.0479, b = 0.391, R² = 0.992. A line at ω is seen too large by (ωΔt)²/12 in θ̈ (0.4 % there).
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct RollFit {
-    /// a [1/(kg·m)].
+    /// a [1/(kg·m)], or [1/m] where the support was given for one kilogram.
     pub a: f64,
     /// b [1/s].
     pub b_per_s: f64,
@@ -68,6 +70,8 @@ pub struct Evidence {
     pub share_at_f: Option<f64>,
     /// The fit, where there are forces.
     pub fit: Option<RollFit>,
+    /// The forces are those on one kilogram of the load: the fit's a is in 1/m.
+    pub per_mass: bool,
 }
 
 impl Evidence {
@@ -87,7 +91,10 @@ impl Evidence {
             return Ok(Verdict::Quiet);
         }
         let (Some(half), Some(at_f)) = (self.share_at_half, self.share_at_f) else {
-            return Err("the height has no line in the window, so there is no drive frequency to compare the roll with".into());
+            return Err(match self.f_hz {
+                None => "the height has no line in the window, so there is no drive frequency to compare the roll with".into(),
+                Some(hz) => format!("the window is shorter than {FEWEST_PERIODS:.0} periods of {hz:.2} Hz, too short to tell a line at half of it from one at it"),
+            });
         };
         let pendulum = self.fit.is_none_or(|fit| fit.a > 0.0 && fit.r2 >= EXPLAINS);
         Ok(match () {
@@ -117,9 +124,13 @@ impl fmt::Display for Evidence {
             )?;
         }
         if let Some(fit) = &self.fit {
+            let (support, unit) = match self.per_mass {
+                true => ("N_tot/M", "1/m"),
+                false => ("N_tot", "1/(kg·m)"),
+            };
             write!(
                 f,
-                "; θ̈ = −a·N_tot·sin θ − b·θ̇ with a = {:.5} /(kg·m), b = {:.3} 1/s, R² = {:.3}",
+                "; θ̈ = −a·{support}·sin θ − b·θ̇ with a = {:.5} {unit}, b = {:.3} 1/s, R² = {:.3}",
                 fit.a, fit.b_per_s, fit.r2
             )?;
             if let Some(gain) = fit.delta_n_gain {
@@ -133,13 +144,30 @@ impl fmt::Display for Evidence {
 /// Samples left out of the fit at each end, where the interpolant's derivatives are poor.
 const EDGE: usize = 4;
 
-/// Fits [`RollFit`] to evenly sampled roll and handle forces. `None` without forces, below 20 samples, or where the roll does not move.
-pub fn fit_roll(roll_rad: &[f64], normal_n: &[Vec<f64>], step_s: f64) -> Option<RollFit> {
+/// Fits [`RollFit`] to roll and handle forces, evenly sampled within each of the `stretches`; where a force is not finite the sample is left
+/// out. `None` without forces, below 20 samples, or where the roll does not move.
+pub fn fit_roll(
+    roll_rad: &[f64],
+    normal_n: &[Vec<f64>],
+    stretches: &[Range<usize>],
+    step_s: f64,
+) -> Option<RollFit> {
     let n = roll_rad.len();
     if n < 20 || normal_n.is_empty() || normal_n.iter().any(|h| h.len() != n) {
         return None;
     }
-    let (rate, acceleration) = spline_derivatives(roll_rad, step_s)?;
+    let (mut rate, mut acceleration) = (vec![0.0; n], vec![0.0; n]);
+    let mut rows: Vec<usize> = Vec::with_capacity(n);
+    for stretch in stretches.iter().filter(|s| s.len() > 2 * EDGE) {
+        let (first, second) = spline_derivatives(&roll_rad[stretch.clone()], step_s)?;
+        rate[stretch.clone()].copy_from_slice(&first);
+        acceleration[stretch.clone()].copy_from_slice(&second);
+        let inner = stretch.start + EDGE..stretch.end - EDGE;
+        rows.extend(inner.filter(|k| normal_n.iter().all(|h| h[*k].is_finite())));
+    }
+    if rows.len() + 2 * EDGE < 20 {
+        return None;
+    }
     let handles = normal_n.len();
     // Columns: −N_tot sin θ, −θ̇, then N_i − N̄ for all handles but the last (they sum to zero).
     let row = |k: usize, out: &mut [f64]| {
@@ -150,10 +178,9 @@ pub fn fit_roll(roll_rad: &[f64], normal_n: &[Vec<f64>], step_s: f64) -> Option<
             *o = h[k] - total / handles as f64;
         }
     };
-    let range = EDGE..n - EDGE;
-    let plain = least_squares(range.clone(), 2, &acceleration, |k, out| row(k, out))?;
+    let plain = least_squares(&rows, 2, &acceleration, |k, out| row(k, out))?;
     let delta_n_gain = (handles > 1)
-        .then(|| least_squares(range, handles + 1, &acceleration, |k, out| row(k, out)))
+        .then(|| least_squares(&rows, handles + 1, &acceleration, |k, out| row(k, out)))
         .flatten()
         .map(|full| (full.r2 - plain.r2).max(0.0));
     Some(RollFit {
@@ -171,7 +198,7 @@ struct Solution {
 
 /// Least squares by the normal equations of scaled columns; `None` where they are singular or nothing is to be explained.
 fn least_squares(
-    range: std::ops::Range<usize>,
+    rows: &[usize],
     columns: usize,
     y: &[f64],
     row: impl Fn(usize, &mut [f64]),
@@ -179,7 +206,7 @@ fn least_squares(
     let mut gram = vec![vec![0.0; columns + 1]; columns];
     let mut values = vec![0.0; columns];
     let (mut sum, mut squares) = (0.0, 0.0);
-    for k in range.clone() {
+    for &k in rows {
         row(k, &mut values[..]);
         for i in 0..columns {
             for j in i..columns {
@@ -204,12 +231,12 @@ fn least_squares(
     let mut x = eliminate(gram)?;
     x.iter_mut().zip(&scale).for_each(|(x, s)| *x /= s);
     let mut residual = 0.0;
-    for k in range.clone() {
+    for &k in rows {
         row(k, &mut values[..]);
         let fitted: f64 = values.iter().zip(&x).map(|(v, x)| v * x).sum();
         residual += (y[k] - fitted).powi(2);
     }
-    let total = squares - sum * sum / range.len() as f64;
+    let total = squares - sum * sum / rows.len() as f64;
     (total > 0.0).then(|| Solution {
         x,
         r2: 1.0 - residual / total,
@@ -335,7 +362,21 @@ mod tests {
                 t += h;
             }
         }
-        let fit = fit_roll(&roll, &[force.clone(), force], dt).unwrap();
+        // The same support on one kilogram of 60: a in 1/m is as many times larger. A hole is left out, and whatever stands in it.
+        let per_mass: Vec<f64> = force.iter().map(|n| 2.0 * n / 60.0).collect();
+        let parts = [0..600, 700..1350];
+        let mut spliced = roll.clone();
+        spliced[600..700].fill(0.0);
+        let split = fit_roll(&spliced, &[per_mass], &parts, dt).unwrap();
+        let whole = [Range {
+            start: 0,
+            end: roll.len(),
+        }];
+        let fit = fit_roll(&roll, &[force.clone(), force], &whole, dt).unwrap();
+        assert!(
+            (split.a / (60.0 * fit.a) - 1.0).abs() < 1e-4 && split.r2 > 0.9999,
+            "{split:?}"
+        );
         // The interpolant's bias at the roll's own frequency, known in advance: + (ωΔt)²/12.
         let bias = (std::f64::consts::PI * 2.15 * dt).powi(2) / 12.0;
         assert!((fit.a / a - 1.0 - bias).abs() < 1e-3, "{fit:?}");
@@ -359,6 +400,7 @@ mod tests {
             share_at_half: Some(0.9),
             share_at_f: Some(0.01),
             fit: Some(fit),
+            per_mass: false,
         };
         assert_eq!(e.verdict(), Ok(Verdict::Parametric));
         assert_eq!(

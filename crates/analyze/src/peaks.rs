@@ -2,7 +2,7 @@
 
 use serde::Serialize;
 
-use crate::inputs::{Window, mean_step_s};
+use crate::inputs::{Window, mean_step_s, stretches};
 use crate::median::median;
 use crate::spectrum::{DEFAULT_SEGMENT_S, Options, Spectrum, welch};
 
@@ -81,7 +81,8 @@ impl SpectrumSummary {
         }
     }
 
-    /// Of an evenly sampled column in a window, in segments of [`DEFAULT_SEGMENT_S`]. `None` below 16 finite samples.
+    /// Of an evenly sampled column in a window, in segments of [`DEFAULT_SEGMENT_S`]: of the longest part without a hole. `None` below 16
+    /// finite samples of it.
     pub fn of(
         t_s: &[f64],
         x: &[f64],
@@ -93,12 +94,13 @@ impl SpectrumSummary {
             return None;
         }
         let range = window.range(t_s);
-        let (t_s, x) = (&t_s[range.clone()], &x[range]);
-        // An estimated column may have no values at its ends.
-        let first = x.iter().position(|x| x.is_finite())?;
-        let last = x.iter().rposition(|x| x.is_finite())? + 1;
-        let (t_s, x) = (&t_s[first..last], &x[first..last]);
-        if x.len() < 16 || x.iter().any(|x| !x.is_finite()) {
+        let all = t_s[range.clone()].iter().zip(&x[range]);
+        // An estimated column has no values at its ends.
+        let (t_s, x): (Vec<f64>, Vec<f64>) = all.filter(|(_, x)| x.is_finite()).unzip();
+        let parts = stretches(&t_s, 0.0).into_iter();
+        let longest = parts.max_by_key(ExactSizeIterator::len)?;
+        let (t_s, x) = (&t_s[longest.clone()], &x[longest]);
+        if x.len() < 16 {
             return None;
         }
         let fs_hz = 1.0 / mean_step_s(t_s)?;

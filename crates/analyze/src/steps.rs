@@ -20,7 +20,7 @@
 
 use crate::filter::{Band, butter, sosfiltfilt};
 use crate::imu::track::period_s;
-use crate::inputs::interpolate;
+use crate::inputs::longest_step_s;
 use crate::phase::{hilbert, unwrap};
 use crate::spectrum::{rfft, rfft_magnitude};
 
@@ -39,6 +39,8 @@ pub const SHORTEST_S: f64 = 5.0;
 /// stamp must not ask for all memory.
 const LEAST_SHARE: f64 = 0.05;
 const GAP_S: f64 = 10.0;
+/// What straight lines may bridge of a swing that lasts a third of a second and more, s.
+const BRIDGED_S: f64 = 0.1;
 /// Steps swing at least this much (RMS), m/s²: a device on a table does not walk.
 const LEAST_SWING_M_PER_S2: f64 = 0.2;
 
@@ -70,13 +72,13 @@ pub enum StepError {
 pub struct Steps {
     /// Time of each step, s.
     pub step_s: Vec<f64>,
-    /// Steps per second while walking: median over steps, Hz.
+    /// Steps per second while walking: one over the mean interval, pauses left out, Hz.
     pub cadence_hz: f64,
     /// Half the 95 % interval of the cadence, Hz.
     pub cadence_ci95_hz: f64,
     /// Times of the phase, evenly spaced, s.
     pub t_s: Vec<f64>,
-    /// Gait phase, unwrapped, 2π per step, rad; NaN where nobody walks.
+    /// Gait phase, unwrapped, 2π per step, rad; NaN where nobody walks, and in and beside holes.
     pub phase_rad: Vec<f64>,
 }
 
@@ -129,7 +131,20 @@ pub fn steps_in(times: &[f64], norm: &[f64]) -> Result<Steps, StepError> {
         });
     }
     let start = grid[0];
-    let step_s: Vec<f64> = at.iter().map(|k| start + k / RATE_HZ).collect();
+    let mut step_s: Vec<f64> = at.iter().map(|k| start + k / RATE_HZ).collect();
+    // Nobody felt the steps in a hole, nor what the band draws beside it for half a step.
+    let longest_s = longest_step_s(times).max(BRIDGED_S);
+    let holes: Vec<(f64, f64)> = times
+        .windows(2)
+        .filter(|t| t[1] - t[0] > longest_s)
+        .map(|t| (t[0], t[1]))
+        .collect();
+    step_s.retain(|t| !holes.iter().any(|(a, b)| (*a..=*b).contains(t)));
+    if step_s.len() < 3 {
+        return Err(StepError::NoWalking {
+            reason: "fewer than three steps stand out",
+        });
+    }
     let (cadence_hz, cadence_ci95_hz) = rate_of(&step_s);
     let analytic = hilbert(&narrow);
     let wrapped: Vec<f64> = analytic.iter().map(|z| z.arg()).collect();
@@ -140,6 +155,14 @@ pub fn steps_in(times: &[f64], norm: &[f64]) -> Result<Steps, StepError> {
         if *swing < quiet.max(0.5 * LEAST_SWING_M_PER_S2) {
             *phase = f64::NAN;
         }
+    }
+    let beside_s = 0.5 / cadence_hz;
+    for (from, to) in holes {
+        let inside = |t: &f64| *t > from - beside_s && *t < to + beside_s;
+        let phases = grid.iter().zip(&mut phase_rad);
+        phases
+            .filter(|(t, _)| inside(t))
+            .for_each(|(_, phase)| *phase = f64::NAN);
     }
     Ok(Steps {
         step_s,
@@ -178,26 +201,39 @@ fn longest_stretch(t_s: &[f64]) -> std::ops::Range<usize> {
     longest
 }
 
-/// Onto an even grid: averaged where the source is faster, drawn straight where it is slower.
+/// Onto an even grid: means over one step of the grid of what straight lines between samples draw, so that no sample pulls to its side.
 fn even(t_s: &[f64], x: &[f64], rate_hz: f64) -> (Vec<f64>, Vec<f64>) {
     let (start, end) = (t_s[0], t_s[t_s.len() - 1]);
     let n = ((end - start) * rate_hz) as usize + 1;
     let grid: Vec<f64> = (0..n).map(|k| start + k as f64 / rate_hz).collect();
-    let mut out = interpolate(t_s, x, &grid);
-    let half = 0.5 / rate_hz;
-    let mut low = 0;
-    for (g, y) in grid.iter().zip(&mut out) {
-        while t_s[low] < g - half {
-            low += 1;
-        }
-        let mut high = low;
-        while high < t_s.len() && t_s[high] <= g + half {
-            high += 1;
-        }
-        if high - low >= 2 {
-            *y = x[low..high].iter().sum::<f64>() / (high - low) as f64;
-        }
+    let mut areas = vec![0.0];
+    for (t, x) in t_s.windows(2).zip(x.windows(2)) {
+        areas.push(areas[areas.len() - 1] + 0.5 * (x[0] + x[1]) * (t[1] - t[0]));
     }
+    let mut k = 0;
+    // Edges ascend, and two cells share one.
+    let mut area = |t: f64| {
+        while k + 2 < t_s.len() && t_s[k + 1] <= t {
+            k += 1;
+        }
+        let (into, width) = (t - t_s[k], t_s[k + 1] - t_s[k]);
+        areas[k] + into * (x[k] + 0.5 * (x[k + 1] - x[k]) * into / width)
+    };
+    let half = 0.5 / rate_hz;
+    let mut before = (start, 0.0);
+    let out = grid
+        .iter()
+        .map(|g| {
+            let edge = (g + half).min(end);
+            let here = (edge, area(edge));
+            let mean = match here.0 - before.0 {
+                width if width > 1e-9 => (here.1 - before.1) / width,
+                _ => x[x.len() - 1],
+            };
+            before = here;
+            mean
+        })
+        .collect();
     (grid, out)
 }
 
@@ -354,8 +390,8 @@ fn median_rate(at: &[f64]) -> Option<f64> {
     (gaps.len() >= 2).then(|| RATE_HZ / quantile(&gaps, 0.5))
 }
 
-/// Mean rate over the intervals that are no pauses, and 1.96 standard errors of it.
-fn rate_of(step_s: &[f64]) -> (f64, f64) {
+/// Steps per second: one over the mean interval, pauses left out; and 1.96 standard errors of it, Hz. Of at least three steps, ascending, s.
+pub fn rate_of(step_s: &[f64]) -> (f64, f64) {
     let gaps: Vec<f64> = step_s.windows(2).map(|w| w[1] - w[0]).collect();
     let median = quantile(&gaps, 0.5);
     let walked: Vec<f64> = gaps.into_iter().filter(|g| *g < 1.7 * median).collect();
@@ -443,6 +479,42 @@ mod tests {
         let turns = (found.phase_rad[b] - found.phase_rad[a]) / TAU;
         let expected = (found.t_s[b] - found.t_s[a]) * hz;
         assert!((turns - expected).abs() < 0.1, "{turns} {expected}");
+    }
+
+    #[test]
+    fn in_a_hole_there_are_no_steps_and_no_phase() {
+        let t: Vec<f64> = (0..6000).map(|k| f64::from(k) * 0.01).collect();
+        let t: Vec<f64> = t
+            .into_iter()
+            .filter(|t| !(20.0..23.0).contains(t))
+            .collect();
+        let x: Vec<f64> = t
+            .iter()
+            .map(|t| 9.8 + 2.0 * (TAU * 2.0 * t).cos())
+            .collect();
+        let found = steps_in(&t, &x).unwrap();
+        assert!(!found.step_s.iter().any(|t| (20.0..23.0).contains(t)));
+        for (t, phase) in found.t_s.iter().zip(&found.phase_rad) {
+            let off = (phase - TAU * 2.0 * t).rem_euclid(TAU);
+            if *t > 19.8 && *t < 23.2 {
+                assert!(phase.is_nan(), "{t}");
+            } else if (2.0..58.0).contains(t) && !(19.7..23.3).contains(t) {
+                assert!(off.min(TAU - off) < 0.35, "{t} {off}");
+            }
+        }
+    }
+
+    #[test]
+    fn a_grid_falls_between_samples_or_on_them_alike() {
+        // 200 Hz on 100 Hz: a tenth of a microsecond must not decide on which side of a cell a sample counts.
+        let mean_of = |late_s: f64| {
+            let t: Vec<f64> = (0..400)
+                .map(|k| f64::from(k) * 0.005 + late_s * f64::from((k + 1) % 2))
+                .collect();
+            even(&t, &t, 100.0).1[100]
+        };
+        assert!((mean_of(1e-7) - mean_of(-1e-7)).abs() < 1e-6);
+        assert!((mean_of(0.0) - 1.0).abs() < 1e-12);
     }
 
     #[test]

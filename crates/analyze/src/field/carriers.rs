@@ -5,9 +5,9 @@ use crate::filter::{Band, butter, sosfiltfilt};
 use crate::imu::Track;
 use crate::imu::orientation::{Options, batch};
 use crate::imu::rath::{ENDS, Motion};
-use crate::imu::track::period_s;
+use crate::imu::track::{BRIDGED_S, period_s};
 use crate::imu::vertical::height;
-use crate::inputs::interpolate;
+use crate::inputs::{Window, interpolate, mean_step_s, stretches};
 use crate::metrics::{Datum, Metrics};
 use crate::phase::hilbert;
 use crate::quality::Quality;
@@ -290,24 +290,28 @@ impl Carriers {
     /// them cannot tell what is vertical, or does not walk.
     pub fn heave_m(&self, at_s: &[f64], corner_hz: f64) -> Vec<Vec<f64>> {
         let of = |worn: &Worn| {
-            let period_s = period_s(&worn.t_s).filter(|_| worn.upright && worn.steps.is_ok())?;
-            let (first, last) = (worn.t_s[0], worn.t_s[worn.t_s.len() - 1]);
-            // As for the body: a wrong stamp far away must not ask for all memory.
-            let n = (((last - first) / period_s).round() as usize + 1).min(4 * worn.t_s.len());
-            let grid: Vec<f64> = (0..n).map(|k| first + k as f64 * period_s).collect();
-            let mut accel = interpolate(&worn.t_s, &worn.heave, &grid);
-            let mean = accel.iter().sum::<f64>() / n as f64;
-            accel.iter_mut().for_each(|a| *a -= mean);
-            let heave = height(&accel, period_s, corner_hz);
-            let common = |t: f64| t - worn.ahead_s;
-            let grid: Vec<f64> = grid.into_iter().map(common).collect();
-            let ends = ENDS / corner_hz;
-            let (from, to) = (grid[0] + ends, grid[n - 1] - ends);
-            let mut out = interpolate(&grid, &heave, at_s);
-            for (x, t) in out.iter_mut().zip(at_s) {
-                if !(from..=to).contains(t) {
-                    *x = f64::NAN;
-                }
+            (worn.upright && worn.steps.is_ok()).then_some(())?;
+            let period_s = mean_step_s(&worn.t_s)?;
+            let mut out = vec![f64::NAN; at_s.len()];
+            for stretch in stretches(&worn.t_s, BRIDGED_S) {
+                let (t_s, heave) = (&worn.t_s[stretch.clone()], &worn.heave[stretch]);
+                let first = t_s[0];
+                let n = ((t_s[t_s.len() - 1] - first) / period_s).round() as usize + 1;
+                let grid: Vec<f64> = (0..n).map(|k| first + k as f64 * period_s).collect();
+                let mut accel = interpolate(t_s, heave, &grid);
+                let mean = accel.iter().sum::<f64>() / n as f64;
+                accel.iter_mut().for_each(|a| *a -= mean);
+                let heave = height(&accel, period_s, corner_hz);
+                let common = |t: f64| t - worn.ahead_s;
+                let grid: Vec<f64> = grid.into_iter().map(common).collect();
+                let ends = ENDS / corner_hz;
+                let known = Window {
+                    start_s: grid[0] + ends,
+                    end_s: grid[n - 1] - ends,
+                };
+                let here = known.range(at_s);
+                let seen = interpolate(&grid, &heave, &at_s[here.clone()]);
+                out[here].copy_from_slice(&seen);
             }
             Some(out)
         };
@@ -333,10 +337,15 @@ impl Carriers {
         }
     }
 
-    /// Steps per second of each who walks, and half the 95 % interval, Hz.
-    pub fn cadence_hz(&self) -> Vec<[f64; 2]> {
-        let steps = self.0.iter().filter_map(|w| w.steps.as_ref().ok());
-        steps.map(|s| [s.cadence_hz, s.cadence_ci95_hz]).collect()
+    /// Steps of each who walks, on the carriers' common clock, s.
+    pub fn step_s(&self) -> Vec<Vec<f64>> {
+        let walking = self
+            .0
+            .iter()
+            .filter_map(|w| Some((w, w.steps.as_ref().ok()?)));
+        walking
+            .map(|(worn, found)| found.step_s.iter().map(|t| t - worn.ahead_s).collect())
+            .collect()
     }
 
     /// Steps of the first who walks, s.
@@ -357,7 +366,7 @@ impl Carriers {
                 .step_s
                 .iter()
                 .map(|t| Event {
-                    t_s: *t,
+                    t_s: *t - worn.ahead_s,
                     kind: "step",
                     what: worn.topic.clone(),
                 })
@@ -380,7 +389,7 @@ impl Carriers {
 }
 
 /// Half the 95 % interval of a synchrony from gait phases, 1: by simulated twins (docs/field.md).
-const PHASE_ERROR: f64 = 0.0014;
+const PHASE_ERROR: f64 = 0.0020;
 /// What is added to it where clocks were put right by motion: 20 ms of a clock are 0.13 of half a relative phase at 2 Hz, and cos 0.13 = 0.99; twins
 /// show a third more.
 const MOVED_ERROR: f64 = 0.013;

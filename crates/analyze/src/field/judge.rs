@@ -90,7 +90,9 @@ impl Judge {
     pub fn read(columns: &Columns, roles: &Roles, recording: &Recording) -> Option<Self> {
         let step_s = columns.times(STEP_TOPIC);
         let topic = roles.topic(Role::Truth);
-        let sensor = roles.topic(Role::Imu).and_then(|t| columns.track(t));
+        let sensor = roles
+            .topic(Role::Imu)
+            .and_then(|t| Some(columns.sensor(t)?.track));
         let mut judge = Self {
             truth: Truth::default(),
             height: None,
@@ -257,10 +259,7 @@ impl Judge {
             inclination_error_deg(&motion.inputs.t_s, &whole, &self.truth, &spans),
         );
         let Some((t_s, z)) = &self.height else { return };
-        let Some(period_s) = period_s(&motion.inputs.t_s) else {
-            return;
-        };
-        let height_m = vertical::height(&motion.accel_up_m_per_s2, period_s, vertical::CORNER_HZ);
+        let height_m = motion.height_m(vertical::CORNER_HZ);
         let inner = spans
             .iter()
             .fold((f64::MAX, f64::MIN), |(a, b), s| (a.min(s.0), b.max(s.1)));

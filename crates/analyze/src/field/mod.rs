@@ -5,6 +5,7 @@
 
 mod carriers;
 mod clocks;
+mod dates;
 mod judge;
 mod place;
 mod sound;
@@ -28,6 +29,7 @@ use crate::quality::Quality;
 use crate::roles::{Role, Roles, Sensors, about_the_load};
 use carriers::Carriers;
 use clocks::Clocks;
+use dates::{Dated, dated};
 use judge::Judge;
 use sound::Heard;
 
@@ -44,6 +46,11 @@ const ACCEL: [&str; 3] = [
 ];
 /// ROS's mark of a field that the sensor does not have.
 const GYRO_MARK: &str = "angular_velocity_covariance[0]";
+
+/// Seconds and nanoseconds of a header's stamp.
+const STAMP: [&str; 2] = ["header.stamp.sec", "header.stamp.nanosec"];
+/// More samples than this share left out are worth a word.
+const MANY: f64 = 0.01;
 
 /// What a recording's sensors say.
 #[derive(Default)]
@@ -78,6 +85,7 @@ impl Field {
         gravity_m_per_s2: f64,
         truth: bool,
         one_clock: bool,
+        window: Window,
     ) -> Result<Self, ReadError> {
         let topics: Vec<&str> = [Role::Imu, Role::Carriers, Role::Beats, Role::Truth]
             .iter()
@@ -113,6 +121,7 @@ impl Field {
                 GYRO.contains(&field)
                     || ACCEL.contains(&field)
                     || field == GYRO_MARK
+                    || STAMP.contains(&field)
                     || judge::wants(field)
                     || field == "number"
             }) || (truth && path.starts_with(judge::STEP_TOPIC))
@@ -132,9 +141,17 @@ impl Field {
         let options = options(place::is_simulated(recording), &roles.sensors);
         let mut clocks = Clocks::default();
         for topic in imus {
-            let Some(mut track) = columns.track(topic) else {
+            let Some(Sensor {
+                mut track,
+                turns,
+                remarks,
+            }) = columns.sensor(topic)
+            else {
                 continue;
             };
+            let said = remarks.into_iter();
+            let said = said.map(|(kind, text)| Quality::remark(topic, kind, text));
+            field.quality.extend(said);
             let is_rath = roles.topic(Role::Imu) == Some(topic.as_str());
             if !is_rath && roles.patterns(Role::Imu).contains(topic) {
                 if !one_clock {
@@ -154,10 +171,17 @@ impl Field {
                 let settings = Settings {
                     orientation: options,
                     gravity_m_per_s2,
+                    level_over: window,
                     ..here.or_as_said(&roles.sensors)
                 };
                 field.topic = Some(topic.clone());
-                field.motion(&columns, topic, &track, settings);
+                if turns {
+                    field.motion(topic, &track, settings);
+                } else {
+                    field.no_motion = Some(format!(
+                        "{topic} has no gyroscope (angular_velocity_covariance[0] is -1)"
+                    ));
+                }
             }
             // The one sensor of a walker's phone plays the rath's role for want of another: steps tell.
             if !is_rath || (roles.patterns(Role::Carriers).is_empty() && !about_the_load(topic)) {
@@ -211,15 +235,23 @@ impl Field {
         Ok(Some((topic, onset_s)))
     }
 
-    fn motion(&mut self, columns: &Columns, topic: &str, track: &Track, settings: Settings) {
-        if columns.first(topic, GYRO_MARK) == Some(-1.0) {
-            self.no_motion = Some(format!(
-                "{topic} has no gyroscope (angular_velocity_covariance[0] is -1)"
-            ));
-            return;
-        }
+    fn motion(&mut self, topic: &str, track: &Track, settings: Settings) {
         match rath::motion(track, &settings) {
-            Ok(motion) => self.motion = Some(motion),
+            Ok(motion) => {
+                if motion.left_out_s > 0.0 {
+                    self.quality.push(Quality::remark(
+                        topic,
+                        "holes",
+                        format!(
+                            "motion is estimated in {} stretches without a hole, {:.2} s are left out; within {:.1} s of a hole there is no height",
+                            motion.stretches.len(),
+                            motion.left_out_s,
+                            rath::BESIDE_HOLES / settings.height_corner_hz
+                        ),
+                    ));
+                }
+                self.motion = Some(motion);
+            }
             Err(error) => self.no_motion = Some(format!("{topic}: {error}")),
         }
     }
@@ -255,7 +287,7 @@ impl Field {
             inputs.heave_m = self.carriers.heave_m(&inputs.t_s, corner_hz);
             self.filled.motion = true;
         }
-        inputs.cadence_hz = self.carriers.cadence_hz();
+        inputs.step_s = self.carriers.step_s();
         if inputs.phase_rad.is_empty()
             && let Some((t_s, phases)) = self.carriers.phases()
         {
@@ -406,6 +438,14 @@ fn options(simulated: bool, said: &Sensors) -> Options {
     }
 }
 
+/// What is read of an inertial sensor.
+struct Sensor {
+    track: Track,
+    /// Whether it has a gyroscope.
+    turns: bool,
+    remarks: Vec<(&'static str, String)>,
+}
+
 /// Signals by topic.
 struct Columns {
     signals: Vec<Signal>,
@@ -419,10 +459,6 @@ impl Columns {
             .find(|s| s.path.strip_prefix(topic).and_then(|p| p.strip_prefix('.')) == Some(field))
     }
 
-    fn first(&self, topic: &str, field: &str) -> Option<f64> {
-        self.get(topic, field)?.values.first().copied()
-    }
-
     fn values<const N: usize>(&self, topic: &str, fields: [&str; N]) -> Option<[&[f64]; N]> {
         let found: Vec<&[f64]> = fields
             .iter()
@@ -431,12 +467,49 @@ impl Columns {
         found.try_into().ok()
     }
 
-    fn track(&self, topic: &str) -> Option<Track> {
-        let t_s = self.get(topic, ACCEL[0])?.times_s(self.start_ns);
+    fn sensor(&self, topic: &str) -> Option<Sensor> {
+        let signal = self.get(topic, ACCEL[0])?;
         let accel = self.values(topic, ACCEL)?;
-        let still = vec![0.0; t_s.len()];
-        let gyro = self.values(topic, GYRO).unwrap_or([&still, &still, &still]);
-        Some(Track::from_columns(&t_s, gyro, accel))
+        let n = signal.values.len();
+        let stamp_s = self.values(topic, STAMP).map(|[sec, nanosec]| {
+            let since = |(s, ns): (&f64, &f64)| (s - sec[0]) + (ns - nanosec[0]) / 1e9;
+            sec.iter().zip(nanosec).map(since).collect()
+        });
+        let Dated { mut t_s, remark } = dated(signal.times_s(self.start_ns), stamp_s);
+        let mut remarks: Vec<_> = remark.into_iter().collect();
+        let gyro = self.values(topic, GYRO);
+        // Samples without a rate among others that have one are holes; a sensor that never gives one still tells steps.
+        let mark = self.get(topic, GYRO_MARK).map(|s| &s.values[..]);
+        let mark = mark.filter(|mark| mark.len() == n);
+        let marked = |k: usize| mark.is_some_and(|mark| mark.get(k) == Some(&-1.0));
+        let without = (0..n).filter(|k| marked(*k)).count();
+        let turns = gyro.is_some() && without < n;
+        if turns && without > 0 {
+            for (k, t) in t_s.iter_mut().enumerate() {
+                if marked(k) {
+                    *t = f64::NAN;
+                }
+            }
+            remarks.push((
+                "no_rate",
+                format!("{without} of {n} samples have no angular velocity and are left out"),
+            ));
+        }
+        let still = vec![0.0; n];
+        let gyro = gyro.filter(|_| turns).unwrap_or([&still, &still, &still]);
+        let track = Track::from_columns(&t_s, gyro, accel);
+        let dropped = track.dropped - if turns { without } else { 0 };
+        if dropped as f64 > MANY * n as f64 {
+            remarks.push((
+                "left_out",
+                format!("{dropped} of {n} samples are left out: not finite, beyond any sensor's range, or no later than the one before"),
+            ));
+        }
+        Some(Sensor {
+            track,
+            turns,
+            remarks,
+        })
     }
 
     /// Times of a topic's messages, s.
@@ -459,3 +532,44 @@ impl Columns {
 
 /// Metadata records by name, as a reader gives them.
 type Records = BTreeMap<String, BTreeMap<String, String>>;
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Of 100 samples every 10 ms those that have a rate.
+    fn read(has_rate: impl Fn(usize) -> bool) -> Sensor {
+        let times_ns: std::sync::Arc<[i64]> = (0..100).map(|k| k * 10_000_000).collect();
+        let column = |field: &str, values: Vec<f64>| Signal {
+            path: format!("/imu/rath.{field}"),
+            unit: String::new(),
+            times_ns: times_ns.clone(),
+            values,
+        };
+        let mark = |k| if has_rate(k) { 0.0 } else { -1.0 };
+        let mut signals = vec![column(GYRO_MARK, (0..100).map(mark).collect())];
+        for field in GYRO.iter().chain(&ACCEL) {
+            signals.push(column(field, vec![1.0; 100]));
+        }
+        let start_ns = 0;
+        Columns { signals, start_ns }.sensor("/imu/rath").unwrap()
+    }
+
+    #[test]
+    fn samples_without_a_rate_are_left_out_where_others_have_one() {
+        let late = read(|k| (3..50).contains(&k) || k > 60);
+        assert!(late.turns && late.track.len() == 86);
+        assert_eq!((late.track.t_s[0], late.track.t_s[47]), (0.03, 0.61));
+        assert!(late.track.gyro_rad_per_s.iter().all(|w| *w == [1.0; 3]));
+        let [(kind, text)] = &late.remarks[..] else {
+            panic!("{:?}", late.remarks)
+        };
+        assert!(
+            *kind == "no_rate" && text.starts_with("14 of 100"),
+            "{text}"
+        );
+        // A pedometer has none at all, and its steps still count.
+        let never = read(|_| false);
+        assert!(!never.turns && never.track.len() == 100);
+    }
+}

@@ -53,8 +53,8 @@ pub fn factors(recording: &Recording, roles: &Roles) -> Result<BTreeMap<String, 
     Err(factors.keys().map(|topic| messages(topic)).sum())
 }
 
-/// The inertial columns of the topics whose factor is above 1: means over so many samples in the order of the file. Samples that are not finite are
-/// left out.
+/// The inertial columns of the topics whose factor is above 1: means over so many samples in the order of the file, at log times. Samples that are
+/// not finite are left out, and of a sensor that gives angular velocities those without one.
 pub fn read(
     recording: &Recording,
     factors: &BTreeMap<String, usize>,
@@ -104,7 +104,9 @@ struct Sensor {
     columns: [Vec<f64>; 6],
     /// The columns that the sensor has.
     has: [bool; 6],
-    mark: Option<f64>,
+    /// Samples that say they have no angular velocity, and whether there are others.
+    marked: usize,
+    turns: bool,
 }
 
 impl Sensor {
@@ -118,26 +120,43 @@ impl Sensor {
             times_ns: Vec::new(),
             columns: Default::default(),
             has: [false; 6],
-            mark: None,
+            marked: 0,
+            turns: false,
         }
     }
 
     fn take(&mut self, batch: &Batch<'_>) {
         let mut parts: [Option<&[f64]>; 6] = [None; 6];
+        let mut mark: Option<&[f64]> = None;
         for column in batch.columns {
             let field = column.path.get(batch.topic.len() + 1..).unwrap_or_default();
             // Fields of a message of fixed layout are in every row.
             if let (Some(k), None) = (COLUMNS.iter().position(|c| *c == field), column.rows) {
                 parts[k] = Some(column.values);
                 self.has[k] = true;
-            } else if field == GYRO_MARK {
-                self.mark = self.mark.or(column.values.first().copied());
+            } else if let (GYRO_MARK, None) = (field, column.rows) {
+                mark = Some(column.values);
             }
         }
         for (row, &t_ns) in batch.times_ns.iter().enumerate() {
             let sample = parts.map(|part| part.map_or(0.0, |values| values[row]));
             if !sample.iter().all(|x| x.is_finite()) {
                 continue;
+            }
+            match mark.is_some_and(|mark| mark[row] == -1.0) {
+                true => {
+                    self.marked += 1;
+                    if self.turns {
+                        continue;
+                    }
+                }
+                // The first with a rate: those before it are without.
+                false if !self.turns && self.marked > 0 => {
+                    (self.turns, self.count) = (true, 0);
+                    self.times_ns.clear();
+                    self.columns.iter_mut().for_each(Vec::clear);
+                }
+                false => self.turns = true,
             }
             if self.count == 0 {
                 (self.first_ns, self.since_ns, self.sums) = (t_ns, 0, [0.0; 6]);
@@ -168,11 +187,11 @@ impl Sensor {
             times_ns: times_ns.into(),
             values,
         };
-        let mark = self.mark.zip(self.times_ns.first().copied());
-        let mut signals: Vec<Signal> = mark
-            .map(|(mark, t_ns)| signal(GYRO_MARK, &[t_ns], vec![mark]))
-            .into_iter()
-            .collect();
+        let mut signals: Vec<Signal> = Vec::new();
+        if !self.turns {
+            let marks = vec![-1.0; self.times_ns.len()];
+            signals.push(signal(GYRO_MARK, &self.times_ns, marks));
+        }
         for ((field, values), has) in COLUMNS.iter().zip(self.columns).zip(self.has) {
             if has {
                 signals.push(signal(field, &self.times_ns, values));
@@ -214,9 +233,45 @@ mod tests {
             x.extend(values);
         }
         let signals = sensor.signals("/a");
-        assert_eq!(signals.len(), 1);
+        assert_eq!(signals.len(), 1, "{signals:?}");
         // 0 1 2 3, 4 5 7 8, 9 10 11 12, 13 14 15 16.
         assert_eq!(signals[0].values, [1.5, 6.0, 10.5, 14.5]);
         assert_eq!(*signals[0].times_ns, [1_500, 6_000, 10_500, 14_500]);
+    }
+
+    #[test]
+    fn of_a_sensor_that_turns_only_samples_with_a_rate_count() {
+        fn column<'a>(path: &'a str, values: &'a [f64]) -> recording::read::Column<'a> {
+            recording::read::Column {
+                id: 0,
+                path,
+                rows: None,
+                values,
+                finite: true,
+            }
+        }
+        let times_ns: Vec<i64> = (0..8).collect();
+        let values: Vec<f64> = (0..8).map(f64::from).collect();
+        for (mark, left) in [
+            ([-1.0, -1.0, 0.0, 0.0, -1.0, 0.0, 0.0, -1.0], vec![2.5, 5.5]),
+            ([-1.0; 8], vec![0.5, 2.5, 4.5, 6.5]),
+        ] {
+            let mut sensor = Sensor::new(2);
+            sensor.take(&Batch {
+                channel: 0,
+                topic: "/a",
+                schema: "",
+                times_ns: &times_ns,
+                stamps_ns: None,
+                columns: &[
+                    column("/a.linear_acceleration.x", &values),
+                    column("/a.angular_velocity_covariance[0]", &mark),
+                ],
+            });
+            let signals = sensor.signals("/a");
+            let x = signals.iter().find(|s| s.path.ends_with(".x")).unwrap();
+            assert_eq!(x.values, left);
+            assert_eq!(signals.len(), 1 + usize::from(mark == [-1.0; 8]));
+        }
     }
 }

@@ -216,7 +216,8 @@ fn run(track: &Track, options: Options, backward: bool) -> (Estimate, Vec<Matrix
 
 /// Orientation from the whole recording.
 ///
-/// An empty track gives an empty estimate. Holes are bridged as if the rate before them had lasted.
+/// An empty track gives an empty estimate. Nothing is carried over a hole but what was learnt of the bias: each stretch between holes has a
+/// tilt and a heading of its own.
 pub fn batch(track: &Track, options: Options) -> Estimate {
     let n = track.len();
     let Some(period_s) = track.period_s() else {
@@ -244,7 +245,24 @@ pub fn batch(track: &Track, options: Options) -> Estimate {
         out.rest[i] |= back.rest[i];
     }
 
-    let inertial = integrate(track, &out.bias_rad_per_s);
+    for stretch in track.stretches() {
+        let part = track.part(stretch.clone());
+        let bias = &out.bias_rad_per_s[stretch.clone()];
+        let tilted = tilted(&part, bias, period_s, options);
+        out.earth_from_sensor[stretch].copy_from_slice(&tilted);
+    }
+    out
+}
+
+/// Orientation over one stretch, by its own gravity.
+fn tilted(
+    track: &Track,
+    bias: &[[f64; 3]],
+    period_s: f64,
+    options: Options,
+) -> Vec<UnitQuaternion<f64>> {
+    let n = track.len();
+    let inertial = integrate(track, bias);
     let mut gravity: [Vec<f64>; 3] = std::array::from_fn(|_| Vec::with_capacity(n));
     for (q, a) in inertial.iter().zip(&track.accel_m_per_s2) {
         let g = q * Vector3::from(*a);
@@ -257,7 +275,7 @@ pub fn batch(track: &Track, options: Options) -> Estimate {
     }
 
     let mut tilt = UnitQuaternion::identity();
-    for i in 0..n {
+    let oriented = |i: usize| {
         let g = tilt * Vector3::new(gravity[0][i], gravity[1][i], gravity[2][i]);
         // No direction, no correction: a free fall as long as τ.
         if let Some(turn) = UnitQuaternion::rotation_between(&g, &Vector3::z()) {
@@ -265,11 +283,11 @@ pub fn batch(track: &Track, options: Options) -> Estimate {
             tilt.renormalize_fast();
         }
         // Integrated by the trapezium, so the stamp is the sample's own instant; the latency remains.
-        let rate = Vector3::from(track.gyro_rad_per_s[i]) - Vector3::from(out.bias_rad_per_s[i]);
+        let rate = Vector3::from(track.gyro_rad_per_s[i]) - Vector3::from(bias[i]);
         let ahead = UnitQuaternion::from_scaled_axis(rate * options.latency_s);
-        out.earth_from_sensor[i] = tilt * inertial[i] * ahead;
-    }
-    out
+        tilt * inertial[i] * ahead
+    };
+    (0..n).map(oriented).collect()
 }
 
 /// Strap-down integration from identity, with the mean of two neighbouring rates over each step.
@@ -279,7 +297,7 @@ fn integrate(track: &Track, bias: &[[f64; 3]]) -> Vec<UnitQuaternion<f64>> {
     let mut out = Vec::with_capacity(track.len());
     for i in 0..track.len() {
         if i > 0 {
-            let dt_s = (track.t_s[i] - track.t_s[i - 1]).min(LONGEST_HOLE_S);
+            let dt_s = track.t_s[i] - track.t_s[i - 1];
             let (a, b) = (rate(i - 1), rate(i));
             // Trapezium, and the turn of the axis inside the step (coning, second order).
             let turn = (a + b) * (0.5 * dt_s) + a.cross(&b) * (dt_s * dt_s / 12.0);

@@ -19,21 +19,23 @@ use super::track::Track;
 use super::unloading::unloadings;
 use super::vertical;
 use crate::filter::{Band, butter, sosfiltfilt};
-use crate::inputs::{Inputs, Window, interpolate};
+use crate::inputs::{Inputs, Window, between, interpolate, mean_step_s};
 use crate::median::median;
 use crate::metrics::{Datum, Metrics, Value, metrics_of, rival_hz};
 use crate::random::Random;
 use nalgebra::{UnitQuaternion, Vector3};
+use std::ops::Range;
 
 /// How the sensor's axes lie on the body (x forward along the pole, y left, z up).
 #[derive(Clone, Copy, Debug, PartialEq, Default)]
 pub enum Mounting {
-    /// The sensor's x points forward along the pole, as well as tape allows; up is taken from the mean of gravity over the recording.
+    /// The sensor's x points forward along the pole, as well as tape allows; up is the mean of gravity over [`Settings::level_over`]. How the
+    /// sensor sits and how the load leans on average cannot be told apart then: roll and pitch are about their means.
     #[default]
     Levelled,
     /// Body from sensor, known; taken as it is.
     Known(UnitQuaternion<f64>),
-    /// Up from the mean of gravity, forward from the first steps out of standstill.
+    /// Up as in `Levelled`, forward from the first steps out of standstill.
     Walking,
 }
 
@@ -81,6 +83,8 @@ pub struct Settings {
     pub orientation: Options,
     /// Mounting.
     pub mounting: Mounting,
+    /// Where gravity is averaged to find what is up on the sensor; all of the recording where nothing lies in it.
+    pub level_over: Window,
     /// From the centre of mass to the sensor, in the body's axes, m.
     pub lever_m: [f64; 3],
     /// Gravity, m/s².
@@ -98,6 +102,7 @@ impl Default for Settings {
         Self {
             orientation: Options::default(),
             mounting: Mounting::default(),
+            level_over: Window::ALL,
             lever_m: [0.0; 3],
             gravity_m_per_s2: 9.80665,
             height_corner_hz: 2.0 * vertical::CORNER_HZ,
@@ -110,9 +115,11 @@ impl Default for Settings {
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum MotionError {
     /// Too short.
-    #[error("{found_s:.1} s of inertial data; orientation and height need at least 5 s")]
+    #[error(
+        "{found_s:.1} s of inertial data without a hole; orientation and height need at least 5 s"
+    )]
     TooShort {
-        /// Length found, s.
+        /// Longest stretch found, s.
         found_s: f64,
     },
     /// Too slowly sampled.
@@ -136,8 +143,12 @@ pub enum MotionError {
 pub struct Motion {
     /// Columns for [`crate::metrics()`], all from the sensor: roll, pitch, support ratio, height about its slow course (NaN at the ends).
     pub inputs: Inputs,
-    /// Vertical acceleration of the centre of mass about its mean, gravity removed, m/s²; evenly spaced.
+    /// Vertical acceleration of the centre of mass about its mean, gravity removed, m/s²; evenly spaced but for the holes.
     pub accel_up_m_per_s2: Vec<f64>,
+    /// The parts between holes, as ranges of samples.
+    pub stretches: Vec<Range<usize>>,
+    /// What of the recording is in none of them, s.
+    pub left_out_s: f64,
     /// Orientation of the body, and what was learnt of the gyroscope; one per time of `inputs.t_s`.
     pub orientation: Estimate,
     /// Body from sensor, as used.
@@ -146,25 +157,49 @@ pub struct Motion {
     pub settings: Settings,
 }
 
-/// The body's motion from its sensor.
+impl Motion {
+    /// Height about its slow course, stretch by stretch, m, with the corner f₀ as in [`vertical`].
+    pub fn height_m(&self, corner_hz: f64) -> Vec<f64> {
+        stretchwise_height(
+            &self.accel_up_m_per_s2,
+            &self.stretches,
+            mean_step_s(&self.inputs.t_s).unwrap_or_default(),
+            corner_hz,
+        )
+    }
+}
+
+/// Shorter stretches tell neither orientation nor height, s.
+const SHORTEST_S: f64 = 5.0;
+
+/// The body's motion from its sensor. Nothing is carried over a hole: the columns have no samples there, and no height near it.
 ///
 /// # Errors
 /// When the recording is too short, too slowly sampled, or gravity has been removed from it.
 pub fn motion(track: &Track, settings: &Settings) -> Result<Motion, MotionError> {
-    let found_s = match (track.t_s.first(), track.t_s.last()) {
-        (Some(first), Some(last)) => last - first,
-        _ => 0.0,
-    };
-    if found_s < 5.0 {
+    let span_s = |r: &Range<usize>| track.t_s[r.end - 1] - track.t_s[r.start];
+    let mut whole = track.stretches();
+    let found_s = whole.iter().map(span_s).fold(0.0, f64::max);
+    if found_s < SHORTEST_S {
         return Err(MotionError::TooShort { found_s });
     }
-    let period_s = track.period_s().unwrap_or(1.0);
+    whole.retain(|r| span_s(r) >= SHORTEST_S);
+    let seen_s: f64 = whole.iter().map(span_s).sum();
+    let left_out_s = track.t_s[track.len() - 1] - track.t_s[0] - seen_s;
+    let steps: usize = whole.iter().map(|r| r.len() - 1).sum();
+    let (usual_s, mean_s) = (track.period_s().unwrap_or(1.0), seen_s / steps as f64);
+    // Samples in packets are as dense as their mean step, not as the usual one.
+    let period_s = if mean_s > 1.5 * usual_s {
+        mean_s
+    } else {
+        usual_s
+    };
     if period_s > 1.0 / 25.0 {
         return Err(MotionError::TooSlow {
             found_hz: 1.0 / period_s,
         });
     }
-    let track = even(track, period_s);
+    let (track, stretches) = even(track, &whole, period_s);
     let mut estimate = orientation::batch(&track, settings.orientation);
     let found = mean_specific_force(&track, &estimate);
     let g = settings.gravity_m_per_s2;
@@ -175,9 +210,9 @@ pub fn motion(track: &Track, settings: &Settings) -> Result<Motion, MotionError>
     }
     let body_from_sensor = match settings.mounting {
         Mounting::Known(rotation) => rotation,
-        Mounting::Levelled => level(&estimate),
+        Mounting::Levelled => level(&estimate, settings.level_over.range(&track.t_s)),
         Mounting::Walking => {
-            let level = level(&estimate);
+            let level = level(&estimate, settings.level_over.range(&track.t_s));
             forward(&track, &estimate, &level, g) * level
         }
     };
@@ -186,13 +221,17 @@ pub fn motion(track: &Track, settings: &Settings) -> Result<Motion, MotionError>
         *q *= sensor_from_body;
     }
     let body = track.rotated(&body_from_sensor);
-    let force = at_centre_of_mass(
-        &body,
-        &estimate,
-        &body_from_sensor,
-        settings.lever_m,
-        period_s,
-    );
+    let mut force = Vec::with_capacity(body.len());
+    for stretch in &stretches {
+        let bias = &estimate.bias_rad_per_s[stretch.clone()];
+        let rates = body.gyro_rad_per_s[stretch.clone()].iter().zip(bias);
+        let rates = rates
+            .map(|(w, b)| Vector3::from(*w) - body_from_sensor * Vector3::from(*b))
+            .collect();
+        let felt = body.accel_m_per_s2[stretch.clone()].iter();
+        let felt = felt.map(|a| Vector3::from(*a)).collect();
+        force.extend(at_centre_of_mass(felt, rates, settings.lever_m, period_s));
+    }
     let n = body.len();
     let (mut roll_rad, mut pitch_rad) = (Vec::with_capacity(n), Vec::with_capacity(n));
     let (mut support_ratio, mut accel_up) = (Vec::with_capacity(n), Vec::with_capacity(n));
@@ -210,12 +249,19 @@ pub fn motion(track: &Track, settings: &Settings) -> Result<Motion, MotionError>
     }
     let mean = accel_up.iter().sum::<f64>() / n as f64;
     accel_up.iter_mut().for_each(|a| *a -= mean);
-    let mut height_m = vertical::height(&accel_up, period_s, settings.height_corner_hz);
+    let corner_hz = settings.height_corner_hz;
+    let mut height_m = stretchwise_height(&accel_up, &stretches, period_s, corner_hz);
     // At its free ends the height shows the accelerometer's bias; that fades by e every 1/(√2 π f₀).
-    let fade = (ENDS / settings.height_corner_hz / period_s) as usize;
-    let fade = fade.min(n / 10);
-    height_m[..fade].fill(f64::NAN);
-    height_m[n - fade..].fill(f64::NAN);
+    for stretch in &stretches {
+        // A short recording keeps most of its height; beside a hole there is time enough to do without.
+        let fade = |hole: bool| match hole {
+            true => ((BESIDE_HOLES / corner_hz / period_s) as usize).min(stretch.len() / 2),
+            false => ((ENDS / corner_hz / period_s) as usize).min(stretch.len() / 10),
+        };
+        let (head, tail) = (fade(stretch.start > 0), fade(stretch.end < n));
+        height_m[stretch.start..stretch.start + head].fill(f64::NAN);
+        height_m[stretch.end - tail..stretch.end].fill(f64::NAN);
+    }
     let mut inputs = Inputs {
         t_s: body.t_s.clone(),
         height_m,
@@ -231,14 +277,30 @@ pub fn motion(track: &Track, settings: &Settings) -> Result<Motion, MotionError>
     Ok(Motion {
         inputs,
         accel_up_m_per_s2: accel_up,
+        stretches,
+        left_out_s,
         orientation: estimate,
         body_from_sensor,
         settings: *settings,
     })
 }
 
-/// The same samples on an even grid with the track's own period, straight between samples.
-fn even(track: &Track, period_s: f64) -> Track {
+/// The samples of the stretches on an even grid each, of the same period, straight between samples; and where the stretches are now.
+fn even(track: &Track, whole: &[Range<usize>], period_s: f64) -> (Track, Vec<Range<usize>>) {
+    let mut out = Track {
+        dropped: track.dropped,
+        ..Track::default()
+    };
+    let mut stretches = Vec::with_capacity(whole.len());
+    for range in whole {
+        let first = out.len();
+        out.append(evened(track.part(range.clone()), period_s));
+        stretches.push(first..out.len());
+    }
+    (out, stretches)
+}
+
+fn evened(track: Track, period_s: f64) -> Track {
     let (start, end) = (track.t_s[0], track.t_s[track.len() - 1]);
     let jitter = track
         .t_s
@@ -247,10 +309,10 @@ fn even(track: &Track, period_s: f64) -> Track {
         .map(|(k, t)| (t - start - k as f64 * period_s).abs())
         .fold(0.0, f64::max);
     if jitter < 0.02 * period_s {
-        return track.clone();
+        return track;
     }
-    // Never more than four times the samples that were there: a wrong stamp far away must not ask for all memory.
-    let n = (((end - start) / period_s) as usize + 1).min(4 * track.len());
+    // Bounded by the samples: within a stretch no step is longer than some usual ones.
+    let n = ((end - start) / period_s) as usize + 1;
     let grid: Vec<f64> = (0..n).map(|k| start + k as f64 * period_s).collect();
     let resample = |v: &[[f64; 3]]| -> Vec<[f64; 3]> {
         let axes: [Vec<f64>; 3] = std::array::from_fn(|a| {
@@ -269,6 +331,18 @@ fn even(track: &Track, period_s: f64) -> Track {
     }
 }
 
+/// [`vertical::height`] of each stretch by itself, m.
+fn stretchwise_height(
+    accel_up_m_per_s2: &[f64],
+    stretches: &[Range<usize>],
+    period_s: f64,
+    corner_hz: f64,
+) -> Vec<f64> {
+    let of =
+        |r: &Range<usize>| vertical::height(&accel_up_m_per_s2[r.clone()], period_s, corner_hz);
+    stretches.iter().flat_map(of).collect()
+}
+
 /// Norm of the mean specific force in the earth's frame: g, whatever the motion, when gravity is in it.
 fn mean_specific_force(track: &Track, estimate: &Estimate) -> f64 {
     let mut sum = Vector3::zeros();
@@ -278,10 +352,12 @@ fn mean_specific_force(track: &Track, estimate: &Estimate) -> f64 {
     sum.norm() / track.len() as f64
 }
 
-/// The shortest turn that takes the mean upward direction, as the sensor sees it, to z.
-fn level(estimate: &Estimate) -> UnitQuaternion<f64> {
+/// The shortest turn that takes the mean upward direction, as the sensor sees it over some samples (all where these are none), to z.
+fn level(estimate: &Estimate, over: Range<usize>) -> UnitQuaternion<f64> {
     let mut up = Vector3::zeros();
-    for q in &estimate.earth_from_sensor {
+    let all = &estimate.earth_from_sensor[..];
+    let some = if over.is_empty() { all } else { &all[over] };
+    for q in some {
         up += q.inverse() * Vector3::z();
     }
     // On its head: half a turn about x; there is no shortest turn.
@@ -320,27 +396,19 @@ fn forward(
     UnitQuaternion::from_axis_angle(&Vector3::z_axis(), -push.y.atan2(push.x))
 }
 
-/// Specific force at the centre of mass, in the body's axes.
+/// Specific force at the centre of mass, in the body's axes, from that at the sensor and the angular velocity over one stretch.
 fn at_centre_of_mass(
-    body: &Track,
-    estimate: &Estimate,
-    body_from_sensor: &UnitQuaternion<f64>,
+    force: Vec<Vector3<f64>>,
+    rates: Vec<Vector3<f64>>,
     lever_m: [f64; 3],
     period_s: f64,
 ) -> Vec<Vector3<f64>> {
-    let force = body.accel_m_per_s2.iter().map(|a| Vector3::from(*a));
     if lever_m == [0.0; 3] {
-        return force.collect();
+        return force;
     }
     let r = Vector3::from(lever_m);
-    let rates: Vec<Vector3<f64>> = body
-        .gyro_rad_per_s
-        .iter()
-        .zip(&estimate.bias_rad_per_s)
-        .map(|(w, b)| Vector3::from(*w) - body_from_sensor * Vector3::from(*b))
-        .collect();
     let rates = below(rates, period_s);
-    let force = below(force.collect(), period_s);
+    let force = below(force, period_s);
     let n = rates.len();
     // α over two steps is the mean of two differences, so its edges are those of a sum weighted 1, 2, 1. Whatever else is in the equation
     // is weighted alike: where a pole touches down, α × r cancels what the sensor felt only if both begin at once.
@@ -376,8 +444,10 @@ fn below(v: Vec<Vector3<f64>>, period_s: f64) -> Vec<Vector3<f64>> {
 /// Up to here angular acceleration is taken from the gyroscope, Hz: re-contact jerks the body faster than a person moves.
 const ACCELERATION_HZ: f64 = 60.0;
 
-/// Seconds at both ends without height, times the corner.
+/// Seconds at both ends of the recording without height, times the corner.
 pub(crate) const ENDS: f64 = 0.5;
+/// The same beside a hole, where the window has no say in what is looked at.
+pub(crate) const BESIDE_HOLES: f64 = 0.8;
 
 /// Number of draws behind an interval.
 const DRAWS: usize = 40;
@@ -450,6 +520,9 @@ pub fn metrics(motion: &Motion, window: Window) -> Metrics {
             let (root, ci95) = without_noise(x, &drawn);
             value.datum = Datum::Number(root);
             value.ci95 = Some(ci95);
+            if !matches!(motion.settings.mounting, Mounting::Known(_)) {
+                value.reason = Some("about its mean over the window: how the sensor sits cannot be told from how the load leans; give mounting_roll_pitch_yaw_deg in a roles file".into());
+            }
             continue;
         }
         let x = match *name {
@@ -459,7 +532,13 @@ pub fn metrics(motion: &Motion, window: Window) -> Metrics {
         let half =
             1.96 * (variance(&drawn) + beyond_the_budget(name, motion, window).powi(2)).sqrt();
         value.datum = Datum::Number(x);
-        value.ci95 = Some([x - half, x + half]);
+        // None of them is below nothing, and a share is one at most.
+        let most = if *name == "t_float" {
+            1.0
+        } else {
+            f64::INFINITY
+        };
+        value.ci95 = Some([(x - half).max(0.0), (x + half).min(most)]);
     }
     if out
         .number("rms_roll_deg")
@@ -555,13 +634,13 @@ fn beyond_the_budget(name: &str, motion: &Motion, window: Window) -> f64 {
         "peak_hz" | "roll_peak_hz" if !seen.is_empty() => {
             let bin = 0.5 / (seen.len() as f64 * period_s) / 3f64.sqrt() * 2f64.sqrt();
             let x = if name == "peak_hz" {
-                &seen
+                &inputs.height_m[range.clone()]
             } else {
                 &inputs.roll_rad[range.clone()]
             };
-            // The height lacks its ends: its steps count, not its moments.
-            let t_s = &inputs.t_s[range][..x.len()];
-            bin.hypot(rival_hz(t_s, x) / 1.96)
+            let all = inputs.t_s[range].iter().zip(x);
+            let (t_s, x): (Vec<f64>, Vec<f64>) = all.filter(|(_, x)| x.is_finite()).unzip();
+            bin.hypot(rival_hz(&t_s, &x) / 1.96)
         }
         // The definition counts samples at 30 Hz; others of the same motion come up to one of them later, evenly spread.
         "onset_time_s" => (1.0 / 30.0) / 3f64.sqrt(),
@@ -614,7 +693,7 @@ fn varied(motion: &Motion, window: Window, draw: u64) -> Inputs {
     let t_s: Vec<f64> = (0..n.min(range.len()))
         .map(|k| first + phase + k as f64 * step_s)
         .collect();
-    let pick = |x: &[f64]| interpolate(&inputs.t_s[range.clone()], &x[range.clone()], &t_s);
+    let pick = |x: &[f64]| between(&inputs.t_s[range.clone()], &x[range.clone()], &t_s);
     let angle = |x: &[f64], random: &mut Random| -> Vec<f64> {
         let (offset, scale) = (
             budget.tilt_offset_rad * random.normal(),
@@ -736,6 +815,83 @@ mod tests {
         let [low, high] = value.ci95.unwrap();
         assert!(low < true_deg && true_deg < high);
         assert!(m.get("z_mean_m").unwrap().reason.is_some());
+    }
+
+    #[test]
+    fn a_hole_takes_away_what_it_hides_and_nothing_else() {
+        let (track, roll, height, _) = twin([0.0; 3], UnitQuaternion::identity());
+        let settings = Settings {
+            orientation: Options::without_latency(),
+            ..Settings::default()
+        };
+        let window = Window {
+            start_s: 5.0,
+            end_s: 35.0,
+        };
+        let true_deg = rms(roll[1000..7000].iter().copied()).to_degrees();
+        let swing_m =
+            height.iter().copied().fold(0.0, f64::max) - height.iter().copied().fold(0.0, f64::min);
+        let whole = metrics(&motion(&track, &settings).unwrap(), window);
+        for hole_s in [0.1, 0.5, 2.0] {
+            let (before, behind) = (0..3600, 3600 + (hole_s / 0.005) as usize..track.len());
+            let mut holed = track.part(before);
+            holed.append(track.part(behind));
+            let found = motion(&holed, &settings).unwrap();
+            assert_eq!(found.stretches.len(), 2);
+            assert!(
+                (found.left_out_s - hole_s).abs() < 0.006,
+                "{}",
+                found.left_out_s
+            );
+            let m = metrics(&found, window);
+            for (name, truth) in [
+                ("rms_roll_deg", true_deg),
+                ("dz_pp_m", swing_m),
+                ("peak_hz", 2.14),
+                ("roll_peak_hz", 1.07),
+            ] {
+                let [low, high] = m.get(name).unwrap().ci95.unwrap();
+                println!("{hole_s} s out: {name} {low:.4} … {high:.4}, true {truth:.4}");
+                assert!(low < truth && truth < high, "{name} {low} {truth} {high}");
+            }
+            let word = |m: &Metrics| m.get("mechanism").unwrap().as_word().map(str::to_owned);
+            assert_eq!(word(&m), word(&whole));
+        }
+        // One sample an hour late is a stretch too short to count.
+        let mut late = track.clone();
+        late.append(track.part(0..1));
+        *late.t_s.last_mut().unwrap() = 3640.0;
+        assert_eq!(
+            motion(&late, &settings).unwrap().inputs.t_s.len(),
+            track.len()
+        );
+    }
+
+    #[test]
+    fn up_is_found_in_the_window_whatever_was_before() {
+        let (mut track, roll, ..) = twin([0.0; 3], UnitQuaternion::identity());
+        // On its side for the first 8 s.
+        for k in 0..1600 {
+            track.accel_m_per_s2[k] = [0.0, 9.80665, 0.0];
+            track.gyro_rad_per_s[k] = [0.0; 3];
+        }
+        for k in 1600..1800 {
+            track.accel_m_per_s2[k] = [0.0, 9.80665, 0.0];
+            track.gyro_rad_per_s[k] = [std::f64::consts::FRAC_PI_2, 0.0, 0.0];
+        }
+        let window = Window {
+            start_s: 20.0,
+            end_s: 38.0,
+        };
+        let settings = Settings {
+            orientation: Options::without_latency(),
+            level_over: window,
+            ..Settings::default()
+        };
+        let found = metrics(&motion(&track, &settings).unwrap(), window);
+        let [low, high] = found.get("rms_roll_deg").unwrap().ci95.unwrap();
+        let true_deg = rms(roll[4000..7600].iter().copied()).to_degrees();
+        assert!(low < true_deg && true_deg < high, "{low} {true_deg} {high}");
     }
 
     #[test]

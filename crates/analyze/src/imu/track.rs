@@ -6,6 +6,9 @@ use crate::median::median;
 const GYRO_LIMIT_RAD_PER_S: f64 = 1e3;
 const ACCEL_LIMIT_M_PER_S2: f64 = 1e5;
 
+/// What a straight line may bridge, s: of 10 m/s² at 4 Hz it misses a velocity of 10 mm/s.
+pub(crate) const BRIDGED_S: f64 = 0.025;
+
 /// Samples of one inertial sensor in ascending time; every number finite.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Track {
@@ -62,6 +65,28 @@ impl Track {
     /// The usual time from one sample to the next: the median, s. `None` below two samples.
     pub fn period_s(&self) -> Option<f64> {
         period_s(&self.t_s)
+    }
+
+    /// The parts without a hole, as ranges of samples.
+    pub fn stretches(&self) -> Vec<std::ops::Range<usize>> {
+        crate::inputs::stretches(&self.t_s, BRIDGED_S)
+    }
+
+    /// Some of the samples.
+    pub fn part(&self, range: std::ops::Range<usize>) -> Self {
+        Self {
+            t_s: self.t_s[range.clone()].to_vec(),
+            gyro_rad_per_s: self.gyro_rad_per_s[range.clone()].to_vec(),
+            accel_m_per_s2: self.accel_m_per_s2[range].to_vec(),
+            dropped: self.dropped,
+        }
+    }
+
+    /// These samples and, behind them, later ones.
+    pub fn append(&mut self, mut later: Track) {
+        self.t_s.append(&mut later.t_s);
+        self.gyro_rad_per_s.append(&mut later.gyro_rad_per_s);
+        self.accel_m_per_s2.append(&mut later.accel_m_per_s2);
     }
 
     /// The same samples seen in another frame: each vector is turned by `rotation`.

@@ -4,7 +4,7 @@ use super::contact::mean;
 use super::{Context, Value};
 use crate::beat::adler::Adler;
 use crate::beat::lock::RATIOS;
-use crate::inputs::interpolate;
+use crate::inputs::between;
 use crate::phase::{Circular, circular, hilbert, relative_phase, unwrap};
 use std::f64::consts::TAU;
 
@@ -138,7 +138,13 @@ pub fn roll_lock(c: &Context) -> Value {
     }
     let inside = roll.t_s.partition_point(|t| *t < from)..roll.t_s.partition_point(|t| *t <= to);
     let phi = unwrap(&phase[inside.clone()]);
-    let psi = interpolate(&times, &unwrap(&beat), &roll.t_s[inside]);
+    // Where the beat pauses there is nothing to be in step with.
+    let psi = between(&times, &unwrap(&beat), &roll.t_s[inside]);
+    let (phi, psi): (Vec<f64>, Vec<f64>) = phi
+        .into_iter()
+        .zip(psi)
+        .filter(|(_, psi)| psi.is_finite())
+        .unzip();
     let firm = |p: u32, q: u32| {
         relative_phase(&phi, &psi, p.into(), q.into()).map_or(0.0, |found| found.resultant)
     };

@@ -124,7 +124,11 @@ impl<'a> Context<'a> {
     }
 
     fn series(&self, x: &'a [f64]) -> Series<'a> {
-        let mut table = Table::cut(&self.inputs.t_s, &[x], self.window);
+        self.series_on(&self.inputs.t_s, x)
+    }
+
+    fn series_on(&self, t_s: &'a [f64], x: &'a [f64]) -> Series<'a> {
+        let mut table = Table::cut(t_s, &[x], self.window);
         Series {
             t_s: table.t_s,
             x: table.columns.pop().unwrap_or(Cow::Borrowed(&[])),
@@ -178,6 +182,11 @@ impl<'a> Context<'a> {
         let mut columns: Vec<&[f64]> = vec![&self.inputs.beat_phase_rad];
         columns.extend(self.inputs.phase_rad.iter().map(|c| &c[..]));
         Table::cut(self.inputs.phase_times(), &columns, self.window)
+    }
+
+    /// The beat's phase (rad) wherever it sounds.
+    pub fn beat_alone(&self) -> Series<'a> {
+        self.series_on(self.inputs.phase_times(), &self.inputs.beat_phase_rad)
     }
 
     /// The strongest line of the height.
@@ -237,7 +246,7 @@ impl<'a> Context<'a> {
                 !self.beat().is_empty(),
                 "beat",
             ),
-            Need::Steps => empty(!i.cadence_hz.is_empty(), true, "carrier's steps"),
+            Need::Steps => empty(!i.step_s.is_empty(), true, "carrier's steps"),
         }
     }
 

@@ -2,7 +2,7 @@
 
 use super::lines::Shares;
 use super::{Context, Value};
-use crate::inputs::interpolate;
+use crate::inputs::{between, stretches};
 use crate::mechanism::{self, Evidence};
 
 /// The evidence for this window. `None` where the roll does not move or has no step.
@@ -21,33 +21,28 @@ pub fn evidence(c: &Context) -> Option<Evidence> {
         forces
             .columns
             .iter()
-            .map(|n| interpolate(&forces.t_s, n, &roll.t_s))
+            .map(|n| between(&forces.t_s, n, &roll.t_s))
             .collect()
     };
     let support = c.support_ratio();
-    let (handles, scale) = match on_roll.is_empty() {
-        false => (on_roll, 1.0),
-        // N_tot / (M g) times the weight of one kilogram: a is then per unit mass.
+    let per_mass = on_roll.is_empty();
+    let handles = match per_mass {
+        false => on_roll,
+        // N_tot / (M g) times g: the force on one kilogram.
         true if !support.x.is_empty() && support.t_s == roll.t_s => {
-            (vec![support.x.to_vec()], c.inputs.gravity_m_per_s2)
+            let g = c.inputs.gravity_m_per_s2;
+            vec![support.x.iter().map(|x| x * g).collect()]
         }
-        true => (Vec::new(), 1.0),
+        true => Vec::new(),
     };
-    let handles: Vec<Vec<f64>> = if scale == 1.0 {
-        handles
-    } else {
-        handles
-            .into_iter()
-            .map(|h| h.into_iter().map(|x| x * scale).collect())
-            .collect()
-    };
-    let fit = mechanism::fit_roll(&roll.x, &handles, step_s);
+    let fit = mechanism::fit_roll(&roll.x, &handles, &stretches(&roll.t_s, 0.0), step_s);
     Some(Evidence {
         rms_roll_rad,
         f_hz,
         share_at_half: shares.map(|s| s.at_half),
         share_at_f: shares.map(|s| s.at_f),
         fit,
+        per_mass,
     })
 }
 

@@ -2,6 +2,7 @@
 
 use super::context::Series;
 use super::{Context, Value};
+use crate::inputs::about_mean;
 use crate::spectrum::{rfft, rfft_hz, rfft_magnitude};
 
 /// How far from twice the peak the second harmonic is looked for (Hz).
@@ -9,6 +10,9 @@ const H2_HALF_WIDTH_HZ: f64 = 0.45;
 
 /// Half-width of "near a line", as a share of f.
 pub const NEAR: f64 = 0.1;
+
+/// So many periods of f tell a line at f/2 from one at f: a Hann taper's line reaches 2/T to either side, the band [`NEAR`] · f.
+pub const FEWEST_PERIODS: f64 = 2.0 / NEAR;
 
 /// The strongest line of a signal and the transform it was found in.
 pub struct Line {
@@ -20,16 +24,15 @@ pub struct Line {
 }
 
 impl Line {
-    /// argmax of |rfft(x − mean)|; `None` below four samples or for a constant.
+    /// argmax of |rfft(x − mean)|, 0 in holes; `None` below four samples or for a constant.
     pub fn strongest(series: &Series) -> Option<Self> {
         let x = &series.x;
-        let step_s = series.step_s()?;
         if x.len() < 4 {
             return None;
         }
-        let mean = super::contact::mean(x);
-        let magnitude = rfft_magnitude(&x.iter().map(|x| x - mean).collect::<Vec<_>>());
-        let hz_grid = rfft_hz(x.len(), step_s);
+        let (about, step_s) = about_mean(&series.t_s, x)?;
+        let magnitude = rfft_magnitude(&about);
+        let hz_grid = rfft_hz(about.len(), step_s);
         // Ties go to the lowest frequency, as NumPy's argmax does.
         let bin = (0..magnitude.len()).reduce(|best, k| {
             if magnitude[k] > magnitude[best] {
@@ -89,6 +92,12 @@ pub fn h2_ratio(c: &Context) -> Value {
     let Some(line) = c.height_line() else {
         return Value::missing(NO_LINE);
     };
+    if line.hz <= H2_HALF_WIDTH_HZ {
+        return Value::missing(format!(
+            "the strongest line, {:.2} Hz, lies itself within {H2_HALF_WIDTH_HZ} Hz of twice its frequency",
+            line.hz
+        ));
+    }
     match line.ratio_near(2.0 * line.hz, H2_HALF_WIDTH_HZ) {
         Some(ratio) => Value::number(ratio),
         None => Value::missing(format!(
@@ -107,7 +116,10 @@ pub fn subharmonic_ratio(c: &Context) -> Value {
         return Value::missing("the height has no line to compare with");
     };
     let Some(shares) = Shares::of(c.roll(), line.hz) else {
-        return Value::missing(NO_LINE);
+        return Value::missing(format!(
+            "the roll does not move, or the window is shorter than {FEWEST_PERIODS:.0} periods of {:.2} Hz",
+            line.hz
+        ));
     };
     if shares.at_f <= 0.0 {
         return Value::missing("no roll power near the strongest line of the height");
@@ -120,7 +132,8 @@ pub fn subharmonic_ratio(c: &Context) -> Value {
 /// ```text
 /// share(f₀) = Σ_{|f_k − f₀| ≤ 0.1 f} |X_k|² / Σ_{k ≥ 1} |X_k|²,   X = rfft(hann · (x − mean))
 /// ```
-/// The taper keeps a strong line from leaking into the other's band. Dimensionless, 0 … 1.
+/// The taper keeps a strong line from leaking into the other's band, where that is wider than the taper's own line, 2/T to either side: the window
+/// has to hold T ≥ 20/f. Dimensionless, 0 … 1.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Shares {
     /// Near f/2.
@@ -130,12 +143,14 @@ pub struct Shares {
 }
 
 impl Shares {
-    /// For a signal on an even time axis; `None` where it does not move.
+    /// For a signal on an even time axis, 0 in its holes; `None` where it does not move, or for less than [`FEWEST_PERIODS`].
     pub fn of(series: &Series, f_hz: f64) -> Option<Self> {
-        let (x, step_s) = (&series.x, series.step_s()?);
-        let mean = super::contact::mean(x);
+        let (x, step_s) = about_mean(&series.t_s, &series.x)?;
+        if (x.len() as f64 + 0.5) * step_s * f_hz < FEWEST_PERIODS {
+            return None;
+        }
         let taper = crate::spectrum::Taper::Hann.values(x.len());
-        let tapered: Vec<f64> = x.iter().zip(&taper).map(|(x, w)| (x - mean) * w).collect();
+        let tapered: Vec<f64> = x.iter().zip(&taper).map(|(x, w)| x * w).collect();
         let power: Vec<f64> = rfft(&tapered).iter().map(|z| z.norm_sqr()).collect();
         let hz = rfft_hz(x.len(), step_s);
         let total: f64 = power[1..].iter().sum();

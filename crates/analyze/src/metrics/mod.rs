@@ -14,7 +14,7 @@ mod together;
 pub use contact::FLOAT_SHARE;
 pub use context::{Context, Need};
 pub use drive::evidence as mechanism_evidence;
-pub(crate) use lines::rival_hz;
+pub(crate) use lines::{FEWEST_PERIODS, rival_hz};
 pub use onset::{ONSET_ROLL_DEG, ONSET_STRETCH_S, onset_s};
 
 use serde::ser::{Serialize, SerializeMap, Serializer};
@@ -244,7 +244,7 @@ pub const METRICS: &[Metric] = &[
         needs: &[Need::Steps],
         compute: together::step_rate_hz,
         origin: "docs/field.md",
-        definition: "Steps per second: one over the mean interval between steps, pauses left out; the mean of the carriers, `per` lists them. Over the whole recording.",
+        definition: "Steps per second: one over the mean interval between steps, pauses left out, over W; the mean of the carriers who take three steps in it, `per` lists them.",
     },
     Metric {
         name: "synchrony",
@@ -289,7 +289,7 @@ pub const METRICS: &[Metric] = &[
         needs: &[Need::Beat],
         compute: together::beat_hz,
         origin: "docs/metrics.md",
-        definition: "Advance of the beat's phase over 2π and the time, over the part of W in which a beat sounds.",
+        definition: "Advance of the beat's phase over 2π and the time, over the part of W in which a beat sounds: pauses and lost messages are neither in the one nor in the other. From beats as such: least squares of time on number, a beat that is missing among others counted, each run between pauses with an offset of its own.",
     },
     Metric {
         name: "beat_lead_deg",
@@ -415,7 +415,7 @@ pub const METRICS: &[Metric] = &[
         needs: &[Need::Height],
         compute: lines::h2_ratio,
         origin: ARCHIVE,
-        definition: "Largest magnitude within 0.45 Hz of 2·peak_hz over the magnitude at the peak.",
+        definition: "Largest magnitude within 0.45 Hz of 2·peak_hz over the magnitude at the peak; none where the peak itself lies within 0.45 Hz of that.",
     },
     Metric {
         name: "roll_peak_hz",
@@ -433,7 +433,7 @@ pub const METRICS: &[Metric] = &[
         needs: &[Need::Roll, Need::Height],
         compute: lines::subharmonic_ratio,
         origin: "docs/metrics.md",
-        definition: "Roll power within 0.1·f of f/2 over roll power within 0.1·f of f, f = peak_hz; from a Hann-tapered periodogram of W.",
+        definition: "Roll power within 0.1·f of f/2 over roll power within 0.1·f of f, f = peak_hz; from a Hann-tapered periodogram of W, which has to hold 20 periods of f.",
     },
     Metric {
         name: "growth_ratio",

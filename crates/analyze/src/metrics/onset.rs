@@ -1,7 +1,7 @@
 //! When it starts to roll.
 
 use super::{Context, Value};
-use crate::inputs::mean_step_s;
+use crate::inputs::{mean_step_s, stretches};
 
 /// Length of the stretch whose RMS roll is judged (s).
 pub const ONSET_STRETCH_S: f64 = 2.0;
@@ -14,23 +14,22 @@ pub const ONSET_ROLL_DEG: f64 = 10.0;
 /// t[k] of the smallest k ≥ m − 1 with Σ_{j=k−m+1}^{k} θ[j]² > m·(10°)²,   m = ⌊2 s / Δt⌋
 /// ```
 /// θ roll (rad), Δt the mean step (s); m = 60 both at 30 Hz and at the archive's 30.303 Hz. Stretches lie wholly inside
-/// the given samples, so the answer is never below t\[m − 1\]. Source: archive, stats.json (`uncontrolled_onset_time`).
+/// the given samples and span no hole of them, so the answer is never below t\[m − 1\]. Source: archive, stats.json (`uncontrolled_onset_time`).
 pub fn onset_s(t_s: &[f64], roll_rad: &[f64]) -> Option<f64> {
     let step_s = mean_step_s(t_s)?;
     // A thousandth of a sample of slack: times are rounded to nanoseconds.
     let m = ((ONSET_STRETCH_S / step_s + 1e-3).floor() as usize).max(1);
     let limit = m as f64 * ONSET_ROLL_DEG.to_radians().powi(2);
-    let mut sum = 0.0;
-    for (k, roll) in roll_rad.iter().enumerate() {
-        sum += roll * roll;
-        if k >= m {
-            sum -= roll_rad[k - m] * roll_rad[k - m];
-        }
-        if k + 1 >= m && sum > limit {
-            return Some(t_s[k]);
-        }
-    }
-    None
+    stretches(t_s, 0.0).into_iter().find_map(|stretch| {
+        let (mut sum, first) = (0.0, stretch.start);
+        stretch.into_iter().find_map(|k| {
+            sum += roll_rad[k] * roll_rad[k];
+            if k >= first + m {
+                sum -= roll_rad[k - m] * roll_rad[k - m];
+            }
+            (k + 1 >= first + m && sum > limit).then_some(t_s[k])
+        })
+    })
 }
 
 pub fn onset_time_s(c: &Context) -> Value {

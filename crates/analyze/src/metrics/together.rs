@@ -3,7 +3,10 @@
 use super::beat::carriers;
 use super::contact::mean;
 use super::{Context, Value};
+use crate::inputs::mean_step_s;
 use crate::phase;
+use crate::steps::rate_of;
+use std::f64::consts::{PI, TAU};
 
 /// How many surrogates the chance level of measured phases is made from.
 const SURROGATES: usize = 400;
@@ -33,12 +36,19 @@ pub fn synchrony_chance(c: &Context) -> Value {
 }
 
 pub fn step_rate_hz(c: &Context) -> Value {
-    let steps = &c.inputs.cadence_hz;
+    let of = |step_s: &Vec<f64>| {
+        let inside = &step_s[c.window.range(step_s)];
+        (inside.len() >= 3).then(|| rate_of(inside))
+    };
+    let steps: Vec<(f64, f64)> = c.inputs.step_s.iter().filter_map(of).collect();
+    if steps.is_empty() {
+        return Value::missing("nobody takes three steps in the window");
+    }
     let n = steps.len() as f64;
-    let rates: Vec<f64> = steps.iter().map(|[rate, _]| *rate).collect();
+    let rates: Vec<f64> = steps.iter().map(|(rate, _)| *rate).collect();
     let half = steps
         .iter()
-        .map(|[_, half]| half * half)
+        .map(|(_, half)| half * half)
         .sum::<f64>()
         .sqrt()
         / n;
@@ -63,13 +73,19 @@ pub fn beat_synchrony(c: &Context) -> Value {
 }
 
 pub fn beat_hz(c: &Context) -> Value {
-    let table = c.beat();
-    let psi = phase::unwrap(&table.columns[0]);
-    let span_s = table.t_s[table.len() - 1] - table.t_s[0];
-    if span_s <= 0.0 {
+    let beat = c.beat_alone();
+    // Over silence and over lost messages nobody counted the turns.
+    let Some(longest_s) = mean_step_s(&beat.t_s).map(|step_s| 1.5 * step_s) else {
         return Value::missing("the beat sounds at a single sample of the window");
+    };
+    let (mut turned, mut sounds_s) = (0.0, 0.0);
+    for (t, psi) in beat.t_s.windows(2).zip(beat.x.windows(2)) {
+        if t[1] - t[0] <= longest_s {
+            turned += (psi[1] - psi[0] + PI).rem_euclid(TAU) - PI;
+            sounds_s += t[1] - t[0];
+        }
     }
-    Value::number((psi[psi.len() - 1] - psi[0]) / (std::f64::consts::TAU * span_s))
+    Value::number(turned / (TAU * sounds_s))
 }
 
 #[cfg(test)]

@@ -1,0 +1,168 @@
+//! When a sensor's samples were taken, where the log only knows when they came.
+//!
+//! ```text
+//! t = s + min(l − s)        in the first and the last third of the recording; between and beyond them along a straight line
+//! ```
+//! s header stamp, l log time (s). What was never late lies on the lower edge of l − s: the two clocks' offset and drift, and the least delay. The
+//! log's clock stays everybody's; its scatter does not get into the motion, whose height is two integrals of it.
+//! Source: the lower-envelope estimate of one-way delays, Moon, Skelly & Towsley, INFOCOM 1999.
+
+use crate::inputs::stretches;
+use crate::median::median;
+
+/// Stamps are believed where their steps scatter by less than this share of the log times' own scatter.
+const MORE_EVEN: f64 = 0.8;
+/// Scatter of log times that nobody minds, s: what is driven by a crystal and logged at once.
+const EVEN_S: f64 = 2e-5;
+/// Samples whose usual step is below this share of their mean step came in packets.
+const PACKETS: f64 = 0.6;
+
+/// Times of the samples, s, ascending or not; and what was done, where that is worth a word.
+pub struct Dated {
+    /// When.
+    pub t_s: Vec<f64>,
+    /// Kind and text of a remark.
+    pub remark: Option<(&'static str, String)>,
+}
+
+/// From log times and, where every sample has one, header stamps (s, each since its own first one), in the order of the log.
+pub fn dated(log_s: Vec<f64>, stamp_s: Option<Vec<f64>>) -> Dated {
+    let of_log = scatter_s(&log_s);
+    if let Some(stamp_s) = stamp_s
+        && of_log > EVEN_S
+        && stamp_s.len() == log_s.len()
+    {
+        let of_stamps = scatter_s(&stamp_s);
+        if of_stamps < MORE_EVEN * of_log {
+            return Dated {
+                t_s: on_the_logs_clock(&log_s, &stamp_s),
+                remark: Some((
+                    "by_stamps",
+                    format!(
+                        "samples are dated by their header stamps, whose steps scatter by {:.2} ms, those of the log times by {:.2} ms",
+                        1e3 * of_stamps,
+                        1e3 * of_log
+                    ),
+                )),
+            };
+        }
+    }
+    match unpacked(&log_s) {
+        Some((t_s, usual, mean)) => Dated {
+            t_s,
+            remark: Some((
+                "packets",
+                format!(
+                    "samples came in packets ({:.2} ms from one to the next as a rule, {:.2} ms on average) without useful times of their own; they are taken as evenly spaced",
+                    1e3 * usual,
+                    1e3 * mean
+                ),
+            )),
+        },
+        None => Dated {
+            t_s: log_s,
+            remark: None,
+        },
+    }
+}
+
+/// Mean absolute difference of steps from the usual one, s.
+fn scatter_s(t_s: &[f64]) -> f64 {
+    let steps: Vec<f64> = t_s.windows(2).map(|w| w[1] - w[0]).collect();
+    let usual = median(&mut steps.clone()).unwrap_or(0.0);
+    steps.iter().map(|s| (s - usual).abs()).sum::<f64>() / steps.len().max(1) as f64
+}
+
+/// Stamps moved and stretched so that none lies behind its log time, and two lie on it.
+fn on_the_logs_clock(log_s: &[f64], stamp_s: &[f64]) -> Vec<f64> {
+    let least = |range: std::ops::Range<usize>| {
+        let each = range.map(|k| (stamp_s[k], log_s[k] - stamp_s[k]));
+        each.min_by(|a, b| a.1.total_cmp(&b.1))
+    };
+    let (n, third) = (log_s.len(), log_s.len() / 3);
+    let (Some(a), Some(b)) = (least(0..third), least(n - third..n)) else {
+        return log_s.to_vec();
+    };
+    let slope = if b.0 > a.0 {
+        (b.1 - a.1) / (b.0 - a.0)
+    } else {
+        0.0
+    };
+    let moved = |s: &f64| s + a.1 + slope * (s - a.0);
+    stamp_s.iter().map(moved).collect()
+}
+
+/// Even times for samples that came in packets, stretch by stretch the least-squares line of time over number; with their usual and mean step.
+fn unpacked(log_s: &[f64]) -> Option<(Vec<f64>, f64, f64)> {
+    let parts = stretches(log_s, 0.0);
+    let (mut span_s, mut steps) = (0.0, 0);
+    for part in &parts {
+        span_s += log_s[part.end - 1] - log_s[part.start];
+        steps += part.len() - 1;
+    }
+    let mean = span_s / steps as f64;
+    let usual = median(&mut log_s.windows(2).map(|w| w[1] - w[0]).collect::<Vec<_>>())?;
+    if !(usual < PACKETS * mean) {
+        return None;
+    }
+    let mut t_s = Vec::with_capacity(log_s.len());
+    for part in parts {
+        let x = &log_s[part];
+        let middle = 0.5 * (x.len() as f64 - 1.0);
+        let centre = x.iter().sum::<f64>() / x.len() as f64;
+        let (mut kt, mut kk) = (0.0, 0.0);
+        for (k, t) in x.iter().enumerate() {
+            kt += (k as f64 - middle) * (t - centre);
+            kk += (k as f64 - middle).powi(2);
+        }
+        let step = if kk > 0.0 { kt / kk } else { 0.0 };
+        t_s.extend((0..x.len()).map(|k| centre + step * (k as f64 - middle)));
+    }
+    Some((t_s, usual, mean))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::random::Random;
+
+    fn worst(a: &[f64], b: impl Iterator<Item = f64>) -> f64 {
+        a.iter()
+            .zip(b)
+            .map(|(a, b)| (a - b).abs())
+            .fold(0.0, f64::max)
+    }
+
+    #[test]
+    fn late_samples_are_dated_by_their_stamps_on_the_logs_clock() {
+        // A device whose clock runs 80 ppm fast and began long ago; messages come 2 ms late and more.
+        let mut random = Random(3);
+        let taken: Vec<f64> = (0..6000).map(|k| f64::from(k) * 0.01).collect();
+        let stamps: Vec<f64> = taken.iter().map(|t| (1.0 + 8e-5) * t).collect();
+        let late = |t: &f64| t + 0.002 - 0.003 * (1.0 - random.uniform()).ln();
+        let log: Vec<f64> = taken.iter().map(late).collect();
+        let found = dated(log.clone(), Some(stamps.clone()));
+        assert_eq!(found.remark.unwrap().0, "by_stamps");
+        let off = worst(&found.t_s, taken.iter().map(|t| t + 0.002));
+        assert!(off < 5e-5, "{off}");
+        // What is as even as its stamps is left alone.
+        assert_eq!(dated(taken.clone(), Some(stamps)).t_s, taken);
+        assert!(dated(log, None).remark.is_none());
+    }
+
+    #[test]
+    fn packets_are_spread_and_holes_kept() {
+        let taken = |k: i32| f64::from(k) * 0.005 + if k < 4000 { 0.0 } else { 2.0 };
+        for inside_s in [0.0, 2e-4] {
+            let log: Vec<f64> = (0..12_000)
+                .map(|k| taken(k / 4 * 4) + f64::from(k % 4) * inside_s)
+                .collect();
+            let found = dated(log, None);
+            assert_eq!(found.remark.unwrap().0, "packets");
+            // Late or early alike, by up to a packet.
+            let late = found.t_s[0] - taken(0);
+            let off = worst(&found.t_s, (0..12_000).map(|k| taken(k) + late));
+            assert!(late.abs() < 0.02 && off < 1e-4, "{late} {off}");
+        }
+    }
+}
