@@ -21,7 +21,7 @@ pub struct Summary {
     pub mean: Option<f64>,
     /// Population standard deviation.
     pub sd: Option<f64>,
-    /// Strongest line of Welch's spectrum, constant part taken off (Hz).
+    /// Strongest line of Welch's spectrum at the rate between gaps, constant part taken off (Hz).
     pub peak_hz: Option<f64>,
     /// Unit, where known.
     pub unit: String,
@@ -140,7 +140,14 @@ pub struct Times {
     latest_ns: i64,
     steps: Moments,
     buffer: Vec<f64>,
+    /// Steps of ordinary length, and their sum (s).
+    ordinary: u64,
+    ordinary_s: f64,
 }
+
+/// A step so many times the mean of those before it is a gap; the first few are taken as they come.
+const GAP: f64 = 10.0;
+const FIRST: u64 = 16;
 
 impl Times {
     /// The next log times.
@@ -160,6 +167,13 @@ impl Times {
             self.earliest_ns = self.earliest_ns.min(*t);
             self.latest_ns = self.latest_ns.max(*t);
         }
+        for step in &self.buffer {
+            let usual_s = self.ordinary_s / self.ordinary as f64;
+            if self.ordinary < FIRST || *step <= GAP * usual_s {
+                self.ordinary += 1;
+                self.ordinary_s += step;
+            }
+        }
         self.count += times_ns.len() as u64;
         self.last_ns = last;
         self.steps.push_finite(&self.buffer);
@@ -174,6 +188,13 @@ impl Times {
     pub fn hz(&self) -> Option<f64> {
         let span_s = seconds(self.earliest_ns, self.latest_ns);
         (self.count > 1 && span_s > 0.0).then(|| (self.count - 1) as f64 / span_s)
+    }
+
+    /// Rate between gaps (Hz): that of the samples, which lost ones do not slow down.
+    pub fn hz_between_gaps(&self) -> Option<f64> {
+        (self.ordinary > 0 && self.ordinary_s > 0.0)
+            .then(|| self.ordinary as f64 / self.ordinary_s)
+            .or(self.hz())
     }
 
     /// Population standard deviation of the steps (s).
@@ -265,7 +286,8 @@ impl Stream {
         let hz = times.hz();
         let range = self.moments.range();
         let moves = range.is_some_and(|(low, high)| high > low);
-        let spectrum = hz
+        let spectrum = times
+            .hz_between_gaps()
             .filter(|_| moves || told)
             .and_then(|hz| self.welch.as_ref()?.finish_at(hz).ok());
         let summary = Summary {
@@ -318,6 +340,12 @@ mod tests {
         assert_eq!(times.hz(), Some(100.0));
         // Steps 10, 10, 11, 9 ms.
         assert!((times.jitter_s().unwrap() - (0.5f64).sqrt() * 1e-3).abs() < 1e-12);
+        // Lost messages do not slow the samples down.
+        let mut gap = Times::default();
+        let steps = (0..400).map(|k| k * 10_000_000 + if k < 200 { 0 } else { 2_000_000_000 });
+        gap.push(&steps.collect::<Vec<_>>());
+        assert!((gap.hz_between_gaps().unwrap() - 100.0).abs() < 1e-9);
+        assert!(gap.hz().unwrap() < 70.0);
         let mut odd = Times::default();
         odd.push(&[i64::MIN, i64::MAX, 5]);
         assert!(odd.hz().unwrap() > 0.0);

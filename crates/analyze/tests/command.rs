@@ -562,3 +562,69 @@ fn the_documentation_names_every_metric() {
         );
     }
 }
+
+#[test]
+fn topics_of_other_times_meet_where_both_have_samples() {
+    let folder = tempfile::tempdir().unwrap();
+    let file = folder.path().join("apart.mcap");
+    let mut w = RecordingWriter::create(&file, &WriterOptions::default()).unwrap();
+    let names = ["/a", "/b", "/beat", "/left", "/right"];
+    let channels = names.map(|name| w.channel(name, MessageKind::Float64).unwrap());
+    let tau = std::f64::consts::TAU;
+    let wrapped = |x: f64| (x + tau / 2.0).rem_euclid(tau) - tau / 2.0;
+    for k in 0..1801i64 {
+        for (j, channel) in channels.iter().enumerate() {
+            // Each topic a few milliseconds behind the one before; the right handle falls silent half way.
+            let t_ns = k * 1_000_000_000 / 30 + 5_000_000 * j as i64;
+            let t = t_ns as f64 / 1e9;
+            if names[j] == "/right" && t > 30.0 {
+                continue;
+            }
+            let data = match names[j] {
+                "/left" | "/right" => (300.0 + 350.0 * (tau * 2.0 * t).sin()).max(0.0),
+                _ => wrapped(tau * 2.03 * t),
+            };
+            w.message(*channel, t_ns, &Float64 { data }).unwrap();
+        }
+    }
+    w.finish().unwrap();
+    let roles = folder.path().join("roles.toml");
+    std::fs::write(
+        &roles,
+        "phases = [\"/a.data\", \"/b.data\"]\nbeat_phase = \"/beat.data\"\nforces = [\"/left.data\", \"/right.data\"]\n",
+    )
+    .unwrap();
+    let args = [file.to_str().unwrap(), "--roles", roles.to_str().unwrap()];
+    let all = json(&[&args[..], &["--format", "json"]].concat());
+    let number = |v: &Value, name: &str| v["metrics"][name]["value"].as_f64();
+    for (name, truth) in [
+        ("synchrony", 1.0),
+        ("plv", 1.0),
+        ("beat_synchrony", 1.0),
+        ("beat_hz", 2.03),
+    ] {
+        let found = number(&all, name).unwrap();
+        assert!((found - truth).abs() < 1e-6, "{name}: {found}");
+    }
+    // Over the half in which both press, 1 and not what a held force makes of it.
+    assert!(number(&all, "force_correlation").unwrap() > 0.99);
+    let late = json(&[&args[..], &["--format", "json", "--window", "35..60"]].concat());
+    assert_eq!(number(&late, "contact_loss_mean"), None);
+    assert!(late["metrics"]["contact_loss_mean"]["reason"].is_string());
+    // Thinned, every topic keeps rows.
+    let table = folder.path().join("thin.csv");
+    let out = analyze(&[
+        args[0],
+        "--downsample",
+        "2",
+        "--out",
+        table.to_str().unwrap(),
+    ]);
+    assert!(out.status.success(), "{}", text(&out.stderr));
+    let table = std::fs::read_to_string(&table).unwrap();
+    for column in 2..7 {
+        let filled = |line: &&str| !line.split(',').nth(column).unwrap().is_empty();
+        let rows = table.lines().skip(1).filter(filled).count();
+        assert!((450..=901).contains(&rows), "{column}: {rows}");
+    }
+}

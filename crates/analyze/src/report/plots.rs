@@ -2,7 +2,7 @@
 
 use crate::envelope::outline;
 use crate::examine::Analysis;
-use crate::inputs::Window;
+use crate::inputs::{Window, about_mean, mean_step_s, stretches};
 use crate::mechanism::spline_derivatives;
 use crate::peaks::SpectrumSummary;
 use crate::phase;
@@ -405,9 +405,14 @@ fn portrait(a: &Analysis) -> Option<Panel> {
         return None;
     }
     let range = inside(&i.t_s, a.window);
-    let step_s = crate::inputs::mean_step_s(&i.t_s[range.clone()])?;
-    let roll = &i.roll_rad[range];
-    let (rate, _) = spline_derivatives(roll, step_s)?;
+    let (t_s, roll) = (&i.t_s[range.clone()], &i.roll_rad[range]);
+    let step_s = mean_step_s(t_s)?;
+    let mut rate = vec![f64::NAN; roll.len()];
+    for stretch in stretches(t_s, 0.0) {
+        if let Some((first, _)) = spline_derivatives(&roll[stretch.clone()], step_s) {
+            rate[stretch].copy_from_slice(&first);
+        }
+    }
     let mut p = Panel::new(
         "portrait",
         "Phase portrait of the roll",
@@ -474,13 +479,15 @@ fn roll_spectrogram(a: &Analysis) -> Option<Image> {
     if i.roll_rad.len() != i.t_s.len() || i.roll_rad.iter().any(|x| !x.is_finite()) {
         return None;
     }
-    let fs_hz = 1.0 / crate::inputs::mean_step_s(&i.t_s)?;
+    // Dark where nothing was measured; not at all where that is most of it.
+    let (roll, step_s) = about_mean(&i.t_s, &i.roll_rad)?;
+    let fs_hz = 1.0 / step_s;
     let nperseg = (SPECTROGRAM_SEGMENT_S * fs_hz).round() as usize;
-    if i.roll_rad.len() < 2 * nperseg {
+    if roll.len() < i.roll_rad.len() || roll.len() < 2 * nperseg {
         return None;
     }
     // About 240 columns, whatever the length.
-    let step = ((i.roll_rad.len() - nperseg) / 240).max(1).min(nperseg / 2);
+    let step = ((roll.len() - nperseg) / 240).max(1).min(nperseg / 2);
     let options = Options {
         noverlap: Some(nperseg - step),
         ..Options {
@@ -488,7 +495,7 @@ fn roll_spectrogram(a: &Analysis) -> Option<Image> {
             ..Options::default()
         }
     };
-    let degrees: Vec<f64> = i.roll_rad.iter().map(|x| x.to_degrees()).collect();
+    let degrees: Vec<f64> = roll.iter().map(|x| x.to_degrees()).collect();
     let s = spectrogram(&degrees, fs_hz, &options, Mode::Psd).ok()?;
     let f_hz = a
         .metrics
