@@ -148,8 +148,15 @@ fn panel(p: &Panel) -> Scene {
     let marks: Vec<Mark> = p
         .series
         .iter()
-        .map(|s| {
+        .flat_map(|s| {
             let points: Vec<(f64, f64)> = s.x.iter().copied().zip(s.y.iter().copied()).collect();
+            let parts = points.split(|(_, y)| !p.points && y.is_nan());
+            let whole = parts.filter(|part| !part.is_empty()).enumerate();
+            whole
+                .map(|(k, part)| (s, part.to_vec(), several && k == 0))
+                .collect::<Vec<_>>()
+        })
+        .map(|(s, points, named)| {
             let colour = COLOURS[s.colour % COLOURS.len()];
             if p.points {
                 let mut cloud = ScatterPlot::new()
@@ -157,7 +164,7 @@ fn panel(p: &Panel) -> Scene {
                     .with_color(colour)
                     .with_size(2.0)
                     .with_marker_opacity(0.5);
-                if several {
+                if named {
                     cloud = cloud.with_legend(s.name.clone());
                 }
                 cloud.into()
@@ -166,7 +173,7 @@ fn panel(p: &Panel) -> Scene {
                     .with_data(points)
                     .with_color(colour)
                     .with_stroke_width(1.2);
-                if several {
+                if named {
                     line = line.with_legend(s.name.clone());
                 }
                 if !s.spread.is_empty() {

@@ -2,6 +2,8 @@
 // Draws what the page's data describe. No library, no network. One plot is one <figure data-plot="K">.
 (() => {
   const data = JSON.parse(document.getElementById("data").textContent);
+  // Null is where a curve is interrupted, and would count as 0.
+  for (const p of data.plots) for (const s of p.series) s.y = s.y.map(v => v === null ? NaN : v);
   const SVG = "http://www.w3.org/2000/svg";
   const pad = { left: 70, right: 12, top: 18, bottom: 38 };
   const paper = { w: 700, h: 230 }; // of a plot in print: three fit on a page
@@ -17,6 +19,7 @@
     return e;
   };
   const short = x => {
+    if (isNaN(x)) return "–";
     if (x === 0) return "0";
     const a = Math.abs(x);
     if (a >= 1e5 || a < 1e-3) return x.toExponential(2).replace(/\.?0+e/, "e").replace("e+", "e");

@@ -8,6 +8,7 @@ use crate::peaks::SpectrumSummary;
 use crate::phase;
 use crate::spectrum::{Mode, Options, spectrogram};
 use recording::topics;
+use std::ops::Range;
 
 /// Okabe and Ito's colours, distinct to every kind of colour vision (jfly, 2008); black comes last: it vanishes on dark paper.
 pub const COLOURS: [&str; 7] = [
@@ -21,7 +22,7 @@ pub struct Series {
     pub name: String,
     /// Abscissae.
     pub x: Vec<f64>,
-    /// Ordinates, as many.
+    /// Ordinates, as many; NaN where a curve is interrupted.
     pub y: Vec<f64>,
     /// Index into [`COLOURS`].
     pub colour: usize,
@@ -94,8 +95,27 @@ impl Panel {
         }
     }
 
+    /// A curve of what is finite, with a NaN in each of its holes: nothing is drawn through them.
     fn line(&mut self, name: impl Into<String>, t_s: &[f64], x: &[f64]) {
-        let (x, y) = outline(t_s, x);
+        let known = t_s.iter().zip(x).filter(|(_, x)| x.is_finite());
+        let (t_s, values): (Vec<f64>, Vec<f64>) = known.unzip();
+        let mut parts = stretches(&t_s, 0.0);
+        if parts.len() > MOST_PARTS {
+            parts = vec![Range {
+                start: 0,
+                end: t_s.len(),
+            }];
+        }
+        let (mut x, mut y) = (Vec::new(), Vec::new());
+        for part in parts {
+            if let Some(end_s) = x.last() {
+                x.push(0.5 * (end_s + t_s[part.start]));
+                y.push(f64::NAN);
+            }
+            let (mut times, mut points) = outline(&t_s[part.clone()], &values[part]);
+            x.append(&mut times);
+            y.append(&mut points);
+        }
         if !x.is_empty() {
             self.series.push(Series {
                 name: name.into(),
@@ -107,6 +127,9 @@ impl Panel {
         }
     }
 }
+
+/// A curve in more parts than this is something else than a signal with holes.
+const MOST_PARTS: usize = 50;
 
 /// A surface over time and frequency.
 #[derive(Clone, Debug)]
@@ -394,7 +417,7 @@ pub(super) fn unit(text: &str) -> String {
     out
 }
 
-fn inside(t_s: &[f64], window: Window) -> std::ops::Range<usize> {
+fn inside(t_s: &[f64], window: Window) -> Range<usize> {
     window.range(t_s)
 }
 
