@@ -27,12 +27,13 @@ const FLIGHT: f64 = crate::metrics::FLOAT_SHARE;
 /// Contact, jumps, beat and locking are looked for in the whole run (what is before the window is part of its story); the onset, like its
 /// metric, inside `window`.
 pub fn events(inputs: &Inputs, window: Window) -> Vec<Event> {
+    let context = Context::new(inputs, window);
     let mut out = Vec::new();
     contact(inputs, &mut out);
-    jumps(inputs, window, &mut out);
+    jumps(&context, &mut out);
     beat(inputs, &mut out);
     locking(inputs, &mut out);
-    if let Some(t_s) = Context::new(inputs, window).onset() {
+    if let Some(t_s) = context.onset() {
         out.push(Event {
             t_s,
             kind: "onset",
@@ -71,21 +72,12 @@ fn contact(inputs: &Inputs, out: &mut Vec<Event>) {
 }
 
 /// Stretches of at least two samples in which nothing holds the weight.
-fn jumps(inputs: &Inputs, window: Window, out: &mut Vec<Event>) {
+fn jumps(c: &Context, out: &mut Vec<Event>) {
+    let inputs = c.inputs;
     let (t_s, ratio) = if inputs.normal_n.is_empty() {
         (&inputs.t_s[..], inputs.support_ratio.clone())
     } else {
-        let total_n = inputs.total_force_n();
-        let weight_n = match inputs.mass_kg {
-            Some(mass_kg) => mass_kg * inputs.gravity_m_per_s2,
-            // As the metric: over many strides what is carried neither rises nor falls.
-            None => {
-                let range = window.range(inputs.force_times());
-                let some = total_n.get(range).unwrap_or(&total_n).iter();
-                let known: Vec<f64> = some.copied().filter(|n| n.is_finite()).collect();
-                known.iter().sum::<f64>() / known.len() as f64
-            }
-        };
+        let (total_n, weight_n) = (inputs.total_force_n(), c.weight_n());
         let ratio = total_n.iter().map(|n| n / weight_n).collect();
         (inputs.force_times(), ratio)
     };

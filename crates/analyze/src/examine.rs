@@ -1,7 +1,6 @@
 //! A recording in one pass: a line per signal, the roles' columns, what is odd; then metrics, spectra and events.
 
 use std::collections::{HashMap, HashSet};
-use std::f64::consts::{PI, TAU};
 
 use rayon::prelude::*;
 use recording::read::{Batch, ReadError, Recording};
@@ -12,7 +11,7 @@ use crate::field::Field;
 use crate::inputs::{Inputs, Window, between};
 use crate::metrics::{self, Metrics};
 use crate::peaks::SpectrumSummary;
-use crate::phase::unwrap;
+use crate::phase::{unwrap, wrap};
 use crate::quality::Quality;
 use crate::quaternion::Quaternions;
 use crate::roles::{Role, Roles, RolesFile, matches};
@@ -717,9 +716,8 @@ impl<'a> Pass<'a> {
 fn wrapped(t_s: &[f64], x: &[f64], axis: &[f64]) -> Vec<f64> {
     let known = t_s.iter().zip(x).filter(|(_, x)| x.is_finite());
     let (t_s, x): (Vec<f64>, Vec<f64>) = known.unzip();
-    let angle = |x: f64| (x + PI).rem_euclid(TAU) - PI;
     let straight = between(&t_s, &unwrap(&x), axis);
-    straight.into_iter().map(angle).collect()
+    straight.into_iter().map(wrap).collect()
 }
 
 /// The values at exactly the times of `axis`; NaN where there is none.

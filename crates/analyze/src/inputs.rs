@@ -188,8 +188,13 @@ pub fn stretches(t_s: &[f64], least_s: f64) -> Vec<Range<usize>> {
 
 /// Mean step of an ascending time axis, holes left out (s); `None` below two samples or for a step that is not positive.
 pub fn mean_step_s(t_s: &[f64]) -> Option<f64> {
+    mean_step_in(t_s, &stretches(t_s, 0.0))
+}
+
+/// Mean step within parts of an ascending time axis (s); `None` as [`mean_step_s`].
+pub fn mean_step_in(t_s: &[f64], parts: &[Range<usize>]) -> Option<f64> {
     let (mut span_s, mut steps) = (0.0, 0);
-    for part in stretches(t_s, 0.0) {
+    for part in parts {
         span_s += t_s[part.end - 1] - t_s[part.start];
         steps += part.len() - 1;
     }
@@ -197,26 +202,29 @@ pub fn mean_step_s(t_s: &[f64]) -> Option<f64> {
     (step > 0.0 && step.is_finite()).then_some(step)
 }
 
+/// `x` on an even axis of `step_s` that begins with `t_s`, each sample at the nearest place; `elsewhere` where there is none.
+pub fn placed(t_s: &[f64], x: &[f64], step_s: f64, elsewhere: f64) -> Vec<f64> {
+    let place = |t: f64| ((t - t_s[0]) / step_s).round() as usize;
+    let mut out = vec![elsewhere; place(t_s[t_s.len() - 1]) + 1];
+    t_s.iter().zip(x).for_each(|(t, x)| out[place(*t)] = *x);
+    out
+}
+
 /// `x` about its mean on an even axis, 0 in the holes of `t_s`, and the step (s): a transform of it has its lines where they are, though
 /// samples are missing. Where more is missing than is there, of the longest part without a hole. `None` as [`mean_step_s`].
 pub fn about_mean(t_s: &[f64], x: &[f64]) -> Option<(Vec<f64>, f64)> {
-    let step_s = mean_step_s(t_s)?;
-    let mean = x.iter().sum::<f64>() / x.len() as f64;
     let parts = stretches(t_s, 0.0);
-    if parts.len() == 1 {
-        return Some((x.iter().map(|x| x - mean).collect(), step_s));
-    }
-    let place = |t: f64| ((t - t_s[0]) / step_s).round() as usize;
-    let n = place(t_s[t_s.len() - 1]).saturating_add(1);
-    if n > 2 * x.len() {
+    let step_s = mean_step_in(t_s, &parts)?;
+    if (t_s[t_s.len() - 1] - t_s[0]) / step_s + 1.0 > 2.0 * x.len() as f64 {
         let longest = parts.into_iter().max_by_key(ExactSizeIterator::len)?;
         return about_mean(&t_s[longest.clone()], &x[longest]);
     }
-    let mut out = vec![0.0; n];
-    for (t, x) in t_s.iter().zip(x) {
-        out[place(*t)] = x - mean;
-    }
-    Some((out, step_s))
+    let mean = x.iter().sum::<f64>() / x.len() as f64;
+    let about: Vec<f64> = x.iter().map(|x| x - mean).collect();
+    Some(match parts.len() {
+        1 => (about, step_s),
+        _ => (placed(t_s, &about, step_s, 0.0), step_s),
+    })
 }
 
 /// `x(t)` at the times `at_s` by straight lines between samples; held beyond the ends. Both time axes ascend.
@@ -242,6 +250,9 @@ pub fn interpolate(t_s: &[f64], x: &[f64], at_s: &[f64]) -> Vec<f64> {
 
 /// As [`interpolate`], but NaN before the first sample, behind the last, and in holes.
 pub fn between(t_s: &[f64], x: &[f64], at_s: &[f64]) -> Vec<f64> {
+    if t_s.is_empty() {
+        return vec![f64::NAN; at_s.len()];
+    }
     let mut out = interpolate(t_s, x, at_s);
     let longest_s = longest_step_s(t_s);
     for (y, at) in out.iter_mut().zip(at_s) {
@@ -254,9 +265,6 @@ pub fn between(t_s: &[f64], x: &[f64], at_s: &[f64]) -> Vec<f64> {
         if !there {
             *y = f64::NAN;
         }
-    }
-    if out.is_empty() {
-        out.resize(at_s.len(), f64::NAN);
     }
     out
 }

@@ -305,6 +305,11 @@ pub fn hilbert(x: &[f64]) -> Vec<Complex64> {
         .collect()
 }
 
+/// The same angle within −π … π, rad.
+pub fn wrap(angle_rad: f64) -> f64 {
+    (angle_rad + PI).rem_euclid(TAU) - PI
+}
+
 /// `numpy.unwrap`: adds multiples of 2π so that neighbours differ by at most π.
 pub fn unwrap(phase_rad: &[f64]) -> Vec<f64> {
     let mut out = Vec::with_capacity(phase_rad.len());

@@ -20,7 +20,7 @@
 
 use crate::filter::{Band, butter, sosfiltfilt};
 use crate::imu::track::period_s;
-use crate::inputs::longest_step_s;
+use crate::inputs::stretches;
 use crate::phase::{hilbert, unwrap};
 use crate::spectrum::{rfft, rfft_magnitude};
 
@@ -74,8 +74,6 @@ pub struct Steps {
     pub step_s: Vec<f64>,
     /// Steps per second while walking: one over the mean interval, pauses left out, Hz.
     pub cadence_hz: f64,
-    /// Half the 95 % interval of the cadence, Hz.
-    pub cadence_ci95_hz: f64,
     /// Times of the phase, evenly spaced, s.
     pub t_s: Vec<f64>,
     /// Gait phase, unwrapped, 2π per step, rad; NaN where nobody walks, and in and beside holes.
@@ -125,19 +123,12 @@ pub fn steps_in(times: &[f64], norm: &[f64]) -> Result<Steps, StepError> {
         found = peaks(&m, f);
     }
     let (at, narrow) = found;
-    if at.len() < 3 {
-        return Err(StepError::NoWalking {
-            reason: "fewer than three steps stand out",
-        });
-    }
     let start = grid[0];
     let mut step_s: Vec<f64> = at.iter().map(|k| start + k / RATE_HZ).collect();
     // Nobody felt the steps in a hole, nor what the band draws beside it for half a step.
-    let longest_s = longest_step_s(times).max(BRIDGED_S);
-    let holes: Vec<(f64, f64)> = times
+    let holes: Vec<(f64, f64)> = stretches(times, BRIDGED_S)
         .windows(2)
-        .filter(|t| t[1] - t[0] > longest_s)
-        .map(|t| (t[0], t[1]))
+        .map(|parts| (times[parts[0].end - 1], times[parts[1].start]))
         .collect();
     step_s.retain(|t| !holes.iter().any(|(a, b)| (*a..=*b).contains(t)));
     if step_s.len() < 3 {
@@ -145,7 +136,7 @@ pub fn steps_in(times: &[f64], norm: &[f64]) -> Result<Steps, StepError> {
             reason: "fewer than three steps stand out",
         });
     }
-    let (cadence_hz, cadence_ci95_hz) = rate_of(&step_s);
+    let (cadence_hz, _) = rate_of(&step_s);
     let analytic = hilbert(&narrow);
     let wrapped: Vec<f64> = analytic.iter().map(|z| z.arg()).collect();
     let mut phase_rad = unwrap(&wrapped);
@@ -167,7 +158,6 @@ pub fn steps_in(times: &[f64], norm: &[f64]) -> Result<Steps, StepError> {
     Ok(Steps {
         step_s,
         cadence_hz,
-        cadence_ci95_hz,
         t_s: grid,
         phase_rad,
     })

@@ -7,7 +7,7 @@
 //! log's clock stays everybody's; its scatter does not get into the motion, whose height is two integrals of it.
 //! Source: the lower-envelope estimate of one-way delays, Moon, Skelly & Towsley, INFOCOM 1999.
 
-use crate::inputs::stretches;
+use crate::inputs::{mean_step_in, stretches};
 use crate::median::median;
 
 /// Stamps are believed where their steps scatter by less than this share of the log times' own scatter.
@@ -95,12 +95,7 @@ fn on_the_logs_clock(log_s: &[f64], stamp_s: &[f64]) -> Vec<f64> {
 /// Even times for samples that came in packets, stretch by stretch the least-squares line of time over number; with their usual and mean step.
 fn unpacked(log_s: &[f64]) -> Option<(Vec<f64>, f64, f64)> {
     let parts = stretches(log_s, 0.0);
-    let (mut span_s, mut steps) = (0.0, 0);
-    for part in &parts {
-        span_s += log_s[part.end - 1] - log_s[part.start];
-        steps += part.len() - 1;
-    }
-    let mean = span_s / steps as f64;
+    let mean = mean_step_in(log_s, &parts)?;
     let usual = median(&mut log_s.windows(2).map(|w| w[1] - w[0]).collect::<Vec<_>>())?;
     if !(usual < PACKETS * mean) {
         return None;

@@ -481,7 +481,7 @@ impl Columns {
         // Samples without a rate among others that have one are holes; a sensor that never gives one still tells steps.
         let mark = self.get(topic, GYRO_MARK).map(|s| &s.values[..]);
         let mark = mark.filter(|mark| mark.len() == n);
-        let marked = |k: usize| mark.is_some_and(|mark| mark.get(k) == Some(&-1.0));
+        let marked = |k: usize| mark.is_some_and(|mark| mark[k] == -1.0);
         let without = (0..n).filter(|k| marked(*k)).count();
         let turns = gyro.is_some() && without < n;
         if turns && without > 0 {

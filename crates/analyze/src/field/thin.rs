@@ -205,31 +205,39 @@ impl Sensor {
 mod tests {
     use super::*;
 
+    fn column<'a>(path: &'a str, values: &'a [f64]) -> recording::read::Column<'a> {
+        recording::read::Column {
+            id: 0,
+            path,
+            rows: None,
+            values,
+            finite: false,
+        }
+    }
+
+    fn batch<'a>(times_ns: &'a [i64], columns: &'a [recording::read::Column<'a>]) -> Batch<'a> {
+        Batch {
+            channel: 0,
+            topic: "/a",
+            schema: "",
+            times_ns,
+            stamps_ns: None,
+            columns,
+        }
+    }
+
     #[test]
     fn means_stand_for_samples_across_batches() {
         let mut sensor = Sensor::new(4);
         let mut x = Vec::new();
-        for batch in [3usize, 5, 1, 8] {
+        for length in [3usize, 5, 1, 8] {
             let from = x.len();
-            let values: Vec<f64> = (from..from + batch)
+            let values: Vec<f64> = (from..from + length)
                 .map(|k| if k == 6 { f64::NAN } else { k as f64 })
                 .collect();
-            let times_ns: Vec<i64> = (from..from + batch).map(|k| 1_000 * k as i64).collect();
-            let column = recording::read::Column {
-                id: 0,
-                path: "/a.linear_acceleration.x",
-                rows: None,
-                values: &values,
-                finite: false,
-            };
-            sensor.take(&Batch {
-                channel: 0,
-                topic: "/a",
-                schema: "",
-                times_ns: &times_ns,
-                stamps_ns: None,
-                columns: &[column],
-            });
+            let times_ns: Vec<i64> = (from..from + length).map(|k| 1_000 * k as i64).collect();
+            let columns = [column("/a.linear_acceleration.x", &values)];
+            sensor.take(&batch(&times_ns, &columns));
             x.extend(values);
         }
         let signals = sensor.signals("/a");
@@ -241,15 +249,6 @@ mod tests {
 
     #[test]
     fn of_a_sensor_that_turns_only_samples_with_a_rate_count() {
-        fn column<'a>(path: &'a str, values: &'a [f64]) -> recording::read::Column<'a> {
-            recording::read::Column {
-                id: 0,
-                path,
-                rows: None,
-                values,
-                finite: true,
-            }
-        }
         let times_ns: Vec<i64> = (0..8).collect();
         let values: Vec<f64> = (0..8).map(f64::from).collect();
         for (mark, left) in [
@@ -257,17 +256,11 @@ mod tests {
             ([-1.0; 8], vec![0.5, 2.5, 4.5, 6.5]),
         ] {
             let mut sensor = Sensor::new(2);
-            sensor.take(&Batch {
-                channel: 0,
-                topic: "/a",
-                schema: "",
-                times_ns: &times_ns,
-                stamps_ns: None,
-                columns: &[
-                    column("/a.linear_acceleration.x", &values),
-                    column("/a.angular_velocity_covariance[0]", &mark),
-                ],
-            });
+            let columns = [
+                column("/a.linear_acceleration.x", &values),
+                column("/a.angular_velocity_covariance[0]", &mark),
+            ];
+            sensor.take(&batch(&times_ns, &columns));
             let signals = sensor.signals("/a");
             let x = signals.iter().find(|s| s.path.ends_with(".x")).unwrap();
             assert_eq!(x.values, left);

@@ -19,7 +19,7 @@ use super::track::Track;
 use super::unloading::unloadings;
 use super::vertical;
 use crate::filter::{Band, butter, sosfiltfilt};
-use crate::inputs::{Inputs, Window, between, interpolate, mean_step_s};
+use crate::inputs::{Inputs, Window, between, interpolate, mean_step_in};
 use crate::median::median;
 use crate::metrics::{Datum, Metrics, Value, metrics_of, rival_hz};
 use crate::random::Random;
@@ -163,7 +163,7 @@ impl Motion {
         stretchwise_height(
             &self.accel_up_m_per_s2,
             &self.stretches,
-            mean_step_s(&self.inputs.t_s).unwrap_or_default(),
+            mean_step_in(&self.inputs.t_s, &self.stretches).unwrap_or_default(),
             corner_hz,
         )
     }
@@ -186,8 +186,8 @@ pub fn motion(track: &Track, settings: &Settings) -> Result<Motion, MotionError>
     whole.retain(|r| span_s(r) >= SHORTEST_S);
     let seen_s: f64 = whole.iter().map(span_s).sum();
     let left_out_s = track.t_s[track.len() - 1] - track.t_s[0] - seen_s;
-    let steps: usize = whole.iter().map(|r| r.len() - 1).sum();
-    let (usual_s, mean_s) = (track.period_s().unwrap_or(1.0), seen_s / steps as f64);
+    let usual_s = track.period_s().unwrap_or(1.0);
+    let mean_s = mean_step_in(&track.t_s, &whole).unwrap_or(1.0);
     // Samples in packets are as dense as their mean step, not as the usual one.
     let period_s = if mean_s > 1.5 * usual_s {
         mean_s
@@ -208,11 +208,12 @@ pub fn motion(track: &Track, settings: &Settings) -> Result<Motion, MotionError>
             found_m_per_s2: found,
         });
     }
+    let levelled = || level(&estimate, settings.level_over.range(&track.t_s));
     let body_from_sensor = match settings.mounting {
         Mounting::Known(rotation) => rotation,
-        Mounting::Levelled => level(&estimate, settings.level_over.range(&track.t_s)),
+        Mounting::Levelled => levelled(),
         Mounting::Walking => {
-            let level = level(&estimate, settings.level_over.range(&track.t_s));
+            let level = levelled();
             forward(&track, &estimate, &level, g) * level
         }
     };
@@ -221,17 +222,16 @@ pub fn motion(track: &Track, settings: &Settings) -> Result<Motion, MotionError>
         *q *= sensor_from_body;
     }
     let body = track.rotated(&body_from_sensor);
-    let mut force = Vec::with_capacity(body.len());
-    for stretch in &stretches {
-        let bias = &estimate.bias_rad_per_s[stretch.clone()];
-        let rates = body.gyro_rad_per_s[stretch.clone()].iter().zip(bias);
-        let rates = rates
-            .map(|(w, b)| Vector3::from(*w) - body_from_sensor * Vector3::from(*b))
-            .collect();
-        let felt = body.accel_m_per_s2[stretch.clone()].iter();
-        let felt = felt.map(|a| Vector3::from(*a)).collect();
-        force.extend(at_centre_of_mass(felt, rates, settings.lever_m, period_s));
-    }
+    let turning = body.gyro_rad_per_s.iter().zip(&estimate.bias_rad_per_s);
+    let rates: Vec<Vector3<f64>> = turning
+        .map(|(w, b)| Vector3::from(*w) - body_from_sensor * Vector3::from(*b))
+        .collect();
+    let felt: Vec<Vector3<f64>> = body.accel_m_per_s2.iter().map(|a| (*a).into()).collect();
+    let central = |r: &Range<usize>| {
+        let (felt, rates) = (&felt[r.clone()], &rates[r.clone()]);
+        at_centre_of_mass(felt, rates, settings.lever_m, period_s)
+    };
+    let force: Vec<Vector3<f64>> = stretches.iter().flat_map(central).collect();
     let n = body.len();
     let (mut roll_rad, mut pitch_rad) = (Vec::with_capacity(n), Vec::with_capacity(n));
     let (mut support_ratio, mut accel_up) = (Vec::with_capacity(n), Vec::with_capacity(n));
@@ -240,9 +240,7 @@ pub fn motion(track: &Track, settings: &Settings) -> Result<Motion, MotionError>
         let (roll, pitch, _) = q.euler_angles();
         roll_rad.push(roll);
         pitch_rad.push(pitch);
-        let rate = Vector3::from(body.gyro_rad_per_s[i])
-            - body_from_sensor * Vector3::from(estimate.bias_rad_per_s[i]);
-        let since = rate * -settings.orientation.accel_latency_s;
+        let since = rates[i] * -settings.orientation.accel_latency_s;
         let up = (q * UnitQuaternion::from_scaled_axis(since) * f).z;
         support_ratio.push(up / g);
         accel_up.push(up - g);
@@ -428,13 +426,13 @@ fn forward(
 
 /// Specific force at the centre of mass, in the body's axes, from that at the sensor and the angular velocity over one stretch.
 fn at_centre_of_mass(
-    force: Vec<Vector3<f64>>,
-    rates: Vec<Vector3<f64>>,
+    force: &[Vector3<f64>],
+    rates: &[Vector3<f64>],
     lever_m: [f64; 3],
     period_s: f64,
 ) -> Vec<Vector3<f64>> {
     if lever_m == [0.0; 3] {
-        return force;
+        return force.to_vec();
     }
     let r = Vector3::from(lever_m);
     let rates = below(rates, period_s);
@@ -456,9 +454,9 @@ fn at_centre_of_mass(
 }
 
 /// Fast sensors: without what lies above [`ACCELERATION_HZ`], where a derivative is noise only. Others as they are: the weights see to it.
-fn below(v: Vec<Vector3<f64>>, period_s: f64) -> Vec<Vector3<f64>> {
+fn below(v: &[Vector3<f64>], period_s: f64) -> Vec<Vector3<f64>> {
     if 1.0 / period_s < 5.0 * ACCELERATION_HZ {
-        return v;
+        return v.to_vec();
     }
     let smooth: [Vec<f64>; 3] = std::array::from_fn(|axis| {
         let x: Vec<f64> = v.iter().map(|w| w[axis]).collect();
@@ -847,9 +845,8 @@ mod tests {
         assert!(m.get("z_mean_m").unwrap().reason.is_some());
     }
 
-    #[test]
-    fn a_hole_takes_away_what_it_hides_and_nothing_else() {
-        let (track, roll, height, _) = twin([0.0; 3], UnitQuaternion::identity());
+    /// Most of a twin, whose samples are true at their stamps.
+    fn most() -> (Settings, Window) {
         let settings = Settings {
             orientation: Options::without_latency(),
             ..Settings::default()
@@ -858,6 +855,13 @@ mod tests {
             start_s: 5.0,
             end_s: 35.0,
         };
+        (settings, window)
+    }
+
+    #[test]
+    fn a_hole_takes_away_what_it_hides_and_nothing_else() {
+        let (track, roll, height, _) = twin([0.0; 3], UnitQuaternion::identity());
+        let (settings, window) = most();
         let true_deg = rms(roll[1000..7000].iter().copied()).to_degrees();
         let swing_m =
             height.iter().copied().fold(0.0, f64::max) - height.iter().copied().fold(0.0, f64::min);
@@ -900,14 +904,7 @@ mod tests {
     #[test]
     fn single_samples_may_be_lost() {
         let (track, roll, height, _) = twin([0.0; 3], UnitQuaternion::identity());
-        let settings = Settings {
-            orientation: Options::without_latency(),
-            ..Settings::default()
-        };
-        let window = Window {
-            start_s: 5.0,
-            end_s: 35.0,
-        };
+        let (settings, window) = most();
         let inner = 1000..7000;
         let truths = [
             (

@@ -35,17 +35,10 @@ pub fn t_float(c: &Context) -> Value {
             ratio.x.len(),
         ));
     }
-    let forces = c.forces();
-    let total: Vec<f64> = (0..forces.len())
-        .map(|k| forces.columns.iter().map(|n| n[k]).sum())
-        .collect();
-    let (weight_n, source) = match c.inputs.mass_kg {
-        Some(mass_kg) => (mass_kg * c.inputs.gravity_m_per_s2, String::new()),
-        // Over many strides what is carried neither rises nor falls: its weight is the mean support.
-        None => (
-            mean(&total),
-            "forces; M·g taken as the mean support".to_owned(),
-        ),
+    let (total, weight_n) = (c.total_force_n(), c.weight_n());
+    let source = match c.inputs.mass_kg {
+        Some(_) => String::new(),
+        None => "forces; M·g taken as the mean support".to_owned(),
     };
     Value::number(share(
         total

@@ -169,6 +169,22 @@ impl<'a> Context<'a> {
         })
     }
 
+    /// The sum of the handles' normal forces (N).
+    pub fn total_force_n(&self) -> Vec<f64> {
+        let forces = self.forces();
+        (0..forces.len())
+            .map(|k| forces.columns.iter().map(|n| n[k]).sum())
+            .collect()
+    }
+
+    /// M·g (N). Where no mass is known the mean support over the window: over many strides what is carried neither rises nor falls.
+    pub fn weight_n(&self) -> f64 {
+        match self.inputs.mass_kg {
+            Some(mass_kg) => mass_kg * self.inputs.gravity_m_per_s2,
+            None => super::contact::mean(&self.total_force_n()),
+        }
+    }
+
     /// The carriers' phases (rad).
     pub fn phases(&self) -> &Table<'a> {
         self.phases.get_or_init(|| {

@@ -6,7 +6,7 @@ use super::{Context, Value};
 use crate::inputs::mean_step_s;
 use crate::phase;
 use crate::steps::rate_of;
-use std::f64::consts::{PI, TAU};
+use std::f64::consts::TAU;
 
 /// How many surrogates the chance level of measured phases is made from.
 const SURROGATES: usize = 400;
@@ -81,7 +81,7 @@ pub fn beat_hz(c: &Context) -> Value {
     let (mut turned, mut sounds_s) = (0.0, 0.0);
     for (t, psi) in beat.t_s.windows(2).zip(beat.x.windows(2)) {
         if t[1] - t[0] <= longest_s {
-            turned += (psi[1] - psi[0] + PI).rem_euclid(TAU) - PI;
+            turned += phase::wrap(psi[1] - psi[0]);
             sounds_s += t[1] - t[0];
         }
     }

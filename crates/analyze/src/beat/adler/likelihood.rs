@@ -5,8 +5,9 @@ use super::unknowns::{
     BEGUN, BUILD_UP, ERROR, LEAST, MOST, N, NOISE, OFFSET, OWN, PULL, SHARED, place,
 };
 use super::walk::{WINDOW, Walk};
+use crate::phase::wrap;
 use nalgebra::{DMatrix, DVector};
-use std::f64::consts::{PI, TAU};
+use std::f64::consts::TAU;
 
 type Dual = dual::Dual<N>;
 
@@ -268,7 +269,7 @@ impl Score {
         error: Dual,
         c: usize,
     ) -> State {
-        let miss = (seen - mean.value + PI).rem_euclid(TAU) - PI;
+        let miss = wrap(seen - mean.value);
         let spread = variance + error;
         let inverse = spread.inverse();
         let weight = inverse.value;

@@ -28,9 +28,9 @@ mod unknowns;
 mod walk;
 
 use crate::inputs::Inputs;
+use crate::phase::wrap;
 use crate::spectrum::chi_square_quantile;
 use nalgebra::DVector;
-use std::f64::consts::{PI, TAU};
 use unknowns::{BUILD_UP, LEAST, MOST, OFFSET, OWN, PULL, place};
 use walk::Walk;
 
@@ -130,9 +130,7 @@ pub fn adler(
         noise_rad_per_sqrt_s: walk.noise(&x),
         detuning_rad_per_s: own.iter().map(|k| x[*k] - walk.omega_rad_per_s).collect(),
         detuning_half_rad_per_s: own.iter().map(|k| half(cover[(*k, *k)])).collect(),
-        offset_rad: (0..carriers)
-            .map(|c| (x[place(OFFSET, c)] + PI).rem_euclid(TAU) - PI)
-            .collect(),
+        offset_rad: (0..carriers).map(|c| wrap(x[place(OFFSET, c)])).collect(),
         beat_rad_per_s: walk.omega_rad_per_s,
     };
     let finite = best.value.is_finite() && cover.iter().all(|c| c.is_finite());

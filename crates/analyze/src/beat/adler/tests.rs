@@ -3,6 +3,7 @@
 use super::*;
 use crate::filter::{Band, butter, sosfiltfilt};
 use crate::random::Random;
+use std::f64::consts::TAU;
 
 /// Carriers about a beat of 2.15 Hz, for a minute.
 #[derive(Clone, Copy)]

@@ -2,10 +2,11 @@
 
 use super::unknowns::{BUILD_UP, ERROR, NOISE, OFFSET, OWN, PULL, SHARED, place};
 use crate::imu::track::period_s;
+use crate::inputs::placed;
 use crate::median::median;
-use crate::phase::unwrap;
+use crate::phase::{unwrap, wrap};
 use nalgebra::{DVector, Matrix3, Vector3};
-use std::f64::consts::{PI, TAU};
+use std::f64::consts::TAU;
 
 /// Step of the equation, s: short for any pull that is looked for.
 const STEP_S: f64 = 0.2;
@@ -71,24 +72,19 @@ impl Walk {
         let to = t_s.partition_point(|t| *t <= t_s[onset] + AFTER_S);
         let step_s = period_s(&t_s[from..to]).ok_or(TOO_LITTLE)?;
         if t_s[from..to].windows(2).any(|t| t[1] - t[0] > 1.5 * step_s) {
-            let t_s = &t_s[from..to];
-            let place = |t: f64| ((t - t_s[0]) / step_s).round() as usize;
-            let n = place(t_s[t_s.len() - 1]) + 1;
-            if n > 2 * t_s.len() {
+            let (t_s, beat) = (&t_s[from..to], &beat_rad[from..to]);
+            if (t_s[t_s.len() - 1] - t_s[0]) / step_s + 1.0 > 2.0 * t_s.len() as f64 {
                 return Err(TOO_LITTLE);
             }
-            let even: Vec<f64> = (0..n).map(|k| t_s[0] + k as f64 * step_s).collect();
-            let placed = |x: &[f64]| {
-                let mut out = vec![f64::NAN; n];
-                t_s.iter()
-                    .zip(&x[from..to])
-                    .for_each(|(t, x)| out[place(*t)] = *x);
-                out
-            };
-            let phases: Vec<Vec<f64>> = phase_rad.iter().map(|p| placed(p)).collect();
+            let phases: Vec<Vec<f64>> = phase_rad
+                .iter()
+                .map(|p| placed(t_s, &p[from..to], step_s, f64::NAN))
+                .collect();
             let phases: Vec<&[f64]> = phases.iter().map(|p| &p[..]).collect();
-            let beat = played_on(t_s, &beat_rad[from..to], &even);
-            return Walk::new(&even, &phases, &beat, measured);
+            let even: Vec<f64> = (0..phases[0].len())
+                .map(|k| t_s[0] + k as f64 * step_s)
+                .collect();
+            return Walk::new(&even, &phases, &played_on(t_s, beat, &even), measured);
         }
         let hop = (STEP_S / step_s).round().max(1.0) as usize;
         let first = onset - (onset - from) / hop * hop;
@@ -224,16 +220,15 @@ fn onset(t_s: &[f64], beat_rad: &[f64]) -> Result<usize, &'static str> {
 /// The beat's phase on an even axis, rad: through messages that were lost between two of a beat it goes on at its usual rate, to the nearest
 /// turn. NaN where none sounds, and in holes longer than [`COUNTED_S`].
 fn played_on(t_s: &[f64], beat_rad: &[f64], even: &[f64]) -> Vec<f64> {
-    let wrapped = |x: f64| (x + PI).rem_euclid(TAU) - PI;
     let pairs = || t_s.windows(2).zip(beat_rad.windows(2));
-    let rate = |(t, b): (&[f64], &[f64])| wrapped(b[1] - b[0]) / (t[1] - t[0]);
+    let rate = |(t, b): (&[f64], &[f64])| wrap(b[1] - b[0]) / (t[1] - t[0]);
     let mut rates: Vec<f64> = pairs().map(rate).filter(|r| r.is_finite()).collect();
     let usual = median(&mut rates).unwrap_or(f64::NAN);
     let mut out = vec![f64::NAN; even.len()];
     let mut k = 0;
     for (t, b) in pairs() {
         let width = t[1] - t[0];
-        let turned = usual * width + wrapped(b[1] - b[0] - usual * width);
+        let turned = usual * width + wrap(b[1] - b[0] - usual * width);
         while k < even.len() && even[k] <= t[1] {
             let share = (even[k] - t[0]) / width;
             if width <= COUNTED_S {
