@@ -30,8 +30,9 @@ pub fn angles(x: f64, y: f64, z: f64, w: f64) -> [f64; 3] {
 /// Finds the quaternions among a batch's columns.
 #[derive(Default)]
 pub(crate) struct Quaternions {
-    /// By channel: paths of the three angles, and the positions of x, y, z, w in batches with so many columns.
-    known: HashMap<usize, (usize, Vec<Found>)>,
+    /// By channel: the columns of a batch, each with whether every message has it, and what was found among them. Another batch of the channel
+    /// may have others, or the same in another order.
+    known: HashMap<usize, (Vec<(usize, bool)>, Vec<Found>)>,
     values: [Vec<f64>; 3],
 }
 
@@ -43,19 +44,10 @@ struct Found {
 impl Quaternions {
     /// Gives path and values of every angle of every quaternion in the batch.
     pub fn each(&mut self, batch: &Batch<'_>, mut sink: impl FnMut(&str, &[f64])) {
-        let entry = self
-            .known
-            .entry(batch.channel)
-            .or_insert_with(|| (usize::MAX, Vec::new()));
-        let fits = entry.0 == batch.columns.len()
-            && entry.1.iter().all(|f| {
-                f.columns
-                    .iter()
-                    .zip("xyzw".chars())
-                    .all(|(c, last)| batch.columns[*c].path.ends_with(last))
-            });
-        if !fits {
-            *entry = (batch.columns.len(), find(batch));
+        let entry = self.known.entry(batch.channel).or_default();
+        let columns = || batch.columns.iter().map(|c| (c.id, c.rows.is_none()));
+        if !entry.0.iter().copied().eq(columns()) {
+            *entry = (columns().collect(), find(batch));
         }
         for found in &entry.1 {
             let [x, y, z, w] = found.columns.map(|c| batch.columns[c].values);
@@ -100,6 +92,40 @@ fn find(batch: &Batch<'_>) -> Vec<Found> {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn what_a_batch_lacks_or_has_elsewhere_is_looked_for_again() {
+        let one = [1.0];
+        let column = |id: usize, rows| recording::read::Column {
+            id,
+            path: ["/a.q.x", "/a.q.y", "/a.q.z", "/a.q.w", "/a.p.w"][id],
+            rows,
+            values: &one,
+            finite: true,
+        };
+        let mut quaternions = Quaternions::default();
+        let mut found = |columns: &[recording::read::Column<'_>]| {
+            let batch = Batch {
+                channel: 0,
+                topic: "/a",
+                schema: "",
+                times_ns: &[0],
+                stamps_ns: None,
+                columns,
+            };
+            let mut count = 0;
+            quaternions.each(&batch, |path, _| {
+                count += usize::from(path.starts_with("/a.q."))
+            });
+            count
+        };
+        let rows = [0];
+        let first = [0, 1, 2, 4, 3].map(|id| column(id, (id == 1).then_some(&rows[..])));
+        assert_eq!(found(&first), 0, "y is not in every message");
+        assert_eq!(found(&[0, 1, 2, 4, 3].map(|id| column(id, None))), 3);
+        assert_eq!(found(&[4, 3, 2, 1, 0].map(|id| column(id, None))), 3);
+        assert_eq!(found(&[0, 1, 2, 4].map(|id| column(id, None))), 0);
+    }
 
     #[test]
     fn angles_come_back_from_the_quaternion_they_made() {
