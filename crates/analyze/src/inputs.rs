@@ -168,12 +168,30 @@ pub fn longest_step_s(t_s: &[f64]) -> f64 {
     if steps.is_empty() {
         return f64::INFINITY;
     }
-    let k = (steps.len() - 1) * 19 / 20;
+    let k = usual(steps.len() - 1);
     HOLE * *steps.select_nth_unstable_by(k, f64::total_cmp).1
+}
+
+/// Rank of the step that 95 % do not exceed, of ranks up to `last`.
+fn usual(last: usize) -> usize {
+    last * 19 / 20
+}
+
+/// Whether an axis has no hole, told without sorting its steps.
+fn whole(t_s: &[f64]) -> bool {
+    let steps = || t_s.windows(2).map(|w| HOLE * (w[1] - w[0]));
+    let Some(last) = t_s.len().checked_sub(2) else {
+        return false;
+    };
+    let longest = steps().fold(0.0, f64::max) / HOLE;
+    steps().filter(|step| *step >= longest).count() > last - usual(last)
 }
 
 /// The parts of an ascending time axis between its holes, as ranges of samples; steps up to `least_s` are never one.
 pub fn stretches(t_s: &[f64], least_s: f64) -> Vec<Range<usize>> {
+    if whole(t_s) {
+        return vec![0..t_s.len()];
+    }
     let longest_s = longest_step_s(t_s).max(least_s);
     let mut out = Vec::new();
     let mut start = 0;

@@ -2,14 +2,16 @@
 //!
 //! `RATH_HOSTILE_ROUNDS=100000 cargo test --release -p recording --test hostile` goes on for longer.
 
+mod common;
+
 use std::{
     collections::BTreeMap,
-    io::{self, Read, Write},
+    io::{self, Read},
     path::PathBuf,
-    sync::{Arc, Mutex},
     time::Instant,
 };
 
+use common::Shared;
 use recording::{
     Kind,
     read::{ChannelInfo, ReadOptions, Recording},
@@ -122,20 +124,6 @@ fn files_changed_at_random() {
     }
 }
 
-#[derive(Clone, Default)]
-struct Shared(Arc<Mutex<Vec<u8>>>);
-
-impl Write for Shared {
-    fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
-        self.0.lock().expect("unpoisoned").extend_from_slice(bytes);
-        Ok(bytes.len())
-    }
-
-    fn flush(&mut self) -> io::Result<()> {
-        Ok(())
-    }
-}
-
 /// Schemas and messages changed at random, in a container that is sound: what every decoder is up against.
 #[test]
 fn schemas_and_messages_changed_at_random() {
@@ -176,7 +164,7 @@ fn schemas_and_messages_changed_at_random() {
             }
         }
         writer.finish().expect("finishes");
-        let bytes = shared.0.lock().expect("unpoisoned").clone();
+        let bytes = shared.take();
         read(bytes);
     }
 }
@@ -200,7 +188,7 @@ fn numbers(info: &ChannelInfo, messages: &[Vec<u8>], first: i64) -> (Vec<(String
         writer.message(channel, t_ns, message).expect("writes");
     }
     writer.finish().expect("finishes");
-    let bytes = shared.0.lock().expect("unpoisoned").clone();
+    let bytes = shared.take();
     let recording = Recording::from_bytes(bytes, &ReadOptions::default()).expect("opens");
     let (signals, findings) = recording.signals(&|_| true).expect("reads");
     let mut numbers = Vec::new();
@@ -300,7 +288,7 @@ fn schemas_that_explode_are_refused() {
             .message(channel, 0, message.as_slice())
             .expect("writes");
         writer.finish().expect("finishes");
-        let bytes = shared.0.lock().expect("unpoisoned").clone();
+        let bytes = shared.take();
         let recording = Recording::from_bytes(bytes, &ReadOptions::default()).expect("opens");
         let (signals, findings) = recording.signals(&|_| true).expect("reads");
         assert!(signals.is_empty());

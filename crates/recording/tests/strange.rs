@@ -1,11 +1,10 @@
 //! Sound files with strange content: each oddity is said once, with topic, count and time; and files at the edges of the format.
 
-use std::{
-    collections::BTreeMap,
-    io::{self, Write},
-    sync::{Arc, Mutex},
-};
+mod common;
 
+use std::collections::BTreeMap;
+
+use common::Shared;
 use prost::Message as _;
 use prost_types::{
     DescriptorProto, FieldDescriptorProto, FileDescriptorProto, FileDescriptorSet, MessageOptions,
@@ -18,26 +17,12 @@ use recording::{
     write::{RawChannel, RecordingWriter, WriterOptions},
 };
 
-#[derive(Clone, Default)]
-struct Shared(Arc<Mutex<Vec<u8>>>);
-
-impl Write for Shared {
-    fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
-        self.0.lock().expect("unpoisoned").extend_from_slice(bytes);
-        Ok(bytes.len())
-    }
-
-    fn flush(&mut self) -> io::Result<()> {
-        Ok(())
-    }
-}
-
 fn recording(options: &WriterOptions, fill: impl FnOnce(&mut RecordingWriter)) -> Recording {
     let shared = Shared::default();
     let mut writer = RecordingWriter::to_stream(shared.clone(), options).expect("begins");
     fill(&mut writer);
     writer.finish().expect("finishes");
-    let bytes = shared.0.lock().expect("unpoisoned").clone();
+    let bytes = shared.take();
     Recording::from_bytes(bytes, &ReadOptions::default()).expect("opens")
 }
 

@@ -1,15 +1,16 @@
 //! What the writer promises: the same bytes for the same content, the whole file or none, a killed program's chunks readable.
 
+mod common;
+
 use std::{
     collections::BTreeMap,
-    fs,
-    io::{self, Write},
+    fs, io,
     path::Path,
     process::{Command, Stdio},
-    sync::{Arc, Mutex},
     time::Duration,
 };
 
+use common::Shared;
 use recording::{
     cdr,
     read::{ReadOptions, Recording},
@@ -44,21 +45,6 @@ fn fill(writer: &mut RecordingWriter, messages: i64) -> Result<(), WriteError> {
     Ok(())
 }
 
-/// A stream whose bytes can be looked at afterwards.
-#[derive(Clone, Default)]
-struct Shared(Arc<Mutex<Vec<u8>>>);
-
-impl Write for Shared {
-    fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
-        self.0.lock().expect("unpoisoned").extend_from_slice(bytes);
-        Ok(bytes.len())
-    }
-
-    fn flush(&mut self) -> io::Result<()> {
-        Ok(())
-    }
-}
-
 /// By the caller's thread, and by one of its own.
 fn both_ways() -> [WriterOptions; 2] {
     [WriterOptions::default(), WriterOptions::beside()]
@@ -89,7 +75,7 @@ fn a_thread_of_its_own_writes_the_same_bytes() {
             }
         }
         writer.finish().expect("finishes");
-        std::mem::take(&mut *shared.0.lock().expect("unpoisoned"))
+        shared.take()
     });
     assert!(here == beside);
     let messages = mcap::MessageStream::new(&beside).expect("opens");
@@ -110,7 +96,7 @@ fn the_same_content_gives_the_same_bytes_to_a_file_and_to_a_stream() {
     fill(&mut writer, 5000).expect("writes");
     writer.finish().expect("finishes");
     let bytes = fs::read(&path).expect("reads");
-    assert!(bytes == *shared.0.lock().expect("unpoisoned"));
+    assert!(bytes == shared.take());
     assert_eq!(fs::read_dir(folder.path()).expect("lists").count(), 1);
 
     let recording = Recording::open(&path, &ReadOptions::default()).expect("opens");

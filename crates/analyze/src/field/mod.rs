@@ -20,6 +20,7 @@ use crate::beat::lock::beat_phase;
 use crate::beat::tempo_of;
 use crate::events::Event;
 use crate::imu::Track;
+use crate::imu::interval;
 use crate::imu::orientation::Options;
 use crate::imu::rath::{self, Motion, Settings};
 use crate::imu::unloading::unloadings;
@@ -319,7 +320,7 @@ impl Field {
             Metrics::default()
         };
         for (name, value) in &mut metrics.0 {
-            let ours = if rath::gives(name) {
+            let ours = if interval::gives(name) {
                 self.filled.motion
             } else {
                 self.filled.phases && carriers::gives(name)
@@ -328,7 +329,7 @@ impl Field {
                 *value = v.clone();
             }
             if let Some(why) = &self.no_motion
-                && rath::gives(name)
+                && interval::gives(name)
                 && value.reason.is_some()
                 && value.as_f64().is_none()
                 && value.as_word().is_none()
@@ -360,7 +361,7 @@ impl Field {
     fn estimated(&self, window: Window) -> Metrics {
         let mut out = Metrics::default();
         if let Some(motion) = &self.motion {
-            out = rath::metrics(motion, window);
+            out = interval::metrics(motion, window);
         }
         if (self.filled.phases || self.judge.is_some())
             && let Some((t_s, phases)) = self.carriers.phases()

@@ -5,7 +5,7 @@ use std::collections::BTreeMap;
 use recording::Signal;
 use recording::read::{Batch, ReadError, Recording};
 
-use super::{ACCEL, GYRO, GYRO_MARK};
+use super::{ACCEL, GYRO, GYRO_MARK, STAMP};
 use crate::roles::{Role, Roles};
 
 /// Bytes that the estimates hold per sample of the rath's sensor, and of a carrier's (measured; they hold many columns at once).
@@ -53,7 +53,7 @@ pub fn factors(recording: &Recording, roles: &Roles) -> Result<BTreeMap<String, 
     Err(factors.keys().map(|topic| messages(topic)).sum())
 }
 
-/// The inertial columns of the topics whose factor is above 1: means over so many samples in the order of the file, at log times. Samples that are
+/// The inertial columns and stamps of the topics whose factor is above 1: means over so many samples in the order of the file, at log times. Samples that are
 /// not finite are left out, and of a sensor that gives angular velocities those without one.
 pub fn read(
     recording: &Recording,
@@ -89,8 +89,10 @@ pub fn read(
         .collect())
 }
 
-/// What is averaged.
-const COLUMNS: [&str; 6] = [GYRO[0], GYRO[1], GYRO[2], ACCEL[0], ACCEL[1], ACCEL[2]];
+/// What is averaged. A mean of whole seconds near 2·10⁹ is good to 10⁻⁷ s.
+const COLUMNS: [&str; 8] = [
+    GYRO[0], GYRO[1], GYRO[2], ACCEL[0], ACCEL[1], ACCEL[2], STAMP[0], STAMP[1],
+];
 
 /// One sensor on the way.
 struct Sensor {
@@ -99,11 +101,11 @@ struct Sensor {
     count: usize,
     first_ns: i64,
     since_ns: i64,
-    sums: [f64; 6],
+    sums: [f64; COLUMNS.len()],
     times_ns: Vec<i64>,
-    columns: [Vec<f64>; 6],
+    columns: [Vec<f64>; COLUMNS.len()],
     /// The columns that the sensor has.
-    has: [bool; 6],
+    has: [bool; COLUMNS.len()],
     /// Samples that say they have no angular velocity, and whether there are others.
     marked: usize,
     turns: bool,
@@ -116,17 +118,17 @@ impl Sensor {
             count: 0,
             first_ns: 0,
             since_ns: 0,
-            sums: [0.0; 6],
+            sums: [0.0; COLUMNS.len()],
             times_ns: Vec::new(),
             columns: Default::default(),
-            has: [false; 6],
+            has: [false; COLUMNS.len()],
             marked: 0,
             turns: false,
         }
     }
 
     fn take(&mut self, batch: &Batch<'_>) {
-        let mut parts: [Option<&[f64]>; 6] = [None; 6];
+        let mut parts: [Option<&[f64]>; COLUMNS.len()] = [None; COLUMNS.len()];
         let mut mark: Option<&[f64]> = None;
         for column in batch.columns {
             let field = column.path.get(batch.topic.len() + 1..).unwrap_or_default();
@@ -159,7 +161,7 @@ impl Sensor {
                 false => self.turns = true,
             }
             if self.count == 0 {
-                (self.first_ns, self.since_ns, self.sums) = (t_ns, 0, [0.0; 6]);
+                (self.first_ns, self.since_ns, self.sums) = (t_ns, 0, [0.0; COLUMNS.len()]);
             }
             self.count += 1;
             self.since_ns = self.since_ns.wrapping_add(t_ns.wrapping_sub(self.first_ns));
@@ -245,6 +247,37 @@ mod tests {
         // 0 1 2 3, 4 5 7 8, 9 10 11 12, 13 14 15 16.
         assert_eq!(signals[0].values, [1.5, 6.0, 10.5, 14.5]);
         assert_eq!(*signals[0].times_ns, [1_500, 6_000, 10_500, 14_500]);
+    }
+
+    #[test]
+    fn stamps_are_thinned_with_their_samples() {
+        let stamps_ns: Vec<i64> = (0..12)
+            .map(|k| 1_764_000_000_900_000_000 + 10_000_000 * k)
+            .collect();
+        let times_ns: Vec<i64> = stamps_ns.iter().map(|s| s + 7).collect();
+        let of =
+            |f: fn(&i64) -> i64| -> Vec<f64> { stamps_ns.iter().map(|s| f(s) as f64).collect() };
+        let (x, sec) = (vec![0.0; 12], of(|s| s / 1_000_000_000));
+        let nanosec = of(|s| s % 1_000_000_000);
+        let mut sensor = Sensor::new(3);
+        let columns = [
+            column("/a.linear_acceleration.x", &x),
+            column("/a.header.stamp.sec", &sec),
+            column("/a.header.stamp.nanosec", &nanosec),
+        ];
+        sensor.take(&batch(&times_ns, &columns));
+        let signals = sensor.signals("/a");
+        let of = |field: &str| {
+            &signals
+                .iter()
+                .find(|s| s.path.ends_with(field))
+                .unwrap()
+                .values
+        };
+        for (k, (sec, nanosec)) in of("stamp.sec").iter().zip(of("nanosec")).enumerate() {
+            let since = (sec - 1_764_000_000.0) + nanosec / 1e9;
+            assert!((since - (0.91 + 0.03 * k as f64)).abs() < 1e-6, "{since}");
+        }
     }
 
     #[test]

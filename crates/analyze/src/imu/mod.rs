@@ -8,10 +8,12 @@
 //! | [`track`] | a clean series of samples out of whatever columns a file had |
 //! | [`orientation`] | sensor → earth (z up), causal and batch |
 //! | [`vertical`] | height by drift-free double integration, with its valid band |
-//! | [`rath`] | the body's motion and every metric that rests on it, with intervals |
+//! | [`rath`] | the body's motion |
+//! | [`interval`] | every metric that rests on the motion, with its interval |
 //! | [`unloading`] | when the support falls below a share of the weight |
 //! | [`truth`] | errors against a recorded truth |
 
+pub mod interval;
 pub mod orientation;
 pub mod rath;
 pub mod track;

@@ -1,4 +1,4 @@
-//! The paper's metrics from one inertial sensor on what is carried.
+//! The motion of what is carried, from one inertial sensor on it.
 //!
 //! ```text
 //! f_com = f − ( α × r + ω × (ω × r) )        specific force at the centre of mass
@@ -9,20 +9,14 @@
 //! derivative [rad/s²], R body → earth, g gravity [m/s²]. Only contact lifts the body, so its specific force *is* the support force over its
 //! mass: no force sensor is needed for T_float. With r unknown (0) the term in brackets stays in, up to r·ω² and r·α.
 //!
-//! What an inertial sensor cannot give: mean height, heading, forces of single handles. Those stay missing, with the reason.
-//!
-//! Intervals: the estimated columns are varied within the [`Budget`] of what the sensor and the method leave uncertain, and sampled
-//! at the paper's 30 Hz with a random phase; the metric's spread over the draws is its standard error, 1.96 of which are given.
+//! What an inertial sensor cannot give: mean height, heading, forces of single handles. Those stay missing, with the reason. The numbers made of it, and how sure they are: [`super::interval`].
 
+use super::interval::Budget;
 use super::orientation::{self, Estimate, Options};
 use super::track::Track;
-use super::unloading::unloadings;
 use super::vertical;
 use crate::filter::{Band, butter, sosfiltfilt};
-use crate::inputs::{Inputs, Window, between, interpolate, mean_step_in};
-use crate::median::median;
-use crate::metrics::{Datum, Metrics, Value, metrics_of, rival_hz};
-use crate::random::Random;
+use crate::inputs::{Inputs, Window, interpolate, mean_step_in};
 use nalgebra::{UnitQuaternion, Vector3};
 use std::ops::Range;
 
@@ -37,43 +31,6 @@ pub enum Mounting {
     Known(UnitQuaternion<f64>),
     /// Up as in `Levelled`, forward from the first steps out of standstill.
     Walking,
-}
-
-/// What the sensor and the method leave uncertain, one standard deviation each.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Budget {
-    /// Roll and pitch: constant part, rad.
-    pub tilt_offset_rad: f64,
-    /// Roll and pitch: part that wanders over seconds, rad.
-    pub tilt_wander_rad: f64,
-    /// Angles: relative (gyroscope's scale).
-    pub angle_scale: f64,
-    /// Height: relative (accelerometer's scale, band).
-    pub height_scale: f64,
-    /// Height: wandering over seconds, m.
-    pub height_wander_m: f64,
-    /// Support ratio: constant part (accelerometer's bias over g).
-    pub support_offset: f64,
-    /// Support ratio: relative.
-    pub support_scale: f64,
-    /// Support ratio: from sample to sample.
-    pub support_noise: f64,
-}
-
-impl Default for Budget {
-    /// A calibrated MEMS sensor; checked against simulated twins (docs/field.md).
-    fn default() -> Self {
-        Self {
-            tilt_offset_rad: 0.11f64.to_radians(),
-            tilt_wander_rad: 0.05f64.to_radians(),
-            angle_scale: 0.003,
-            height_scale: 0.01,
-            height_wander_m: 0.002,
-            support_offset: 0.004,
-            support_scale: 0.002,
-            support_noise: 0.016,
-        }
-    }
 }
 
 /// How a recording is to be read.
@@ -477,294 +434,12 @@ pub(crate) const ENDS: f64 = 0.5;
 /// The same beside a hole, where the window has no say in what is looked at.
 pub(crate) const BESIDE_HOLES: f64 = 0.8;
 
-/// Number of draws behind an interval.
-const DRAWS: usize = 40;
-/// Seed of the draws: the same recording gives the same interval.
-const SEED: u64 = 0x7261_7468;
-/// How long what wanders stays alike, s.
-const WANDER_S: f64 = 3.0;
-/// Metrics that an inertial sensor cannot give, and why.
-const BEYOND: &[(&str, &str)] = &[
-    (
-        "z_mean_m",
-        "an inertial sensor does not see the mean height",
-    ),
-    ("rms_yaw_deg", "heading without a magnetometer drifts"),
-];
-/// Metrics that rest on the motion columns: those that get an interval.
-const FROM_MOTION: &[&str] = &[
-    "rms_roll_deg",
-    "rms_pitch_deg",
-    "onset_time_s",
-    "unstable",
-    "roll_excess_s",
-    "dz_pp_m",
-    "rms_z_m",
-    "z_mean_m",
-    "rms_yaw_deg",
-    "t_float",
-    "peak_hz",
-    "h2_ratio",
-    "roll_peak_hz",
-    "subharmonic_ratio",
-    "growth_ratio",
-    "mechanism",
-];
-
-/// Whether a metric is one of those that [`metrics`] gives.
-pub fn gives(name: &str) -> bool {
-    FROM_MOTION.contains(&name)
-}
-
-/// Every metric that rests on the motion alone, over `window`, each number with its 95 % interval.
-pub fn metrics(motion: &Motion, window: Window) -> Metrics {
-    let mut out = metrics_of(&motion.inputs, window, gives);
-    let draws: Vec<Metrics> = (0..DRAWS)
-        .map(|k| {
-            metrics_of(&varied(motion, window, k as u64), Window::ALL, |name| {
-                gives(name) && name != "mechanism"
-            })
-        })
-        .collect();
-    let range = window.range(&motion.inputs.t_s);
-    let support_ratio = &motion.inputs.support_ratio[range];
-    for (name, value) in &mut out.0 {
-        if let Some((_, why)) = BEYOND.iter().find(|(n, _)| n == name) {
-            *value = Value {
-                unit: value.unit,
-                ..Value::missing(*why).source("imu")
-            };
-            continue;
-        }
-        let Datum::Number(x) = value.datum else {
-            continue;
-        };
-        let drawn: Vec<f64> = draws.iter().filter_map(|d| d.number(name)).collect();
-        if drawn.len() < DRAWS / 2 {
-            continue;
-        }
-        // About the estimate, not about the draws' mean: what the draws add on average is theirs.
-        if MEAN_SQUARES.contains(name) {
-            let (root, ci95) = without_noise(x, &drawn);
-            value.datum = Datum::Number(root);
-            value.ci95 = Some(ci95);
-            if !matches!(motion.settings.mounting, Mounting::Known(_)) {
-                value.reason = Some("about its mean over the window: how the sensor sits cannot be told from how the load leans; give mounting_roll_pitch_yaw_deg in a roles file".into());
-            }
-            continue;
-        }
-        let x = match *name {
-            "t_float" => floating(support_ratio),
-            _ => x,
-        };
-        let half =
-            1.96 * (variance(&drawn) + beyond_the_budget(name, motion, window).powi(2)).sqrt();
-        value.datum = Datum::Number(x);
-        // None of them is below nothing, and a share is one at most.
-        let most = if *name == "t_float" {
-            1.0
-        } else {
-            f64::INFINITY
-        };
-        value.ci95 = Some([(x - half).max(0.0), (x + half).min(most)]);
-    }
-    if out
-        .number("rms_roll_deg")
-        .is_some_and(|roll| roll.to_radians() < SEEN * motion.settings.budget.tilt_offset_rad)
-    {
-        for (name, value) in &mut out.0 {
-            if OF_ROLL.contains(name) {
-                *value = Value {
-                    unit: value.unit,
-                    ..Value::missing("so small a roll has no line that the sensor could tell from its own wandering").source("imu")
-                };
-            }
-        }
-    }
-    out
-}
-
-/// Roots of mean squares, to which noise adds and from which it never takes.
-const MEAN_SQUARES: &[&str] = &["rms_roll_deg", "rms_pitch_deg"];
-
-/// A root mean square without what noise added to it, and its 95 % interval: the same noise, `drawn`, adds as much once more.
-///
-/// ```text
-/// s = 2 x² − ⟨d²⟩,    x' = √s,    √(s ± 1.96 SD(d²)),    none below 0
-/// ```
-/// x as estimated, d as drawn about it. Source: Cook & Stefanski, "Simulation-extrapolation estimation", J. Am. Stat. Assoc. 89 (1994), to first
-/// order in the noise's power.
-fn without_noise(x: f64, drawn: &[f64]) -> (f64, [f64; 2]) {
-    let squares: Vec<f64> = drawn.iter().map(|d| d * d).collect();
-    let noisier = squares.iter().sum::<f64>() / squares.len() as f64;
-    let square = 2.0 * x * x - noisier;
-    let half = 1.96 * variance(&squares).sqrt();
-    let root = |square: f64| square.max(0.0).sqrt();
-    (root(square), [root(square - half), root(square + half)])
-}
-
-/// Share of samples with a support of a twentieth of the weight or less, without what noise makes of it: where the support stays a little below
-/// that for long and passes above it fast, noise takes more samples out than it brings in. The same noise takes out as much once more.
-///
-/// ```text
-/// 2 ⟨s ≤ c⟩ − ⟨Φ((c − s)/σ)⟩,    σ = median |s₋₁ − 2 s₀ + s₊₁| / (0.6745 √6)
-/// ```
-/// c = 0.05; the median is of samples up to 2c, where little else bends; σ takes the noise for white. Source: as [`without_noise`].
-fn floating(support_ratio: &[f64]) -> f64 {
-    let n = support_ratio.len() as f64;
-    let c = crate::metrics::FLOAT_SHARE;
-    let counted = support_ratio.iter().filter(|s| **s <= c).count() as f64 / n;
-    let mut bends: Vec<f64> = support_ratio
-        .windows(3)
-        .filter(|w| w.iter().all(|s| s.abs() <= 2.0 * c))
-        .map(|w| (w[0] - 2.0 * w[1] + w[2]).abs())
-        .collect();
-    let sigma = median(&mut bends).unwrap_or(0.0) / (0.6745 * 6f64.sqrt());
-    if !(sigma > 0.0) {
-        return counted;
-    }
-    let blurred = support_ratio
-        .iter()
-        .map(|s| 0.5 * libm::erfc((s - c) / (sigma * std::f64::consts::SQRT_2)))
-        .sum::<f64>()
-        / n;
-    (2.0 * counted - blurred).clamp(0.0, 1.0)
-}
-
-/// Of a sample about its mean.
-fn variance(x: &[f64]) -> f64 {
-    let mean = x.iter().sum::<f64>() / x.len() as f64;
-    x.iter().map(|x| (x - mean).powi(2)).sum::<f64>() / (x.len() as f64 - 1.0).max(1.0)
-}
-
-/// Metrics of the roll's lines.
-const OF_ROLL: &[&str] = &["roll_peak_hz", "subharmonic_ratio"];
-/// RMS roll from which its lines are looked for, in standard deviations of the tilt's constant error.
-const SEEN: f64 = 5.0;
-
-/// How far an edge of the support is moved by what smooths it, samples.
-const EDGE_SAMPLES: f64 = 0.1;
-
-/// Standard error of a metric that no draw shows, in its own unit: what the window holds and the estimate does not.
-fn beyond_the_budget(name: &str, motion: &Motion, window: Window) -> f64 {
-    let inputs = &motion.inputs;
-    let range = window.range(&inputs.t_s);
-    let seen: Vec<f64> = inputs.height_m[range.clone()]
-        .iter()
-        .copied()
-        .filter(|z| z.is_finite())
-        .collect();
-    let Some(period_s) = super::track::period_s(&inputs.t_s) else {
-        return 0.0;
-    };
-    match name {
-        // Lines sit on bins of 1/T, and the estimate's T is shorter than the window's: up to half a bin each, evenly spread.
-        "peak_hz" | "roll_peak_hz" if !seen.is_empty() => {
-            let bin = 0.5 / (seen.len() as f64 * period_s) / 3f64.sqrt() * 2f64.sqrt();
-            let x = if name == "peak_hz" {
-                &inputs.height_m[range.clone()]
-            } else {
-                &inputs.roll_rad[range.clone()]
-            };
-            let all = inputs.t_s[range].iter().zip(x);
-            let (t_s, x): (Vec<f64>, Vec<f64>) = all.filter(|(_, x)| x.is_finite()).unzip();
-            bin.hypot(rival_hz(&t_s, &x) / 1.96)
-        }
-        // The definition counts samples at 30 Hz; others of the same motion come up to one of them later, evenly spread.
-        "onset_time_s" => (1.0 / 30.0) / 3f64.sqrt(),
-        // The weights 1, 2, 1 move a touch-down by a part of a sample, all of them to the same side (docs/field.md: twins at 100 and 200 Hz).
-        "t_float" if motion.settings.lever_m != [0.0; 3] => {
-            let (t_s, ratio) = (&inputs.t_s[range.clone()], &inputs.support_ratio[range]);
-            let length_s = t_s.len().max(1) as f64 * period_s;
-            let edges = 2 * unloadings(t_s, ratio).len();
-            EDGE_SAMPLES * edges as f64 * period_s / length_s
-        }
-        // The ends have no height. Stretches of their length swing so much more or less than the whole.
-        "rms_z_m" => {
-            let lost = range.len() - seen.len();
-            let mean = seen.iter().sum::<f64>() / seen.len().max(1) as f64;
-            let power = |z: &[f64]| {
-                z.iter().map(|z| (z - mean).powi(2)).sum::<f64>() / z.len().max(1) as f64
-            };
-            let whole = power(&seen);
-            if lost < 2 || whole <= 0.0 {
-                return 0.0;
-            }
-            let parts: Vec<f64> = seen.chunks_exact(lost.min(seen.len())).map(power).collect();
-            let spread = (parts.iter().map(|p| (p - whole).powi(2)).sum::<f64>()
-                / parts.len().max(1) as f64)
-                .sqrt();
-            lost as f64 / range.len() as f64 * spread / (2.0 * whole.sqrt())
-        }
-        _ => 0.0,
-    }
-}
-
-/// The window's columns as they might have come out of an equally good sensor, at 30 Hz.
-fn varied(motion: &Motion, window: Window, draw: u64) -> Inputs {
-    let budget = &motion.settings.budget;
-    let mut random = Random(SEED ^ (draw.wrapping_add(1)).wrapping_mul(0x9e37_79b9_7f4a_7c15));
-    let inputs = &motion.inputs;
-    let range = window.range(&inputs.t_s);
-    let (Some(first), Some(last)) = (
-        inputs.t_s[range.clone()].first(),
-        inputs.t_s[range.clone()].last(),
-    ) else {
-        return Inputs {
-            gravity_m_per_s2: inputs.gravity_m_per_s2,
-            ..Inputs::default()
-        };
-    };
-    let step_s = 0.033;
-    let phase = random.uniform() * step_s;
-    let n = ((last - first - phase) / step_s).max(0.0) as usize + 1;
-    let t_s: Vec<f64> = (0..n.min(range.len()))
-        .map(|k| first + phase + k as f64 * step_s)
-        .collect();
-    let pick = |x: &[f64]| between(&inputs.t_s[range.clone()], &x[range.clone()], &t_s);
-    let angle = |x: &[f64], random: &mut Random| -> Vec<f64> {
-        let (offset, scale) = (
-            budget.tilt_offset_rad * random.normal(),
-            1.0 + budget.angle_scale * random.normal(),
-        );
-        let wander = random.wander(t_s.len(), step_s, budget.tilt_wander_rad, WANDER_S);
-        pick(x)
-            .iter()
-            .zip(wander)
-            .map(|(x, w)| scale * x + offset + w)
-            .collect()
-    };
-    let roll_rad = angle(&inputs.roll_rad, &mut random);
-    let pitch_rad = angle(&inputs.pitch_rad, &mut random);
-    let scale = 1.0 + budget.height_scale * random.normal();
-    let wander = random.wander(t_s.len(), step_s, budget.height_wander_m, WANDER_S);
-    let height_m = pick(&inputs.height_m)
-        .iter()
-        .zip(wander)
-        .map(|(z, w)| scale * z + w)
-        .collect();
-    let (offset, scale) = (
-        budget.support_offset * random.normal(),
-        1.0 + budget.support_scale * random.normal(),
-    );
-    let support_ratio = pick(&inputs.support_ratio)
-        .iter()
-        .map(|s| scale * s + offset + budget.support_noise * random.normal())
-        .collect();
-    Inputs {
-        t_s,
-        height_m,
-        roll_rad,
-        pitch_rad,
-        support_ratio,
-        gravity_m_per_s2: inputs.gravity_m_per_s2,
-        ..Inputs::default()
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::imu::interval::metrics;
+    use crate::metrics::Metrics;
+    use crate::random::Random;
     use std::f64::consts::TAU;
 
     /// A body that rolls and heaves, seen by a sensor `lever` off its centre, turned by `mount`.
@@ -957,28 +632,6 @@ mod tests {
         let [low, high] = found.get("rms_roll_deg").unwrap().ci95.unwrap();
         let true_deg = rms(roll[4000..7600].iter().copied()).to_degrees();
         assert!(low < true_deg && true_deg < high, "{low} {true_deg} {high}");
-    }
-
-    #[test]
-    fn noise_is_taken_out_of_a_mean_square() {
-        // A constant of 1 seen through errors of 0.1 and 0.3: its square is 1, not 1.01 and 1.09. Its interval is of first order: an estimate that
-        // came out low draws a narrow one, which shows at 0.3.
-        for (sd, least) in [(0.1, 0.92), (0.3, 0.88)] {
-            let rounds = 4000;
-            let mut random = Random(7);
-            let (mut sum, mut kept) = (0.0, 0);
-            for _ in 0..rounds {
-                let x = 1.0 + sd * random.normal();
-                let drawn: Vec<f64> = (0..DRAWS).map(|_| x + sd * random.normal()).collect();
-                let (root, [low, high]) = without_noise(x, &drawn);
-                sum += root * root;
-                kept += usize::from(low <= 1.0 && 1.0 <= high);
-            }
-            let mean = sum / f64::from(rounds);
-            assert!((mean - 1.0).abs() < 0.1 * sd, "{sd}: {mean}");
-            let covers = kept as f64 / f64::from(rounds);
-            assert!((least..0.98).contains(&covers), "{sd}: {covers}");
-        }
     }
 
     #[test]
