@@ -4,6 +4,15 @@ use std::fs::File;
 use std::io::{Error, ErrorKind, Read, Result};
 use std::path::Path;
 
+/// A line on standard error, for people. It need not be heard: where nothing can be written it is left out.
+#[macro_export]
+macro_rules! note {
+    ($($part:tt)*) => {{
+        use std::io::Write as _;
+        let _ = writeln!(std::io::stderr(), $($part)*);
+    }};
+}
+
 /// None is longer; what is may have no end.
 const MOST_BYTES: u64 = 64 << 20;
 

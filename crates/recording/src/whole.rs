@@ -30,9 +30,64 @@ pub fn write_whole<E: From<Error>>(
     Ok(())
 }
 
+/// That an output is none of the inputs, nor another output: whoever names one twice would lose it.
+///
+/// # Errors
+/// A sentence with the path that was named twice.
+pub fn apart<'a>(
+    outputs: impl IntoIterator<Item = &'a Path>,
+    inputs: impl IntoIterator<Item = &'a Path>,
+) -> Result<(), String> {
+    // What is not there yet may lie in a folder that is.
+    let whereabouts = |path: &Path| {
+        let folder = path.parent().filter(|p| !p.as_os_str().is_empty());
+        let folder = folder.unwrap_or(Path::new(".")).canonicalize();
+        path.canonicalize()
+            .ok()
+            .or_else(|| Some(folder.ok()?.join(path.file_name()?)))
+    };
+    let inputs = inputs.into_iter();
+    let mut seen: Vec<_> = inputs.filter_map(|path| path.canonicalize().ok()).collect();
+    for path in outputs {
+        let Some(place) = whereabouts(path) else {
+            continue;
+        };
+        if seen.contains(&place) {
+            return Err(format!(
+                "{}: is named twice, and what is read or written there would be lost; give the output another name",
+                path.display()
+            ));
+        }
+        // A device keeps nothing.
+        if place.is_file() || !place.exists() {
+            seen.push(place);
+        }
+    }
+    Ok(())
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn nothing_is_read_and_written_at_once() {
+        let folder = tempfile::tempdir().unwrap();
+        let [x, y] = ["x", "y"].map(|name| folder.path().join(name));
+        std::fs::write(&x, "1").unwrap();
+        let round_about = folder
+            .path()
+            .join("..")
+            .join(folder.path().file_name().unwrap());
+        assert!(apart([&*y], [&*x]).is_ok());
+        assert!(
+            apart([&*round_about.join("x")], [&*x])
+                .unwrap_err()
+                .contains("twice")
+        );
+        assert!(apart([&*y, &*round_about.join("y")], [&*x]).is_err());
+        assert!(apart([Path::new("/dev/null"), Path::new("/dev/null")], []).is_ok());
+    }
 
     #[test]
     fn a_failure_leaves_nothing_behind_and_the_old_file_alone() {
