@@ -148,7 +148,8 @@ impl Beat {
             let last = p.phase + s * (p.rate + 0.5 * p.bend * s);
             // A stroke on a seam belongs to the piece that it begins.
             let mut turn = (p.phase / TAU - 1e-9).ceil();
-            let is_last_piece = end_s == until_s;
+            let next = self.pieces.get(k + 1);
+            let is_last_piece = next.is_none_or(|next| next.begin_s > until_s);
             while turn * TAU <= last + 1e-9 && (is_last_piece || turn * TAU < last - TAU * 1e-9) {
                 let rest = (turn * TAU - p.phase).max(0.0);
                 // rate·s + ½ bend·s² = rest, by the form that stays exact for bend → 0.
@@ -218,6 +219,18 @@ mod tests {
             phase += TAU * h * beat.tempo_hz(t + 0.5 * h);
         }
         assert!((beat.tempo_hz(5.0) - 2.5).abs() < 1e-12 && beat.tempo_hz(8.5) == 1.0);
+    }
+
+    #[test]
+    fn a_stroke_at_the_end_and_on_a_seam_is_one() {
+        let change = TempoChange {
+            at_s: 2.0,
+            over_s: 0.0,
+            beat_hz: 3.0,
+        };
+        let beat = Beat::new(0.0, 0.0, 2.0, &[change], &[]);
+        let at: Vec<f64> = beat.strokes(2.0).iter().map(|s| s.t_s).collect();
+        assert_eq!(at, [0.0, 0.5, 1.0, 1.5, 2.0]);
     }
 
     #[test]

@@ -3,7 +3,7 @@
 //! ```text
 //! unexplained = (K + P + S) − (K + P + S)_{t=0} − ∫ work + ∫ dissipation        [J]
 //! ```
-//! K kinetic (in the frame that walks along), P potential in gravity, S stored in springs. Work and dissipation of every
+//! K kinetic and P potential in gravity, both in the frame that walks along (on a slope, what the walk itself climbs is in neither), S stored in springs. Work and dissipation of every
 //! effect are states of their own, integrated by the same method as the motion, so the rest measures that method: it is
 //! zero but for integration error. Nothing is renormalised or clipped to make it small.
 

@@ -11,11 +11,13 @@
 //! music has begun are fixed for a *segment* and change only between two of them.
 
 mod eight;
+mod rest;
 mod term;
 mod workspace;
 
 pub use eight::Registers;
 pub(crate) use eight::{Octet, SideBySide};
+pub(crate) use rest::Bend;
 pub use term::{
     Account, AsWhole, Book, Local, OnBlock, OnEight, Power, PowerOnEight, Stage, Switch, Term,
     Whole,
@@ -25,6 +27,7 @@ pub use workspace::{All, Block, Pair, Part, Workspace};
 use crate::beat::Beat;
 use crate::body::Body;
 use crate::effects;
+use crate::effects::path::Heading;
 use crate::freedoms::{Freedoms, Six, choose};
 use crate::lanes::{self, f64x2, pack, pairs};
 #[cfg(target_arch = "x86_64")]
@@ -33,6 +36,7 @@ use crate::random::{Stream, normal};
 use crate::scene::Scene;
 use crate::sensors::drum::Track;
 use crate::sensors::{Clock, Imu};
+use rest::Springs;
 use std::ops::Range;
 use term::Staged;
 use workspace::{BLOCK, blocks};
@@ -100,6 +104,10 @@ pub struct Model {
     switches: Vec<Box<dyn Switch>>,
     accounts: Vec<(&'static str, Box<dyn Account>)>,
     beat: Option<Beat>,
+    heading: Option<Heading>,
+    bends: Vec<Bend>,
+    /// Where the body starts, m.
+    start_height_m: f64,
     contact_stiffness: Vec<f64>,
     contact_exponent: f64,
     contact_damping: Vec<f64x2>,
@@ -111,6 +119,7 @@ pub struct Model {
     straps: [f64; 2],
     watches_contact: bool,
     has_friction: bool,
+    jumps_at_contact: bool,
     turns_softly: Option<f64>,
     /// Whether there are so many carriers that they are treated block by block.
     in_blocks: bool,
@@ -160,6 +169,9 @@ impl Model {
             switches: Vec::new(),
             accounts: Vec::new(),
             beat: None,
+            heading: None,
+            bends: Vec::new(),
+            start_height_m: 0.0,
             contact_stiffness: Vec::new(),
             contact_exponent: 1.0,
             contact_damping: Vec::new(),
@@ -169,6 +181,7 @@ impl Model {
             extra: Vec::new(),
             watches_contact: false,
             has_friction: false,
+            jumps_at_contact: false,
             turns_softly: None,
             in_blocks: false,
             fused: false,
@@ -190,16 +203,13 @@ impl Model {
             model.accounts.clear();
         }
         // Only now, when every effect has said what it does to gravity and to the springs that the body rests on.
-        let height_m = scene
-            .start
-            .height_m
-            .unwrap_or_else(|| model.resting_height_m());
+        model.start_height_m = scene.start.height_m.unwrap_or_else(|| model.come_to_rest());
         model.freedoms = choose(
             &model.body,
             &scene.carriers.handles_m,
             &scene.freedom,
             &scene.start,
-            height_m,
+            model.start_height_m,
         );
         model.layout.body = model.freedoms.size();
         model.layout.phases = if model.has_phases { n } else { 0 };
@@ -222,6 +232,25 @@ impl Model {
                 && is_x86_feature_detected!("fma");
         }
         model
+    }
+
+    /// Bends the poles as they are bent at rest, and gives the height at which the level body rests, m.
+    fn come_to_rest(&mut self) -> f64 {
+        let carriers = &self.scene.carriers;
+        let level = |i: usize| carriers.shoulder_height_m.get(i) - carriers.handles_m[i][2];
+        let springs = Springs {
+            level_m: (0..self.carriers()).map(level).collect(),
+            stiffness: &self.contact_stiffness,
+            exponent: self.contact_exponent,
+            pull: self.contact_pulls(),
+            weight_n: -self.body.mass_kg * self.body.gravity_m_per_s2.z,
+            bends: &self.bends,
+        };
+        let (height_m, bent_m) = springs.rest();
+        for (bend, bent_m) in self.bends.iter().zip(bent_m) {
+            self.extra[bend.state].1 = bent_m;
+        }
+        height_m
     }
 
     // What effects call while they are built.
@@ -275,6 +304,15 @@ impl Model {
         self.beat = Some(beat);
     }
 
+    /// Says which poles bend.
+    pub(crate) fn set_bends(&mut self, bends: Vec<Bend>) {
+        self.bends = bends;
+    }
+
+    pub(crate) fn set_heading(&mut self, heading: Heading) {
+        self.heading = Some(heading);
+    }
+
     pub(crate) fn set_contact_springs(
         &mut self,
         bilateral: bool,
@@ -289,6 +327,11 @@ impl Model {
     /// Says that a force turns with the sense of a motion.
     pub(crate) fn expect_friction(&mut self) {
         self.has_friction = true;
+    }
+
+    /// Says that a rate jumps where a handle opens or closes; forces never do.
+    pub(crate) fn jump_at_contact(&mut self) {
+        self.jumps_at_contact = true;
     }
 
     /// A torque about the body's x axis turns with the sense of the motion, within about this rate, rad/s.
@@ -351,6 +394,11 @@ impl Model {
     /// Every inertial sensor.
     pub fn imus(&self) -> &[Imu] {
         &self.imus
+    }
+
+    /// Where the party faces, where its way turns.
+    pub fn heading(&self) -> Option<Heading> {
+        self.heading
     }
 
     /// How many carriers there are.
@@ -428,6 +476,11 @@ impl Model {
     /// The music's beat.
     pub fn beat(&self) -> Option<&Beat> {
         self.beat.as_ref()
+    }
+
+    /// Whether a rate jumps where a handle opens or closes.
+    pub(crate) fn jumps_at_contact(&self) -> bool {
+        self.jumps_at_contact
     }
 
     /// Whether a force turns with the sense of a motion, faster than the motion itself changes.
@@ -518,55 +571,14 @@ impl Model {
 
     /// The state at t = 0.
     pub fn initial_state(&self) -> Vec<f64> {
-        let start = &self.scene.start;
-        let height = start.height_m.unwrap_or_else(|| self.resting_height_m());
         let mut y = vec![0.0; self.layout.size()];
-        self.freedoms.place(start, height, &mut y);
+        self.freedoms
+            .place(&self.scene.start, self.start_height_m, &mut y);
         y[self.layout.phase_range()].copy_from_slice(&self.initial_phases[..self.layout.phases]);
         for (y, (_, first)) in y[self.layout.extra_range()].iter_mut().zip(&self.extra) {
             *y = *first;
         }
         y
-    }
-
-    /// Height at which the level body's weight rests on the springs, m; with no springs, handles at shoulder height.
-    fn resting_height_m(&self) -> f64 {
-        let carriers = &self.scene.carriers;
-        let n = self.carriers();
-        let stiffness: f64 = self.contact_stiffness.iter().sum();
-        let above = |i: usize| carriers.shoulder_height_m.get(i) - carriers.handles_m[i][2];
-        if stiffness > 0.0 && self.contact_exponent != 1.0 {
-            // Σ k δ^p falls as the body rises: halve the interval where it meets the weight.
-            let weight = -self.body.mass_kg * self.body.gravity_m_per_s2.z;
-            let push = |z: f64| {
-                let of = |i: usize| {
-                    self.contact_stiffness[i] * (above(i) - z).max(0.0).powf(self.contact_exponent)
-                };
-                (0..n).map(of).sum::<f64>()
-            };
-            let mut high = (0..n).map(above).fold(f64::NEG_INFINITY, f64::max);
-            let mut low = high - 1.0;
-            while push(low) < weight {
-                low -= high - low;
-            }
-            for _ in 0..200 {
-                let middle = 0.5 * (low + high);
-                if push(middle) < weight {
-                    high = middle
-                } else {
-                    low = middle
-                }
-            }
-            0.5 * (low + high)
-        } else if stiffness > 0.0 {
-            let level: f64 = (0..n)
-                .map(|i| self.contact_stiffness[i] * above(i))
-                .sum::<f64>()
-                / stiffness;
-            level + self.body.mass_kg * self.body.gravity_m_per_s2.z / stiffness
-        } else {
-            (0..n).map(above).sum::<f64>() / n as f64
-        }
     }
 
     /// The first moment after `after_s` at which the right-hand side may jump.

@@ -190,6 +190,8 @@ impl<'m> Recorder<'m> {
             };
             self.writer.message(channel, t_ns, &message)?;
         }
+        // What is tied is in contact though it pulls.
+        let tied = self.model.contact_pulls();
         let message = rath::HandleForces {
             time_s: s.t_s,
             normal_n: s.normal_n.clone(),
@@ -199,7 +201,7 @@ impl<'m> Recorder<'m> {
                 .map(|t| vector([t[0], t[1], 0.0]))
                 .collect(),
             compression_m: s.compression_m.clone(),
-            in_contact: s.normal_n.iter().map(|n| *n > 0.0).collect(),
+            in_contact: s.normal_n.iter().map(|n| tied || *n > 0.0).collect(),
         };
         self.writer.message(self.forces, t_ns, &message)?;
         if let (Some(channel), Some(e)) = (self.energy, s.energy) {
@@ -291,14 +293,16 @@ impl<'m> Recorder<'m> {
             s.pose.position_m,
             Quaternion { x, y, z, w },
         ));
+        let [heading, _] = self.model.heading().map_or([0.0; 2], |way| way.at(s.t_s));
+        let (z, w) = (0.5 * heading).sin_cos();
+        let upright = Quaternion {
+            x: 0.0,
+            y: 0.0,
+            z,
+            w,
+        };
         for (frame, shoulder) in self.frames.iter().zip(&s.shoulder_m) {
-            let level = Quaternion {
-                x: 0.0,
-                y: 0.0,
-                z: 0.0,
-                w: 1.0,
-            };
-            transforms.push(transform(t_ns, frame, *shoulder, level));
+            transforms.push(transform(t_ns, frame, *shoulder, upright));
         }
         TfMessage { transforms }
     }

@@ -2,7 +2,7 @@
 
 mod common;
 
-use common::{rates_at_start, samples, scene};
+use common::{rates_at_start, readings, samples, scene};
 use sim::model::Model;
 use std::f64::consts::{FRAC_PI_2, TAU};
 
@@ -208,25 +208,29 @@ fn val_hunt_crossley() {
     assert!((last.compression_m[0] - delta).abs() < 1e-9);
 }
 
-/// A free pole rings at its frequency and loses e^{−2ζω t} of its energy; a loaded one bends by load over stiffness.
+/// A body set down on straight poles sinks by load over stiffness; one that starts at rest stays there.
 #[test]
 fn val_flexure_at_rest_carries_the_load() {
-    let all = samples(&scene(
-        r#"
-        name = "bow"
-        duration_s = 30.0
-        [effects.contact]
-        [effects.hold]
-        [effects.flexure]
-        frequency_hz = 5.0
-        modal_mass_kg = 6.0
-        damping_ratio = 0.1
-        "#,
-    ));
-    let last = all.last().unwrap();
+    let with = |start: &str| {
+        samples(&scene(&format!(
+            r#"
+            name = "bow"
+            duration_s = 30.0
+            {start}
+            [effects.contact]
+            [effects.hold]
+            [effects.flexure]
+            frequency_hz = 5.0
+            modal_mass_kg = 6.0
+            damping_ratio = 0.1
+            "#
+        )))
+    };
     // Both ends: N₁ + N₂ = Mg = m ω² q, so the body sinks by q besides the shoulders' give.
     let q = 60.0 * 9.81 / (6.0 * (TAU * 5.0).powi(2));
-    let sunk = all[0].pose.position_m[2] - last.pose.position_m[2];
+    let straight = 0.9 - 60.0 * 9.81 / 6000.0;
+    let all = with(&format!("[start]\nheight_m = {straight:?}"));
+    let sunk = straight - all.last().unwrap().pose.position_m[2];
     assert!((sunk - q).abs() < 1e-7, "{sunk} {q}");
     for s in &all {
         assert!(
@@ -234,6 +238,12 @@ fn val_flexure_at_rest_carries_the_load() {
             "{:.1e}",
             s.energy.unwrap().unexplained_j
         );
+    }
+    for s in with("") {
+        let z = s.pose.position_m[2];
+        assert!((z - (straight - q)).abs() < 1e-9, "{z}");
+        let miss_n = s.normal_n[0] - 60.0 * 9.81 / 2.0;
+        assert!(miss_n.abs() < 1e-6, "{miss_n:e}");
     }
 }
 
@@ -370,4 +380,167 @@ fn music_pauses_and_changes_tempo() {
     assert!((rate(1, 0.0, 40.0) - 2.0).abs() < 1e-9);
     let locked = at(29.0).beat_phase_rad.unwrap() - at(29.0).phase_rad[0];
     assert!((locked.sin() - TAU * 0.1 / 2.0).abs() < 1e-6);
+}
+
+/// Straps alone are a pendulum of their length; friction caps them, and a hold beside them.
+#[test]
+fn val_straps_swing_and_slip() {
+    let swing = |more: &str| {
+        samples(&scene(&format!(
+            "name = \"swing\"\nduration_s = 10.0\nfreedom = [\"y\"]\n[start]\nposition_m = [0.0, 0.3]\n[effects.contact]\n[effects.sling]\n{more}"
+        )))
+    };
+    let w = (9.81_f64 / 0.7).sqrt();
+    for s in &swing("") {
+        let y = 0.3 * (w * s.t_s).cos();
+        assert!((s.pose.position_m[1] - y).abs() < 1e-9, "{} s", s.t_s);
+    }
+    // T/N would be 0.3/0.7 at the start.
+    for more in ["", "[effects.hold]\n"] {
+        for mu in [0.0, 0.05, 0.4] {
+            let all = swing(&format!("{more}[effects.friction]\ncoefficient = {mu:?}\n"));
+            for s in &all {
+                for (t, n) in s.tangential_n.iter().zip(&s.normal_n) {
+                    assert!(t[0].hypot(t[1]) <= mu * n, "{more}{mu}: {t:?} {n}");
+                }
+            }
+            assert_eq!(all[30].pose.position_m[1] == 0.3, mu == 0.0, "{more}{mu}");
+        }
+    }
+}
+
+/// What slides down a slope under a limited hold turns M g sin s · x − K into heat, and stores nothing that its spring could not hold.
+#[test]
+fn val_a_hold_that_slips_dissipates() {
+    let all = samples(&scene(
+        "name = \"slip\"\nfreedom = [\"x\"]\n[effects.contact]\n[effects.hold]\n[effects.friction]\ncoefficient = 0.1\n[effects.path]\nslope_deg = 20.0",
+    ));
+    let held_j = all[0].energy.unwrap().elastic_j;
+    for s in &all {
+        let e = s.energy.unwrap();
+        let fell_j = -60.0 * 9.81 * 20.0_f64.to_radians().sin() * s.pose.position_m[0];
+        assert!(
+            (e.dissipated_j - (fell_j - e.kinetic_j)).abs() < 1e-6 * (1.0 + fell_j),
+            "{e:?}"
+        );
+        assert_eq!(e.elastic_j, held_j);
+    }
+    assert!(all.last().unwrap().pose.position_m[0] < -10.0);
+}
+
+/// A cloth that sways in the air is straight when the handle comes down on it.
+#[test]
+fn bristles_straighten_in_the_air() {
+    let all = samples(&scene(
+        "name = \"drop\"\nduration_s = 1.5\nlog_rate_hz = 10000.0\nfreedom = [\"height\"]\n[carriers]\nhandles_m = [[0.0, 0.0, 0.0]]\n[start]\nheight_m = 5.9\n\
+         [effects.contact]\n[effects.gait]\namplitude_m = 0.0\nsway_m = 0.1\n[effects.friction]\nlaw = \"bristle\"",
+    ));
+    let first = all.iter().find(|s| s.normal_n[0] > 0.0).unwrap();
+    let share = first.tangential_n[0][1].abs() / first.normal_n[0];
+    // σ₁ ḋ with the sway's 2π·2 Hz·0.1 m is what fresh bristles take at most.
+    assert!(share <= 0.5 * TAU * 2.0 * 0.1, "{share}");
+    let z = |s: &sim::run::Sample| first.t_s > 0.9 && s.t_s < first.t_s;
+    assert!(
+        all.iter()
+            .filter(|s| z(s))
+            .all(|s| s.tangential_n[0] == [0.0; 2])
+    );
+}
+
+/// What looks a little back from the onset of a lift sees no kink, and fixed steps keep their order across it.
+#[test]
+fn a_lift_begins_smoothly_for_who_looks_on() {
+    let text = "name = \"onset\"\nduration_s = 2.0\nfreedom = [\"height\"]\n[effects.contact]\nbilateral = true\n[effects.gait]\n\
+                [effects.lift]\ngain = 1.5\nonset_s = 0.5\nbuild_up_s = 0.2\n";
+    let end = |step: &str| {
+        let mut s = scene(text);
+        if !step.is_empty() {
+            (s.solver.method, s.solver.step_s) = ("rk4".into(), step.parse().unwrap());
+        }
+        samples(&s).last().unwrap().pose.position_m[2]
+    };
+    let truth = end("");
+    let errors = ["0.01", "0.005", "0.0025"].map(|step| (end(step) - truth).abs());
+    for pair in errors.windows(2) {
+        let order = (pair[0] / pair[1]).log2();
+        assert!(order > 3.5, "order {order}: {errors:?}");
+    }
+    for onset in [0.0, 1.0] {
+        let s = scene(&format!(
+            "name = \"look\"\nduration_s = 1.5\n[effects.contact]\n[effects.gait]\n[effects.lift]\nonset_s = {onset:?}\nbuild_up_s = 1.0\n[effects.imu]\nrate_hz = 200.0\n\
+             gyro_noise_rad_per_s_per_sqrt_hz = 0.0\naccel_noise_m_per_s2_per_sqrt_hz = 0.0\naccel_bias_sd_m_per_s2 = 0.0\naccel_bias_walk_m_per_s3_per_sqrt_hz = 0.0\nsensors = [{{ on = \"carrier_1\" }}]"
+        ));
+        let (shown, _) = readings(&s);
+        let f: Vec<f64> = shown.iter().map(|r| r.force[2]).collect();
+        let jump = f
+            .windows(2)
+            .map(|w| (w[1] - w[0]).abs())
+            .fold(0.0, f64::max);
+        assert!(jump < 1.0, "{jump}");
+    }
+}
+
+/// A party that turns about has its carriers' sensors turn, and walks back, sideways too.
+#[test]
+fn who_walks_a_turn_turns() {
+    let s = scene(
+        "name = \"about\"\nduration_s = 40.0\n[carriers]\nwalk_m_per_s = [0.8, 0.3, 0.0]\n[effects.contact]\n[effects.hold]\n[effects.pole_friction]\n\
+         [effects.path]\nturn_deg = 180.0\nturn_start_s = 5.0\nturn_time_s = 10.0\n[effects.imu]\nrate_hz = 100.0\n\
+         gyro_noise_rad_per_s_per_sqrt_hz = 0.0\ngyro_bias_sd_rad_per_s = 0.0\ngyro_bias_walk_rad_per_s2_per_sqrt_hz = 0.0\ngyro_resolution_rad_per_s = 0.0\nscale_error_sd = 0.0\nmisalignment_sd_deg = 0.0\n\
+         accel_noise_m_per_s2_per_sqrt_hz = 0.0\naccel_bias_sd_m_per_s2 = 0.0\naccel_bias_walk_m_per_s3_per_sqrt_hz = 0.0\naccel_resolution_m_per_s2 = 0.0\nsensors = [{ on = \"carrier_1\" }]",
+    );
+    let (shown, all) = readings(&s);
+    let last = all.last().unwrap();
+    let [vx, vy, _] = last.pose.velocity_m_per_s;
+    assert!(
+        (vx + 0.8).abs() < 1e-3 && (vy + 0.3).abs() < 1e-3,
+        "{vx} {vy}"
+    );
+    let turned: f64 = shown.iter().map(|r| r.spin[2] * 0.01).sum();
+    assert!((turned - std::f64::consts::PI).abs() < 1e-6, "{turned}");
+    // In mid-turn, at 1 m/s for one who walks at the centre: across the way v χ̇, and inwards besides for the place on the pole.
+    let middle = shown
+        .iter()
+        .min_by(|a, b| (a.t_s - 10.0).abs().total_cmp(&(b.t_s - 10.0).abs()))
+        .unwrap();
+    let rate = 1.875 * std::f64::consts::PI / 10.0;
+    // Axes of the party: x along the pole, on which carrier 1 is 2.45 m ahead; v = (0.8, 0.3).
+    let expected = [-0.3 * rate - 2.45 * rate * rate, 0.8 * rate];
+    for (axis, expected) in expected.iter().enumerate() {
+        let f = middle.force[axis];
+        assert!((f - expected).abs() < 1e-6, "{axis}: {f} {expected}");
+    }
+}
+
+/// Handles on one line but for rounding are on one pole.
+#[test]
+fn a_hair_beside_the_pole_is_on_the_pole() {
+    let with = |y: f64| {
+        let s = scene(&format!(
+            "name = \"hair\"\nduration_s = 2.0\n[carriers]\nhandles_m = [[2.45, 0.0, 0.1], [-2.45, {y:?}, 0.1]]\nfrequency_hz = [2.0, 2.1]\n\
+             [effects.coupling]\nstrength_rad_per_s = 50.0\ngraph = \"chain\"\n[effects.contact]\n[effects.flexure]"
+        ));
+        let last = samples(&s).pop().unwrap();
+        (
+            last.phase_rad[1] - last.phase_rad[0],
+            last.pose.position_m[2],
+        )
+    };
+    let ((a, z), (b, y)) = (with(0.0), with(1e-12));
+    assert!(
+        (a - b).abs() < 1e-9 && (z - y).abs() < 1e-9,
+        "{a} {b} {z} {y}"
+    );
+}
+
+/// On a slope a fair share is a share of what presses on the ground.
+#[test]
+fn on_a_slope_nobody_feels_too_little() {
+    let all = samples(&scene(
+        "name = \"share\"\nduration_s = 20.0\n[carriers]\nhandles_m = [[2.45, 0.0, 0.0], [-2.45, 0.0, 0.0]]\n[effects.contact]\n[effects.hold]\n[effects.pole_friction]\n[effects.feedback]\n[effects.path]\nslope_deg = 30.0",
+    ));
+    for turn in all[all.len() - 100..].windows(2) {
+        let rate = (turn[1].phase_rad[0] - turn[0].phase_rad[0]) / (turn[1].t_s - turn[0].t_s);
+        assert!((rate / TAU - 2.0).abs() < 1e-3, "{rate}");
+    }
 }

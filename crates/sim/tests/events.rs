@@ -3,7 +3,7 @@
 
 mod common;
 
-use common::scene;
+use common::{samples, scene};
 use sim::model::Model;
 use sim::run::{Listener, Sample, run_model};
 use sim::scene::Scene;
@@ -140,5 +140,28 @@ fn a_handle_that_comes_back_to_its_edge_is_held_there_longer() {
         let radau15 = sim::solve::method("radau15").unwrap();
         let events = heard_at(tolerance, &scene, radau15).0.len();
         assert!((500..1500).contains(&events), "{tolerance}: {events}");
+    }
+}
+
+/// Moments that are one but for rounding leave a step of that length between them, which says nothing about the next one.
+#[test]
+fn moments_a_rounding_apart_stop_nobody() {
+    let apart = 0.1 + 0.2;
+    assert!(apart != 0.3);
+    let held = "[effects.contact]\n[effects.hold]\n[effects.gait]\n[effects.noise]\n";
+    for text in [
+        format!("{held}[effects.path]\nturn_deg = 10.0\nturn_start_s = 0.1\nturn_time_s = 0.2"),
+        format!("{held}[effects.music]\nonset_s = {apart:?}"),
+        format!("{held}[effects.lift]\nonset_s = {apart:?}\nbuild_up_s = 0.1"),
+        format!(
+            "{held}[effects.music]\nonset_s = 0.0\ntempo_changes = [{{ at_s = 0.1, over_s = 0.2, beat_hz = 2.0 }}]"
+        ),
+    ] {
+        for method in METHODS.iter().map(|m| m.name) {
+            let mut s = scene(&format!("name = \"apart\"\nduration_s = 1.0\n{text}"));
+            s.solver.method = method.into();
+            let all = samples(&s);
+            assert_eq!(all.last().unwrap().t_s, 1.0, "{method} {text}");
+        }
     }
 }

@@ -30,6 +30,7 @@ fn valid(seed: u64) -> String {
         d.from(0.2, 3.0),
         d.from(1.0, 120.0)
     );
+    let mut turns = true;
     if d.chance(0.4) {
         let mut free: Vec<&str> = ["x", "y", "height", "roll", "tilt", "yaw"]
             .into_iter()
@@ -38,6 +39,7 @@ fn valid(seed: u64) -> String {
         if free.is_empty() {
             free.push("height");
         }
+        turns = ["x", "y", "yaw"].iter().all(|f| free.contains(f));
         t += &format!("freedom = {free:?}\n");
     }
     // Moments of a box: they always belong to a body.
@@ -66,6 +68,8 @@ fn valid(seed: u64) -> String {
         d.from(0.0, 2.0),
         d.from(-0.3, 0.5)
     );
+    // Where all handles are metres from their shoulders, straps have no bounded motion: they are for the others.
+    let yaw_deg = d.from(-180.0, 180.0);
     t += "[start]\n";
     if d.chance(0.5) {
         t += &format!("height_m = {:?}\n", d.from(0.5, 1.6));
@@ -74,7 +78,7 @@ fn valid(seed: u64) -> String {
         "roll_pitch_yaw_deg = [{:?}, {:?}, {:?}]\nvelocity_m_per_s = [{:?}, 0.0, {:?}]\nangular_velocity_rad_per_s = [{:?}, {:?}, {:?}]\n",
         d.from(-30.0, 30.0),
         d.from(-20.0, 20.0),
-        d.from(-180.0, 180.0),
+        yaw_deg,
         d.from(-1.0, 1.0),
         d.from(-1.0, 1.0),
         d.from(-2.0, 2.0),
@@ -110,7 +114,7 @@ fn valid(seed: u64) -> String {
             d.from(0.0, 6000.0)
         );
     }
-    let sling = d.chance(0.2);
+    let sling = yaw_deg.abs() < 20.0 && d.chance(0.9);
     if sling {
         t += &format!("[effects.sling]\nlength_m = {:?}\n", d.from(0.3, 2.0));
     }
@@ -173,7 +177,12 @@ fn valid(seed: u64) -> String {
     if d.chance(0.3) {
         t += &format!(
             "[effects.path]\nturn_deg = {:?}\nturn_start_s = 0.3\nslope_deg = {:?}\n",
-            d.from(-90.0, 90.0),
+            // What nothing takes along does not turn.
+            if turns && (hold || sling || t.contains("[effects.friction]")) {
+                d.from(-90.0, 90.0)
+            } else {
+                0.0
+            },
             d.from(-15.0, 15.0)
         );
     }

@@ -173,6 +173,41 @@ fn wrong_types_and_signs_are_pointed_at() {
         "4:7",
         &["hold"],
     );
+    expect(
+        "name = \"a\"\n[effects.path]\nturn_deg = 9.0",
+        "3:12",
+        &["effects.hold"],
+    );
+    expect(
+        "name = \"a\"\nfreedom = [\"x\", \"height\"]\n[effects.hold]\n[effects.path]\nturn_deg = 9.0",
+        "5:12",
+        &["yaw"],
+    );
+    expect(
+        "name = \"a\"\n[effects.contact]\nexponent = 2.0",
+        "3:12",
+        &["hunt-crossley"],
+    );
+    expect(
+        "name = \"a\"\n[effects.noise]\ngrid_hz = 1e300",
+        "3:11",
+        &["1e300", "at most 1e18"],
+    );
+    expect(
+        "name = \"a\"\n[effects.noise]\ngrid_hz = 1e9",
+        "3:11",
+        &["1e9 Hz", "cells"],
+    );
+    expect(
+        "name = \"a\"\n[effects.music]\nbeat_phase_rad = 1e17",
+        "3:18",
+        &["at most 1000000"],
+    );
+    expect(
+        "name = \"a\"\n[effects.music]\n[effects.drum]\npitch_hz = 2e4",
+        "4:12",
+        &["8000"],
+    );
     expect("name = \"a\"\n\n[body\nmass_kg = 3", "3:6", &[]);
     expect("", "1:1", &["name"]);
 }
@@ -212,7 +247,7 @@ fn settings_are_checked_like_the_scene() {
         ("effects.music.beat_hs=2", "Did you mean `beat_hz`?"),
         ("effects.musik=false", "Did you mean `music`?"),
         ("effects.music.beat_hz=fast", "expected a number"),
-        ("effects.music.beat_hz=-2", "zero or more"),
+        ("effects.music.beat_hz=-2", "at least 0"),
         ("duration_s", "KEY=VALUE"),
         ("duration_s=0", "above zero"),
         ("=3", "empty name"),

@@ -90,8 +90,15 @@ fn switching_one_effect_off_leaves_the_others_as_they_are() {
     let t_s = 0.7;
     for kept in TABLE {
         for other in TABLE.iter().filter(|o| o.name != kept.name) {
-            // Effects that are about another by their definition: lift amplifies the gait, friction limits the hold, a sling adds to it.
-            let by_definition = [("lift", "gait"), ("friction", "hold"), ("sling", "hold")];
+            // Effects that are about another by their definition: lift amplifies the gait, friction limits hold and sling, a sling adds to a
+            // hold, a fair share of the load is smaller on a slope.
+            let by_definition = [
+                ("lift", "gait"),
+                ("friction", "hold"),
+                ("friction", "sling"),
+                ("sling", "hold"),
+                ("feedback", "path"),
+            ];
             if by_definition.contains(&(kept.name, other.name)) {
                 continue;
             }

@@ -40,7 +40,7 @@ pub fn run(args: &Args) -> Result<()> {
     let wav = track.wav().map_err(|e| anyhow!(e))?;
     write_whole(&args.out, |file| file.write_all(&wav))
         .with_context(|| format!("cannot write {}", args.out.display()))?;
-    eprintln!(
+    recording::note!(
         "{}: {} strokes in {} s at {} Hz",
         args.out.display(),
         track.strokes.len(),

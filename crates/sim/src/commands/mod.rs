@@ -52,7 +52,7 @@ pub fn run(command: Command) -> ExitCode {
     match outcome {
         Ok(()) => ExitCode::SUCCESS,
         Err(error) => {
-            eprintln!("sim: {error:#}");
+            recording::note!("sim: {error:#}");
             ExitCode::from(1)
         }
     }

@@ -2,6 +2,7 @@
 
 use anyhow::{Context, Result, anyhow};
 use indicatif::{ProgressBar, ProgressStyle};
+use recording::whole::apart;
 use recording::write::{RecordingWriter, WriterOptions, remove_unfinished_files};
 use sim::model::Model;
 use sim::record::Recorder;
@@ -63,6 +64,7 @@ pub fn run(args: &Args) -> Result<()> {
         .out
         .clone()
         .unwrap_or_else(|| PathBuf::from(format!("{}-{}.mcap", scene.name, scene.seed)));
+    apart([path.as_path()], [Path::new(&args.scene)]).map_err(anyhow::Error::msg)?;
     let options = WriterOptions::beside();
     let writer = if to_stdout {
         RecordingWriter::to_stream(std::io::stdout(), &options)?
@@ -80,6 +82,7 @@ pub fn run(args: &Args) -> Result<()> {
         began,
         duration_s: scene.duration_s,
         samples: 0,
+        astray: None,
     };
     let (stats, outcome) = run_model(&model, method_of(&scene), &settings(&scene), &mut watch);
     if let Some(bar) = watch.progress.take() {
@@ -120,7 +123,7 @@ pub fn run(args: &Args) -> Result<()> {
         some if some == stats.steps => " (implicit)".to_owned(),
         some => format!(" ({some} of them implicit, where the contact is stiff)"),
     };
-    eprintln!(
+    recording::note!(
         "{what}: {} seed {}, {} s at {} Hz ({} samples); {} in {:.3} s: {} steps{implicit}, {} contact events",
         scene.name,
         scene.seed,
@@ -132,6 +135,11 @@ pub fn run(args: &Args) -> Result<()> {
         stats.steps,
         stats.events
     );
+    if let Some((handle, beside_m, t_s)) = watch.astray {
+        recording::note!(
+            "handle {handle} was carried from {beside_m:.1} m beside its shoulder at {t_s:.1} s: contact asks for height alone; `effects.hold`, `friction` or `sling` keep a load with its carriers"
+        );
+    }
     Ok(())
 }
 
@@ -155,6 +163,23 @@ struct Watch<'m> {
     began: Instant,
     duration_s: f64,
     samples: u64,
+    /// The handle farthest beside its shoulder, counted from 1: how far (m), and when (s).
+    astray: Option<(usize, f64, f64)>,
+}
+
+/// Beside a shoulder by more than a shoulder's breadth nobody carries, m: the law of contact asks for height alone.
+const BREADTH_M: f64 = 0.5;
+
+impl Watch<'_> {
+    fn look_beside(&mut self, sample: &Sample) {
+        for (i, (handle, shoulder)) in sample.handle_m.iter().zip(&sample.shoulder_m).enumerate() {
+            let beside_m = (handle[0] - shoulder[0]).hypot(handle[1] - shoulder[1]);
+            let farthest_m = self.astray.map_or(BREADTH_M, |(_, m, _)| m);
+            if sample.normal_n[i] > 0.0 && beside_m > farthest_m {
+                self.astray = Some((i + 1, beside_m, sample.t_s));
+            }
+        }
+    }
 }
 
 impl Listener for Watch<'_> {
@@ -164,6 +189,7 @@ impl Listener for Watch<'_> {
 
     fn sample(&mut self, sample: &Sample) -> bool {
         self.samples += 1;
+        self.look_beside(sample);
         // A short run needs no progress bar; indicatif shows one on a terminal only.
         if self.samples.is_multiple_of(64) {
             if self.progress.is_none() && self.began.elapsed() > Duration::from_secs(1) {

@@ -4,6 +4,7 @@ use super::{Format, print};
 use anyhow::{Context, Result, anyhow};
 use recording::read::{ReadOptions, Recording};
 use recording::topics::{BEAT, FORCES, PHASES, STATE};
+use recording::whole::apart;
 use recording::write::{ChannelId, RawChannel, RecordingWriter, WriteError, WriterOptions};
 use sim::model::Model;
 use sim::record::Recorder;
@@ -118,6 +119,7 @@ pub fn run(args: &Args) -> Result<Input> {
         let stem = args.file.file_stem().unwrap_or_default().to_string_lossy();
         PathBuf::from(format!("{stem}-replay.mcap"))
     });
+    apart([out.as_path()], [args.file.as_path()]).map_err(anyhow::Error::msg)?;
     let model = Model::new(&replay.scene);
     let writer = RecordingWriter::create(&out, &WriterOptions::beside())?;
     let mut recorder = Recorder::at(&model, writer, replay.epoch_ns)?;
@@ -175,7 +177,7 @@ pub fn run(args: &Args) -> Result<Input> {
         .writer()
         .metadata("replay", &record(&name, &replay, &found))?;
     recorder.finish()?;
-    eprintln!(
+    recording::note!(
         "{}: {} s of {name} from {:.3} s on, driven by {} samples of {}",
         out.display(),
         replay.scene.duration_s,
@@ -188,7 +190,7 @@ pub fn run(args: &Args) -> Result<Input> {
         Format::Table => table(&take, window_s, &found),
     })?;
     for loss in &take.losses {
-        eprintln!("sim: {name}: {loss}");
+        recording::note!("sim: {name}: {loss}");
     }
     Ok(if take.losses.is_empty() {
         Input::Whole

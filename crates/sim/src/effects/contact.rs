@@ -9,14 +9,14 @@
 //! price. Energy: the spring stores ½kδ² while in contact; what is left in it at lift-off is lost in the damper, what
 //! it is given at a touch-down with δ ≠ 0 is taken back from it (both are booked, see [`crate::energy`]).
 //!
-//! Alternative law, `hunt-crossley`: N* = k δ^p (1 + d δ̇), d = c/k, p exponent (1); k then in N/m^p. Its damping vanishes with δ, so
+//! Alternative law, `hunt-crossley`: N* = k δ^p (1 + d δ̇), d = c/k, p exponent (1); k then in N/m^p, c in N·s/m^(p+1). Its damping vanishes with δ, so
 //! the force starts from zero at touch-down and never jumps; it is unilateral. For δ < 0 N* = −k|δ|^p max(1 + d δ̇, 0.01) only marks
 //! the sign. With p = 1 it is smooth through the zero. Source: Hunt & Crossley, J. Appl. Mech. 42 (1975), 440–445.
 //! Source: paper, eq. (unilateral); Brogliato, Nonsmooth Mechanics (1999), ch. 2.
 
 use crate::lanes::{Moments, Now, Number, f64x2, pack};
 use crate::model::{Book, Local, Model, Pair, Part, Power, Stage, Workspace};
-use crate::scene::{Checker, PerCarrier, Problem, Scene, problem};
+use crate::scene::{Checker, PerCarrier, Problem, Scene, problem, shown};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
@@ -87,7 +87,7 @@ impl Contact {
             if !(1.0..=3.0).contains(&self.exponent) {
                 return Err(problem(
                     "effects.contact.exponent",
-                    format!("found {}, expected 1 to 3", self.exponent),
+                    format!("found {}, expected 1 to 3", shown(self.exponent)),
                 ));
             }
             return self
@@ -95,6 +95,15 @@ impl Contact {
                 .values()
                 .iter()
                 .try_for_each(|&x| Checker::positive(k, x));
+        }
+        if self.exponent != 1.0 {
+            return Err(problem(
+                "effects.contact.exponent",
+                format!(
+                    "found {}, but spring and damper are linear; take law = \"hunt-crossley\", or leave it out",
+                    shown(self.exponent)
+                ),
+            ));
         }
         let pushes = (0..n)
             .all(|i| self.stiffness_n_per_m.get(i) > 0.0 || self.damping_n_s_per_m.get(i) > 0.0);
@@ -223,12 +232,10 @@ impl Local for SpringDampers {
     }
 }
 
-/// `x` where N acts, which is always in a bilateral contact, else where it pushes; 0 elsewhere.
+/// `x` where N acts, 0 elsewhere.
 #[inline(always)]
 fn in_contact<N: Moments>(p: &Pair<N>, x: N::Pair) -> N::Pair {
-    // The floor is 0 or −∞.
-    let acts = p.normal.larger(-p.contact_floor);
-    acts.if_positive(x, N::Pair::splat(0.0))
+    p.acts().if_positive(x, N::Pair::splat(0.0))
 }
 
 impl Book for SpringDampers {

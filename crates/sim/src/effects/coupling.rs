@@ -11,7 +11,7 @@
 
 use crate::lanes::{LANES, Moments, Number};
 use crate::model::{AsWhole, Model, Stage, Whole, Workspace};
-use crate::scene::{Checker, Problem, Scene, problem};
+use crate::scene::{Carriers, Checker, Problem, Scene, problem};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
@@ -40,26 +40,16 @@ pub enum Graph {
 
 impl Graph {
     /// The pairs, each once; `None` for all-to-all.
-    fn pairs(&self, handles: &[[f64; 3]]) -> Option<Vec<[usize; 2]>> {
+    fn pairs(&self, carriers: &Carriers) -> Option<Vec<[usize; 2]>> {
         match self {
             Self::All => None,
             Self::Edges(list) => Some(list.clone()),
             Self::Chain => {
-                let mut order: Vec<usize> = (0..handles.len()).collect();
-                let key = |i: usize| (handles[i][1], handles[i][0]);
-                order.sort_by(|&a, &b| {
-                    key(a)
-                        .0
-                        .total_cmp(&key(b).0)
-                        .then(key(a).1.total_cmp(&key(b).1))
-                });
-                Some(
-                    order
-                        .windows(2)
-                        .filter(|w| key(w[0]).0 == key(w[1]).0)
-                        .map(|w| [w[0], w[1]])
-                        .collect(),
-                )
+                let poles = carriers.poles();
+                let along = |pole: &Vec<usize>| -> Vec<[usize; 2]> {
+                    pole.windows(2).map(|w| [w[0], w[1]]).collect()
+                };
+                Some(poles.iter().flat_map(along).collect())
             }
         }
     }
@@ -109,7 +99,7 @@ impl Coupling {
     pub(super) fn build(&self, scene: &Scene, model: &mut Model) {
         model.need_phases();
         let n = scene.carriers.count();
-        match self.graph.pairs(&scene.carriers.handles_m) {
+        match self.graph.pairs(&scene.carriers) {
             None => model.add(
                 Stage::Phases,
                 AsWhole(MeanField {

@@ -3,7 +3,7 @@
 //! It needs `effects.music`, whose strokes it sounds, and changes nothing about the motion.
 
 use crate::model::Model;
-use crate::scene::{Checker, Problem, Scene, problem};
+use crate::scene::{Checker, Problem, Scene, problem, shown};
 use crate::sensors::drum::Track;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -58,11 +58,21 @@ impl Drum {
             ));
         }
         Checker::positive(&key("pitch_hz"), self.pitch_hz)?;
+        let most_hz = 0.5 * f64::from(self.sample_rate_hz);
+        if self.pitch_hz >= most_hz {
+            return Err(problem(
+                &key("pitch_hz"),
+                format!(
+                    "found {}, expected less than half the sample rate, {most_hz}",
+                    shown(self.pitch_hz)
+                ),
+            ));
+        }
         Checker::positive(&key("decay_s"), self.decay_s)?;
         Checker::not_negative(&key("level"), self.level)?;
         Checker::not_negative(&key("noise"), self.noise)?;
-        Checker::finite(&key("clock_offset_s"), self.clock_offset_s)?;
-        if self.clock_offset_s.abs() > 1e9 || scene.epoch_s + self.clock_offset_s < 0.0 {
+        Checker::within(&key("clock_offset_s"), self.clock_offset_s, -1e9..=1e9)?;
+        if scene.epoch_s + self.clock_offset_s < 0.0 {
             return Err(problem(
                 &key("clock_offset_s"),
                 format!(
@@ -71,13 +81,7 @@ impl Drum {
                 ),
             ));
         }
-        if self.clock_drift_ppm.is_nan() || self.clock_drift_ppm.abs() > 1e5 {
-            return Err(problem(
-                &key("clock_drift_ppm"),
-                format!("found {}, expected -1e5 to 1e5", self.clock_drift_ppm),
-            ));
-        }
-        Ok(())
+        Checker::within(&key("clock_drift_ppm"), self.clock_drift_ppm, -1e5..=1e5)
     }
 
     pub(super) fn build(&self, scene: &Scene, model: &mut Model) {

@@ -1,10 +1,10 @@
 //! Contact → phase feedback: the load that a carrier feels speeds the gait up or slows it down.
 //!
 //! ```text
-//! φ̇_i += κ (ℓ_i − 1) sin(α − φ_i)        ℓ̇_i = (N_i/N₀ − ℓ_i)/τ        N₀ = M|g|/N
+//! φ̇_i += κ (ℓ_i − 1) sin(α − φ_i)        ℓ̇_i = (N_i/N₀ − ℓ_i)/τ        N₀ = −M g_z/N
 //! ```
 //! κ strength [rad/s]; α phase at which the load leaves the gait alone, and towards which an excess of it pulls (rad);
-//! ℓ_i felt load, in fair shares (1); τ latency of the nerves (s); N_i normal force (N); N₀ fair share of the weight (N). A
+//! ℓ_i felt load, in fair shares (1); τ latency of the nerves (s); N_i normal force (N); N₀ fair share of what presses on the ground (N). A
 //! first-harmonic phase response (type 1). The latency is a state of its own, one for each carrier: without it the force would
 //! need the phase rate that it sets. A slack handle is felt as ℓ → 0, which pushes the phase away from α. ℓ starts at 1.
 //! Under a steady load ℓ it is Adler's equation with a beat at rest: φ drifts at √(ω² − κ²(ℓ−1)²).
@@ -45,13 +45,16 @@ impl Feedback {
             "effects.feedback.strength_rad_per_s",
             self.strength_rad_per_s,
         )?;
-        Checker::finite("effects.feedback.phase_rad", self.phase_rad)?;
+        Checker::angle_rad("effects.feedback.phase_rad", self.phase_rad)?;
         Checker::positive("effects.feedback.latency_s", self.latency_s)
     }
 
     pub(super) fn build(&self, scene: &Scene, model: &mut Model) {
         let n = scene.carriers.count();
-        let share_n = model.body.mass_kg * model.body.gravity_m_per_s2.norm() / n as f64;
+        let gravity = scene.body.gravity_m_per_s2;
+        let path = scene.effects.path.as_ref();
+        let [.., along_z] = path.map_or(gravity, |path| path.lean(gravity));
+        let share_n = -scene.body.mass_kg * along_z / n as f64;
         model.need_phases();
         let first = model.add_states((1..=n).map(|i| (format!("felt_load_{i}"), 1.0)));
         let law = Law {

@@ -3,7 +3,7 @@
 //! ```text
 //! e = T*/(μN) + ḋ/v_s        T = μN · e/√(1 + |e|²)        |T| < μN        [N]
 //! ```
-//! T* the hold's force (zero without `hold`) (N); μ coefficient (1); N normal force (N), ≥ 0; ḋ sliding velocity,
+//! T* the force of hold and sling (zero without them) (N); μ coefficient (1); N normal force (N), ≥ 0; ḋ sliding velocity,
 //! shoulder minus handle, in the plane [m/s]; v_s regularising velocity [m/s]. As v_s → 0 with no hold it is Coulomb's
 //! law; |T*| ≪ μN and v_s → ∞ leave the hold as it is. With N → 0 the force vanishes like μN. Smooth everywhere, so
 //! sticking and sliding are no events; it creeps at |T|/(μN)·v_s where true dry friction would stick.
@@ -14,14 +14,15 @@
 //! ż = ḋ − (σ₀/μ) |ḋ| z        T = N (σ₀ z + σ₁ ż)
 //! ```
 //! z bristle deflection (m); σ₀ stiffness per load [1/m]; σ₁ damping per load [s/m]. In steady sliding T = μN along ḋ; under
-//! μN it sticks: a spring of N σ₀ with no creep. |z| ≤ μ/σ₀ for ever if it is so once. On a slack handle T = 0 and z keeps
-//! following ḋ. |ḋ| has a kink at ḋ = 0, which costs the solver a few short steps. What the bristles hold counts as dissipated
+//! μN it sticks: a spring of N σ₀ with no creep. |z| ≤ μ/σ₀ for ever if it is so once. On a slack handle T = 0, and the bristles straighten:
+//! ż = −z/τ, τ = max(σ₁/σ₀, 10 ms), as σ₀ z + σ₁ ż = 0 asks of what has no mass. |ḋ| has a kink at ḋ = 0, which costs the solver a few short steps. What the bristles hold counts as dissipated
 //! until they give it back. Source: Dahl (1968); load-scaled LuGre: Canudas de Wit & Tsiotras, CDC 1999, without its Stribeck curve.
 //!
 //! Source: paper, section 3.3 ("regularized friction"); Stewart & Trinkle (1996) for what is regularised.
 
+use super::hold::Sideways;
 use crate::lanes::{LANES, Moments, Number};
-use crate::model::{Book, Local, Model, Pair, Part, Power, Stage, Workspace};
+use crate::model::{Local, Model, Part, Stage, Workspace};
 use crate::scene::{Checker, Problem, Scene, problem};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -66,6 +67,11 @@ impl Default for Friction {
     }
 }
 
+/// Bristles without damping straighten in no time; so fast is fast enough, s.
+const STRAIGHTENING_S: f64 = 0.01;
+/// Least v_s, m/s: beyond what any motion can tell from dry friction.
+const SLOWEST_M_PER_S: f64 = 1e-9;
+
 impl Friction {
     pub(super) fn check(&self, scene: &Scene) -> Result<(), Problem> {
         Checker::positive(
@@ -86,9 +92,10 @@ impl Friction {
             Checker::positive("effects.friction.coefficient", self.coefficient)?;
         }
         Checker::not_negative("effects.friction.coefficient", self.coefficient)?;
-        Checker::positive(
+        Checker::within(
             "effects.friction.regularising_velocity_m_per_s",
             self.regularising_velocity_m_per_s,
+            SLOWEST_M_PER_S..=Checker::MOST,
         )
     }
 
@@ -105,15 +112,13 @@ impl Friction {
                 stiffness: self.bristle_stiffness_per_m,
                 damping: self.bristle_damping_s_per_m,
                 per_length: self.bristle_stiffness_per_m / self.coefficient,
+                straightening_per_s: 1.0
+                    / (self.bristle_damping_s_per_m / self.bristle_stiffness_per_m)
+                        .max(STRAIGHTENING_S),
             };
-            model.add(Stage::Handles, law.clone());
-            model.add_account(
-                "friction",
-                Coulomb {
-                    mu: 0.0,
-                    per_velocity: 0.0,
-                },
-            );
+            model.jump_at_contact();
+            model.add(Stage::Handles, law);
+            model.add_account("friction", Sideways);
             return;
         }
         let law = Coulomb {
@@ -124,13 +129,13 @@ impl Friction {
             // The hold's or the sling's account books the limited force.
             model.add(Stage::Handles, Limit(law));
         } else {
-            model.add(Stage::Handles, Alone(law.clone()));
-            model.add_account("friction", law);
+            model.add(Stage::Handles, Alone(law));
+            model.add_account("friction", Sideways);
         }
     }
 }
 
-#[derive(Clone, Debug)]
+#[derive(Debug)]
 struct Coulomb {
     mu: f64,
     per_velocity: f64,
@@ -155,7 +160,7 @@ impl Coulomb {
     }
 }
 
-#[derive(Clone, Debug)]
+#[derive(Debug)]
 struct Bristles {
     first: usize,
     carriers: usize,
@@ -163,6 +168,8 @@ struct Bristles {
     damping: f64,
     /// σ₀/μ, 1/m
     per_length: f64,
+    /// 1/τ, 1/s
+    straightening_per_s: f64,
 }
 
 impl Local for Bristles {
@@ -173,10 +180,12 @@ impl Local for Bristles {
             let slide = [0, 1].map(|a| w.of(i, |p| p.gap_rate[a]));
             let speed = (slide[0] * slide[0] + slide[1] * slide[1]).sqrt();
             let load = w.of(i, |p| p.normal).larger(N::Each::splat(0.0));
+            let acts = w.of(i, |p| p.acts());
             for axis in 0..2 {
                 let at = self.first + 2 * i + axis;
                 let bent = w.extra[at];
-                let rate = slide[axis] - speed * self.per_length * bent;
+                let sliding = slide[axis] - speed * self.per_length * bent;
+                let rate = acts.if_positive(sliding, bent * -self.straightening_per_s);
                 w.extra_rate[at] = rate;
                 let force = load * (bent * self.stiffness + rate * self.damping);
                 w.set(i, |p| &mut p.tangential[axis], force);
@@ -211,28 +220,6 @@ impl Local for Alone {
                 [N::Pair::splat(0.0); 2],
                 [p.gap_rate[0], p.gap_rate[1]],
             );
-        }
-    }
-}
-
-impl Book for Coulomb {
-    #[inline(always)]
-    fn power<N: Moments>(
-        &self,
-        _w: &Workspace<N>,
-        pairs: &[Pair<N>],
-        _first: usize,
-    ) -> Power<N::Each> {
-        let (mut work, mut absorbed) = (N::Pair::splat(0.0), N::Pair::splat(0.0));
-        for p in pairs {
-            for axis in 0..2 {
-                work += p.tangential[axis] * p.base_rate[axis];
-                absorbed += p.tangential[axis] * p.gap_rate[axis];
-            }
-        }
-        Power {
-            work_w: N::sum(work),
-            dissipated_w: N::sum(absorbed),
         }
     }
 }

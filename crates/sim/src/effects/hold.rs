@@ -4,7 +4,8 @@
 //! T* = k_t d + c_t ḋ        [N], in x and y
 //! ```
 //! d shoulder minus handle in the plane normal to z (m); k_t stiffness [N/m]; c_t damping [N·s/m]. Alone it is never
-//! capped and acts on a slack handle too (a grip); with the effect `friction` it cannot exceed μN.
+//! capped and acts on a slack handle too (a grip). With the effect `friction` it cannot exceed μN, but its anchor does not slip: what has slid
+//! farther than μN/k_t is drawn back with all of μN, as by hands that keep pulling. For what slips and stays: `friction` alone, or its bristles.
 //! Source: paper, section 3.3 ("tangential forces can be added"); palanquin-bench, law of T.
 
 use crate::lanes::{Moments, Number, f64x2, pack};
@@ -53,7 +54,12 @@ impl Hold {
         model.set_sideways_springs(damping.clone(), stiffness.clone());
         let law = SpringDampers(stiffness.into_iter().zip(damping).collect());
         model.add(Stage::Handles, law.clone());
-        model.add_account("hold", law);
+        if scene.effects.friction.is_some() {
+            // A spring that may slip holds less than its stretch says.
+            model.add_account("hold", Sideways);
+        } else {
+            model.add_account("hold", law);
+        }
     }
 }
 
@@ -72,8 +78,34 @@ impl Local for SpringDampers {
     }
 }
 
+/// Books the whole sideways force, whatever laws set it. It stores nothing: what it gives back counts as dissipated until then.
+#[derive(Debug)]
+pub(super) struct Sideways;
+
+impl Book for Sideways {
+    #[inline(always)]
+    fn power<N: Moments>(
+        &self,
+        _w: &Workspace<N>,
+        pairs: &[Pair<N>],
+        _first: usize,
+    ) -> Power<N::Each> {
+        let (mut work, mut absorbed) = (N::Pair::splat(0.0), N::Pair::splat(0.0));
+        for p in pairs {
+            for axis in 0..2 {
+                work = p.tangential[axis].madd(p.base_rate[axis], work);
+                absorbed = p.tangential[axis].madd(p.gap_rate[axis], absorbed);
+            }
+        }
+        Power {
+            work_w: N::sum(work),
+            dissipated_w: N::sum(absorbed),
+        }
+    }
+}
+
 impl Book for SpringDampers {
-    /// Books the whole tangential force, a friction limit on it included: what the cap takes counts as dissipated.
+    /// The whole sideways force, a sling's included, but for what the springs store.
     #[inline(always)]
     fn power<N: Moments>(
         &self,

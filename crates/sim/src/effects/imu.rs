@@ -3,7 +3,7 @@
 //! Sensors watch: the motion is bit for bit the same without them.
 
 use crate::model::Model;
-use crate::scene::{Checker, Problem, Scene, problem};
+use crate::scene::{Checker, MOST_SAMPLES, Problem, Scene, problem, shown};
 use crate::sensors::imu::{Draws, Seat, Triad};
 use nalgebra::UnitQuaternion;
 use schemars::JsonSchema;
@@ -105,9 +105,6 @@ impl Default for Sensor {
     }
 }
 
-/// Most samples of all sensors together.
-const MOST_SAMPLES: f64 = 1e9;
-
 impl Imu {
     pub(super) fn check(&self, scene: &Scene) -> Result<(), Problem> {
         let key = |name: &str| format!("effects.imu.{name}");
@@ -117,16 +114,12 @@ impl Imu {
                 &key("rate_hz"),
                 format!(
                     "{} Hz for {} s are more than {MOST_SAMPLES:e} samples",
-                    self.rate_hz, scene.duration_s
+                    shown(self.rate_hz),
+                    shown(scene.duration_s)
                 ),
             ));
         }
-        if !(0.0..=1.0).contains(&self.dropout) {
-            return Err(problem(
-                &key("dropout"),
-                format!("found {}, expected a probability from 0 to 1", self.dropout),
-            ));
-        }
+        Checker::within(&key("dropout"), self.dropout, 0.0..=1.0)?;
         for (name, x) in [
             (
                 "gyro_noise_rad_per_s_per_sqrt_hz",
@@ -170,7 +163,7 @@ impl Imu {
                 &key("mounting_roll_pitch_yaw_deg"),
                 &sensor.mounting_roll_pitch_yaw_deg,
             )?;
-            Checker::finite(&key("clock_offset_s"), sensor.clock_offset_s)?;
+            Checker::within(&key("clock_offset_s"), sensor.clock_offset_s, -1e9..=1e9)?;
             if scene.epoch_s + sensor.clock_offset_s < 0.0 {
                 return Err(problem(
                     &key("clock_offset_s"),
@@ -180,18 +173,7 @@ impl Imu {
                     ),
                 ));
             }
-            if sensor.clock_offset_s.abs() > 1e9 {
-                return Err(problem(
-                    &key("clock_offset_s"),
-                    format!("found {}, expected at most 1e9", sensor.clock_offset_s),
-                ));
-            }
-            if sensor.clock_drift_ppm.is_nan() || sensor.clock_drift_ppm.abs() > 1e5 {
-                return Err(problem(
-                    &key("clock_drift_ppm"),
-                    format!("found {}, expected -1e5 to 1e5", sensor.clock_drift_ppm),
-                ));
-            }
+            Checker::within(&key("clock_drift_ppm"), sensor.clock_drift_ppm, -1e5..=1e5)?;
             if let Some(name) = &sensor.name {
                 let fits = |c: char| c.is_ascii_alphanumeric() || c == '_';
                 if name.is_empty() || !name.chars().all(fits) {

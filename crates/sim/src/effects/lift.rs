@@ -4,7 +4,7 @@
 //! z_i = z_i0 + G(t) (z_i,gait − z_i0)        G(t) = 1 + (g − 1)(1 − e^{−(t − t₀)/τ})  for t ≥ t₀,  1 before
 //! ```
 //! g gain (1); t₀ onset (s); τ build-up (s), where 0 means g from t₀ on (then the shoulders jump at t₀ > 0, so a build-up
-//! is asked for there). Source: the archive's music logs, whose summed force is large before the phases lock.
+//! is asked for there). At t₀ their velocity jumps by (g − 1)(z_i,gait − z_i0)/τ. Source: the archive's music logs, whose summed force is large before the phases lock.
 
 use crate::lanes::{Moments, Number};
 use crate::model::{Local, Model, Pair, Part, Stage, Switch, Workspace};
@@ -105,11 +105,13 @@ struct Growing {
 impl Local for Growing {
     #[inline(always)]
     fn act<N: Moments>(&self, t_s: N::Each, w: &mut Workspace<N>, part: impl Part) {
-        // Stages of a step that ends at the onset see t ≤ t₀; a step never straddles it.
+        // `segment_s` decides, not t: the last stage of the step that ends at the onset still grows nothing, and what looks a little back
+        // from the onset sees no kink.
         let zero = N::Each::splat(0.0);
-        let heard_s = t_s + -self.onset_s;
-        let decay = (heard_s.larger(zero) * -self.per_s).exp();
-        let growing = (-heard_s).if_positive(zero, decay * (self.excess * self.per_s));
+        let before = -w.segment_s + self.onset_s;
+        let heard_s = before.if_positive(zero, t_s + -self.onset_s);
+        let decay = (heard_s * -self.per_s).exp();
+        let growing = before.if_positive(zero, decay * (self.excess * self.per_s));
         let gain = decay * -self.excess + (1.0 + self.excess);
         amplify(part.of_mut(&mut w.pair), gain, growing);
     }

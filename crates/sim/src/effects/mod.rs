@@ -98,12 +98,13 @@ pub const TABLE: &[Entry] = &[
     entry!(contact, "handles rest on shoulders: spring and damper"),
     entry!(hold, "hands hold the handles sideways: spring and damper"),
     entry!(
-        friction,
-        "sideways force at a handle is limited by Coulomb friction"
-    ),
-    entry!(
         sling,
         "straps pull a handle back sideways, in proportion to the load"
+    ),
+    // After what it limits.
+    entry!(
+        friction,
+        "sideways force at a handle is limited by Coulomb friction"
     ),
     entry!(
         pole_friction,

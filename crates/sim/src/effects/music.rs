@@ -54,7 +54,7 @@ impl Default for Music {
 
 impl Music {
     pub(super) fn check(&self, scene: &Scene) -> Result<(), Problem> {
-        Checker::not_negative("effects.music.beat_hz", self.beat_hz)?;
+        Checker::within("effects.music.beat_hz", self.beat_hz, 0.0..=FASTEST_HZ)?;
         Checker::per_carrier(
             "effects.music.strength_rad_per_s",
             &self.strength_rad_per_s,
@@ -62,24 +62,12 @@ impl Music {
         )?;
         Checker::not_negative("effects.music.onset_s", self.onset_s)?;
         Checker::not_negative("effects.music.build_up_s", self.build_up_s)?;
-        Checker::finite("effects.music.beat_phase_rad", self.beat_phase_rad)?;
-        if self.beat_hz > FASTEST_HZ {
-            return Err(problem(
-                "effects.music.beat_hz",
-                format!("found {}, expected at most {FASTEST_HZ}", self.beat_hz),
-            ));
-        }
+        Checker::angle_rad("effects.music.beat_phase_rad", self.beat_phase_rad)?;
         let mut free_s = 0.0;
         for (k, change) in self.tempo_changes.iter().enumerate() {
             let key = |name: &str| format!("effects.music.tempo_changes.{k}.{name}");
             Checker::not_negative(&key("over_s"), change.over_s)?;
-            Checker::not_negative(&key("beat_hz"), change.beat_hz)?;
-            if change.beat_hz > FASTEST_HZ {
-                return Err(problem(
-                    &key("beat_hz"),
-                    format!("found {}, expected at most {FASTEST_HZ}", change.beat_hz),
-                ));
-            }
+            Checker::within(&key("beat_hz"), change.beat_hz, 0.0..=FASTEST_HZ)?;
             if !change.at_s.is_finite() || change.at_s < free_s || change.at_s <= 0.0 {
                 return Err(problem(
                     &key("at_s"),

@@ -10,7 +10,7 @@
 
 use crate::model::{Model, Switch, Workspace};
 use crate::random::{Stream, normal_pair};
-use crate::scene::{Checker, Problem, Scene};
+use crate::scene::{Checker, MOST_SAMPLES, Problem, Scene, problem, shown};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
@@ -34,12 +34,24 @@ impl Default for Noise {
 }
 
 impl Noise {
-    pub(super) fn check(&self, _scene: &Scene) -> Result<(), Problem> {
+    pub(super) fn check(&self, scene: &Scene) -> Result<(), Problem> {
         Checker::not_negative(
             "effects.noise.phase_rad_per_sqrt_s",
             self.phase_rad_per_sqrt_s,
         )?;
-        Checker::positive("effects.noise.grid_hz", self.grid_hz)
+        let key = "effects.noise.grid_hz";
+        Checker::positive(key, self.grid_hz)?;
+        if self.grid_hz * scene.duration_s > MOST_SAMPLES {
+            return Err(problem(
+                key,
+                format!(
+                    "{} Hz for {} s are more than {MOST_SAMPLES:e} cells of noise; a gait cannot tell a grid of some hundred hertz from a finer one",
+                    shown(self.grid_hz),
+                    shown(scene.duration_s)
+                ),
+            ));
+        }
+        Ok(())
     }
 
     pub(super) fn build(&self, scene: &Scene, model: &mut Model) {

@@ -2,21 +2,22 @@
 //!
 //! ```text
 //! g = |g| (−sin s, −sin b cos s, −cos b cos s)                                            (slope)
-//! χ(t) = Δχ S((t − t₀)/T),  S(u) = u³(10 − 15u + 6u²) on 0 … 1        ċ = v (cos χ − 1, sin χ)         (turn)
+//! χ(t) = Δχ S((t − t₀)/T),  S(u) = u³(10 − 15u + 6u²) on 0 … 1        ċ = (R_z(χ) − 1) v               (turn)
 //! b_i ← c + R_z(χ) b_i        ḃ_i ← ċ + R_z(χ) ḃ_i + χ̇ ẑ × R_z(χ) b_i
 //! ```
 //! s slope, positive uphill along the walk (rad); b bank, positive where the left side is the higher one (rad); z stays the normal
-//! of the ground. χ heading (rad), Δχ turn (left is positive), t₀ beginning, T time it takes (s); v walking speed, the
-//! x part of `carriers.walk_m_per_s` [m/s]; c where the party's centre is, against the straight walk (m): two states. Heading, its
+//! of the ground. χ heading (rad), Δχ turn (left is positive), t₀ beginning, T time it takes (s); v walking velocity,
+//! `carriers.walk_m_per_s` [m/s]; c where the party's centre is, against the straight walk (m): two states. Heading, its
 //! rate and its curvature are continuous, so nothing jerks; t₀ and t₀ + T are moments the solver meets. Shoulders keep their
 //! places in the party, which turns as a whole: the outer carriers walk faster. Frames are not turned: everything
 //! stays in axes at rest, and centrifugal forces come out by themselves.
+//! A turn takes the load along only through forces sideways: x, y and yaw have to be free, and a hold, friction or a sling there.
 //! The slope replaces the direction of `body.gravity_m_per_s2`, not its size. Source: rigid kinematics; S is the quintic of
 //! least jerk (Flash & Hogan 1985).
 
 use crate::lanes::f64x2;
 use crate::model::{Model, Stage, Switch, Term, Workspace};
-use crate::scene::{Checker, Problem, Scene, problem};
+use crate::scene::{Checker, Freedom, Problem, Scene, problem, shown};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
@@ -49,7 +50,7 @@ impl Default for Path {
 }
 
 impl Path {
-    pub(super) fn check(&self, _scene: &Scene) -> Result<(), Problem> {
+    pub(super) fn check(&self, scene: &Scene) -> Result<(), Problem> {
         for (key, x) in [
             ("effects.path.slope_deg", self.slope_deg),
             ("effects.path.bank_deg", self.bank_deg),
@@ -57,17 +58,39 @@ impl Path {
             if x.is_nan() || x.abs() >= 60.0 {
                 return Err(problem(
                     key,
-                    format!("found {x}, expected above -60 and below 60: nobody walks there"),
+                    format!(
+                        "found {}, expected above -60 and below 60: nobody walks there",
+                        shown(x)
+                    ),
                 ));
             }
         }
-        Checker::finite("effects.path.turn_deg", self.turn_deg)?;
+        let key = "effects.path.turn_deg";
+        Checker::angle_rad(key, self.turn_deg.to_radians())?;
         Checker::not_negative("effects.path.turn_start_s", self.turn_start_s)?;
-        Checker::positive("effects.path.turn_time_s", self.turn_time_s)
+        Checker::positive("effects.path.turn_time_s", self.turn_time_s)?;
+        if self.turn_deg == 0.0 {
+            return Ok(());
+        }
+        let free = [Freedom::X, Freedom::Y, Freedom::Yaw];
+        if !free.iter().all(|f| scene.freedom.contains(f)) {
+            return Err(problem(
+                key,
+                "the party would turn away from its load; free x, y and yaw",
+            ));
+        }
+        let effects = &scene.effects;
+        if effects.hold.is_none() && effects.friction.is_none() && effects.sling.is_none() {
+            return Err(problem(
+                key,
+                "the party would turn away from its load, which nothing holds sideways; add `effects.hold`, `friction` or `sling`",
+            ));
+        }
+        Ok(())
     }
 
     /// Gravity as the sloping ground sees it.
-    fn lean(&self, gravity: [f64; 3]) -> [f64; 3] {
+    pub(super) fn lean(&self, gravity: [f64; 3]) -> [f64; 3] {
         let size = gravity.iter().map(|g| g * g).sum::<f64>().sqrt();
         let (s, b) = (self.slope_deg.to_radians(), self.bank_deg.to_radians());
         [
@@ -75,6 +98,14 @@ impl Path {
             -size * b.sin() * s.cos(),
             -size * b.cos() * s.cos(),
         ]
+    }
+
+    fn heading(&self) -> Heading {
+        Heading {
+            turn: self.turn_deg.to_radians(),
+            start_s: self.turn_start_s,
+            per_s: 1.0 / self.turn_time_s,
+        }
     }
 
     pub(super) fn build(&self, scene: &Scene, model: &mut Model) {
@@ -89,12 +120,11 @@ impl Path {
             Stage::Party,
             Turn {
                 first,
-                speed: scene.carriers.walk_m_per_s[0],
-                turn: self.turn_deg.to_radians(),
-                start_s: self.turn_start_s,
-                per_s: 1.0 / self.turn_time_s,
+                walk: scene.carriers.walk_m_per_s,
+                heading: self.heading(),
             },
         );
+        model.set_heading(self.heading());
         model.add_switch(Ends([
             self.turn_start_s,
             self.turn_start_s + self.turn_time_s,
@@ -102,31 +132,38 @@ impl Path {
     }
 }
 
-#[derive(Debug)]
-struct Turn {
-    first: usize,
-    speed: f64,
+/// Where the party faces.
+#[derive(Clone, Copy, Debug)]
+pub struct Heading {
     turn: f64,
     start_s: f64,
     per_s: f64,
 }
 
-impl Turn {
-    /// χ, χ̇
-    fn heading(&self, t_s: f64) -> (f64, f64) {
+impl Heading {
+    /// χ (rad), χ̇ (rad/s)
+    pub fn at(&self, t_s: f64) -> [f64; 2] {
         let u = ((t_s - self.start_s) * self.per_s).clamp(0.0, 1.0);
         let heading = u * u * u * (10.0 + u * (6.0 * u - 15.0));
         let rate = 30.0 * u * u * (1.0 - u) * (1.0 - u) * self.per_s;
-        (self.turn * heading, self.turn * rate)
+        [self.turn * heading, self.turn * rate]
     }
+}
+
+#[derive(Debug)]
+struct Turn {
+    first: usize,
+    walk: [f64; 3],
+    heading: Heading,
 }
 
 impl Term for Turn {
     fn apply(&self, t_s: f64, w: &mut Workspace) {
-        let (heading, rate) = self.heading(t_s);
+        let [heading, rate] = self.heading.at(t_s);
         let (sin, cos) = heading.sin_cos();
         let centre = [w.extra[self.first], w.extra[self.first + 1]];
-        let velocity = [self.speed * (cos - 1.0), self.speed * sin];
+        let [x, y, _] = self.walk;
+        let velocity = [x * (cos - 1.0) - y * sin, x * sin + y * (cos - 1.0)];
         for p in &mut w.pair {
             let ([x, y, _], [vx, vy, _]) = (p.base, p.base_rate);
             let (turned_x, turned_y) = (x * cos - y * sin, x * sin + y * cos);

@@ -12,8 +12,9 @@
 //! left, the same ratio at every amplitude, and is free in flight: a force in proportion to the load does that (with
 //! h = 0.1 m, M = 60 kg and a = 0.04795 it asks for L = 0.70 m and I_xx = 2.68 kg·m²), a spring of its own does not.
 
+use super::hold::Sideways;
 use crate::lanes::{Moments, Number};
-use crate::model::{Book, Local, Model, Pair, Part, Power, Stage, Workspace};
+use crate::model::{Local, Model, Pair, Part, Stage, Workspace};
 use crate::scene::{Checker, Problem, Scene};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -59,13 +60,13 @@ impl Sling {
             // The hold has set its force already, and its account books all that there is sideways.
             model.add(Stage::Handles, Beside(law));
         } else {
-            model.add(Stage::Handles, law.clone());
-            model.add_account("sling", law);
+            model.add(Stage::Handles, law);
+            model.add_account("sling", Sideways);
         }
     }
 }
 
-#[derive(Clone, Debug)]
+#[derive(Debug)]
 struct Strap {
     per_length: f64,
     damping_s: f64,
@@ -107,28 +108,6 @@ impl Local for Beside {
             let [x, y] = self.0.force(p, least_n);
             p.tangential[0] += x;
             p.tangential[1] += y;
-        }
-    }
-}
-
-impl Book for Strap {
-    #[inline(always)]
-    fn power<N: Moments>(
-        &self,
-        w: &Workspace<N>,
-        pairs: &[Pair<N>],
-        _first: usize,
-    ) -> Power<N::Each> {
-        let (mut work, mut absorbed) = (N::Pair::splat(0.0), N::Pair::splat(0.0));
-        for p in pairs {
-            for (axis, force) in self.force(p, w.least_load_n).into_iter().enumerate() {
-                work = force.madd(p.base_rate[axis], work);
-                absorbed = force.madd(p.gap_rate[axis], absorbed);
-            }
-        }
-        Power {
-            work_w: N::sum(work),
-            dissipated_w: N::sum(absorbed),
         }
     }
 }

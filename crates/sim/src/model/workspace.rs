@@ -45,6 +45,13 @@ pub struct Pair<N: Moments = Now> {
 }
 
 impl<N: Moments> Pair<N> {
+    /// Above 0 where N acts, which is always in a bilateral contact, else where it pushes.
+    #[inline(always)]
+    pub fn acts(&self) -> N::Pair {
+        // The floor is 0 or −∞.
+        self.normal.larger(-self.contact_floor)
+    }
+
     /// Puts the shoulders at rest.
     #[inline(always)]
     pub(super) fn stand(&mut self) {

@@ -2,6 +2,7 @@
 
 use super::{PerCarrier, Scene};
 use crate::body::Body;
+use std::ops::RangeInclusive;
 
 /// What is wrong with a scene, and at which key.
 #[derive(Debug, Clone, PartialEq)]
@@ -16,30 +17,56 @@ pub struct Problem {
 pub(crate) struct Checker;
 
 impl Checker {
-    pub fn finite(key: &str, x: f64) -> Result<(), Problem> {
-        if x.is_finite() {
-            Ok(())
-        } else {
-            Err(problem(key, format!("found {x}, expected a finite number")))
+    /// Greatest number that any unit of the tables asks for, and then some; products of two of them are still numbers.
+    pub const MOST: f64 = 1e18;
+    /// Greatest angle, rad: a number of that size still knows small turns.
+    const MOST_RAD: f64 = 1e6;
+
+    pub fn within(key: &str, x: f64, range: RangeInclusive<f64>) -> Result<(), Problem> {
+        if range.contains(&x) {
+            return Ok(());
         }
+        let (least, most) = (shown(*range.start()), shown(*range.end()));
+        let expected = if x < *range.start() {
+            format!("at least {least}")
+        } else if x > *range.end() {
+            format!("at most {most}")
+        } else {
+            "a number".into()
+        };
+        Err(problem(
+            key,
+            format!("found {}, expected {expected}", shown(x)),
+        ))
+    }
+
+    pub fn finite(key: &str, x: f64) -> Result<(), Problem> {
+        Self::within(key, x, -Self::MOST..=Self::MOST)
+    }
+
+    pub fn angle_rad(key: &str, x: f64) -> Result<(), Problem> {
+        Self::within(key, x, -Self::MOST_RAD..=Self::MOST_RAD)
     }
 
     pub fn positive(key: &str, x: f64) -> Result<(), Problem> {
-        if x > 0.0 && x.is_finite() {
-            Ok(())
+        if x > 0.0 {
+            Self::within(key, x, 1.0 / Self::MOST..=Self::MOST)
         } else {
             Err(problem(
                 key,
-                format!("found {x}, expected a number above zero"),
+                format!("found {}, expected a number above zero", shown(x)),
             ))
         }
     }
 
     pub fn not_negative(key: &str, x: f64) -> Result<(), Problem> {
-        if x >= 0.0 && x.is_finite() {
-            Ok(())
+        if x >= 0.0 {
+            Self::within(key, x, 0.0..=Self::MOST)
         } else {
-            Err(problem(key, format!("found {x}, expected zero or more")))
+            Err(problem(
+                key,
+                format!("found {}, expected zero or more", shown(x)),
+            ))
         }
     }
 
@@ -62,6 +89,15 @@ impl Checker {
     }
 }
 
+/// A number as a sentence wants it: not with hundreds of digits.
+pub(crate) fn shown(x: f64) -> String {
+    if x == 0.0 || (1e-4..1e9).contains(&x.abs()) {
+        format!("{x}")
+    } else {
+        format!("{x:e}")
+    }
+}
+
 pub(crate) fn problem(key: &str, message: impl Into<String>) -> Problem {
     Problem {
         key: key.into(),
@@ -69,8 +105,8 @@ pub(crate) fn problem(key: &str, message: impl Into<String>) -> Problem {
     }
 }
 
-/// Most samples that a run may log; beyond it a slip of the keyboard is likelier than a wish.
-const MOST_SAMPLES: f64 = 1e9;
+/// Most samples that a run may log, and cells that its noise may have; beyond it a slip of the keyboard is likelier than a wish.
+pub(crate) const MOST_SAMPLES: f64 = 1e9;
 
 /// Checks everything that the types do not.
 ///
@@ -84,7 +120,8 @@ pub fn check(scene: &Scene) -> Result<(), Problem> {
             "log_rate_hz",
             format!(
                 "{} s at {} Hz are more than {MOST_SAMPLES:e} samples; log less often",
-                scene.duration_s, scene.log_rate_hz
+                shown(scene.duration_s),
+                shown(scene.log_rate_hz)
             ),
         ));
     }
@@ -155,11 +192,12 @@ pub fn check(scene: &Scene) -> Result<(), Problem> {
         n,
     )?;
     Checker::per_carrier("carriers.frequency_hz", &scene.carriers.frequency_hz, n)?;
-    Checker::per_carrier(
-        "carriers.initial_phase_rad",
-        &scene.carriers.initial_phase_rad,
-        n,
-    )?;
+    let key = "carriers.initial_phase_rad";
+    Checker::per_carrier(key, &scene.carriers.initial_phase_rad, n)?;
+    let phases = scene.carriers.initial_phase_rad.values();
+    phases
+        .iter()
+        .try_for_each(|x| Checker::angle_rad(key, *x))?;
     Checker::not_negative(
         "carriers.initial_phase_sd_rad",
         scene.carriers.initial_phase_sd_rad,
@@ -178,7 +216,6 @@ pub fn check(scene: &Scene) -> Result<(), Problem> {
         &start.angular_velocity_rad_per_s,
     )?;
 
-    Checker::positive("solver.tolerance", scene.solver.tolerance)?;
     if !(1e-13..=1e-1).contains(&scene.solver.tolerance) {
         return Err(problem(
             "solver.tolerance",

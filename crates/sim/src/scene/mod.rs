@@ -8,7 +8,7 @@ mod check;
 mod parse;
 
 pub use builtin::{BUILTIN, builtin};
-pub(crate) use check::{Checker, problem};
+pub(crate) use check::{Checker, MOST_SAMPLES, problem, shown};
 pub use check::{Problem, check};
 pub use parse::{
     SceneError, Template, from_toml, json_schema, load, nearest, parse, setting_value, to_toml,
@@ -305,6 +305,24 @@ impl Carriers {
     /// How many there are.
     pub fn count(&self) -> usize {
         self.handles_m.len()
+    }
+
+    /// The handles of each pole, counted from 0, from its −x to its +x end: those of one y, give or take a micrometre; poles from right to left.
+    pub fn poles(&self) -> Vec<Vec<usize>> {
+        let [x, y] = [0, 1].map(|axis| move |i: &usize| self.handles_m[*i][axis]);
+        let mut all: Vec<usize> = (0..self.count()).collect();
+        all.sort_by(|a, b| y(a).total_cmp(&y(b)));
+        let mut poles: Vec<Vec<usize>> = Vec::new();
+        for i in all {
+            match poles.last_mut() {
+                Some(pole) if y(&i) - y(&pole[0]) < 1e-6 => pole.push(i),
+                _ => poles.push(vec![i]),
+            }
+        }
+        for pole in &mut poles {
+            pole.sort_by(|a, b| x(a).total_cmp(&x(b)));
+        }
+        poles
     }
 }
 

@@ -9,7 +9,7 @@
 //! in the body [rad/s, rad/s²]; p place of the sensor from the centre of mass, body axes (m). u the truth (f or ω_s),
 //! S diagonal scale errors (1), X misalignment (small angles between the axes) (rad), b bias, n white noise of density D
 //! [unit/√Hz] at sample rate r (Hz), W bias walk [unit/s/√Hz], Q rounding to the resolution.
-//! On a carrier the sensor rides on the shoulder, which does not turn but with the party's path: f = b̈ − g.
+//! On a carrier the sensor rides on the shoulder, which turns with the party's path alone: f = R_z(χ)ᵀ(b̈ − g), ω = χ̇ ẑ, χ the heading.
 //!
 //! Holds for a sensor rigid on its body whose own bandwidth is above r/2: each sample is the instantaneous value, so
 //! motion above r/2 folds back as it does in a chip without a filter. Source of the noise model: Woodman, *An
@@ -152,6 +152,15 @@ pub struct BodyMotion {
     pub angular_rad_per_s2: [f64; 3],
 }
 
+/// Motion of the carriers at a moment.
+#[derive(Clone, Copy, Debug)]
+pub struct PartyMotion<'a> {
+    /// b̈ of every shoulder in the world, m/s².
+    pub shoulders_m_per_s2: &'a [[f64; 3]],
+    /// Where the party faces, rad, and its rate, rad/s.
+    pub heading: [f64; 2],
+}
+
 /// What a faultless instrument would show.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Truth {
@@ -208,11 +217,11 @@ impl Imu {
         Memory { bias, gain }
     }
 
-    /// Specific force and angular velocity at its seat. `shoulders` holds b̈ of every carrier where one is asked for.
+    /// Specific force and angular velocity at its seat; the party's motion is asked for where that is a carrier.
     pub fn truth(
         &self,
         body: &BodyMotion,
-        shoulders: Option<&[[f64; 3]]>,
+        party: Option<PartyMotion<'_>>,
         gravity: [f64; 3],
     ) -> Truth {
         let gravity = Vector3::from(gravity);
@@ -229,8 +238,11 @@ impl Imu {
                 (spin, felt + euler + spin.cross(&spin.cross(&p)))
             }
             Seat::Carrier(i) => {
-                let moved = shoulders.map_or([0.0; 3], |all| all[i]);
-                (Vector3::zeros(), Vector3::from(moved) - gravity)
+                let moved = party.map_or([0.0; 3], |p| p.shoulders_m_per_s2[i]);
+                let [heading, rate] = party.map_or([0.0; 2], |p| p.heading);
+                let to_world = UnitQuaternion::from_axis_angle(&Vector3::z_axis(), heading);
+                let felt = to_world.inverse() * (Vector3::from(moved) - gravity);
+                (Vector3::new(0.0, 0.0, rate), felt)
             }
         };
         let back = self.mounting.inverse();

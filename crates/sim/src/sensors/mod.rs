@@ -68,14 +68,17 @@ impl<'m> Sensors<'m> {
             let (near, out) = (&mut self.near, &mut self.shoulders);
             imu::shoulder_accelerations(model, t_s, y, &self.dy, w, near, out);
         }
-        let shoulders = on_carriers.then_some(&self.shoulders[..]);
+        let party = on_carriers.then(|| imu::PartyMotion {
+            shoulders_m_per_s2: &self.shoulders,
+            heading: model.heading().map_or([0.0; 2], |way| way.at(t_s)),
+        });
         for (imu, memory) in model
             .imus()
             .iter()
             .zip(&mut self.memories)
             .filter(|(imu, _)| imu.clock == clock)
         {
-            let truth = imu.truth(&on_body, shoulders, model.body.gravity_m_per_s2.into());
+            let truth = imu.truth(&on_body, party, model.body.gravity_m_per_s2.into());
             if let Some(reading) = imu.measure(tick, t_s, truth, memory) {
                 sink(&reading);
             }

@@ -444,7 +444,7 @@ impl<'m> Course<'m> {
             self.changed(i, kind, observer);
         }
         // The laws agree at the zero: nothing that goes with N has to be asked again.
-        self.fresh = true;
+        self.fresh = !self.model.jumps_at_contact();
     }
 
     fn changed(&mut self, handle: usize, kind: EventKind, observer: &mut dyn Observer) {

@@ -369,6 +369,8 @@ impl<'m, P: Pair, const EVENTS: bool> Run<'m, P, EVENTS> {
             if self.watch {
                 self.note_stiffness(h);
             }
+            // A step that was cut to meet a moment says nothing against a longer one.
+            let cut = h < h_next;
             let mut t1 = if h == left {
                 self.course.stop_s()
             } else {
@@ -386,7 +388,10 @@ impl<'m, P: Pair, const EVENTS: bool> Run<'m, P, EVENTS> {
                 }
             };
             let e = error.max(1e-10);
-            first.held(|| Some(h * (SAFETY * e.powf(-P::EXPONENT)).clamp(SHRINK, GROW)));
+            first.held(|| {
+                let could = (SAFETY * e.powf(-P::EXPONENT)).clamp(SHRINK, GROW);
+                (!cut).then(|| h * could)
+            });
             let ln_error = e.ln();
             let factor = SAFETY * (P::EXPONENT * (0.2 * ln_error_before - 0.8 * ln_error)).exp();
             let factor = factor.clamp(
@@ -397,7 +402,6 @@ impl<'m, P: Pair, const EVENTS: bool> Run<'m, P, EVENTS> {
                     GROW
                 },
             );
-            // A step that was cut to meet a moment says nothing against a longer one.
             h_next = if h < h_next {
                 h_next.max(h * factor)
             } else {

@@ -385,8 +385,10 @@ impl Radau {
     /// Solves one step of at most `h`: the step that was accepted, its error, its rounds.
     fn solve(&mut self, course: &mut Course<'_>, mut h: f64) -> Result<(f64, f64, u32), Stopped> {
         let mut rejected = false;
+        // What is left before the next moment may be as short as it likes.
+        let wanted = h;
         loop {
-            if h < SMALLEST_STEP_S.min(self.h_s) {
+            if h < SMALLEST_STEP_S && h < wanted {
                 return Err(Stopped::StepTooSmall {
                     method: NAME,
                     t_s: course.t_s,
