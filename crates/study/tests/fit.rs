@@ -180,10 +180,10 @@ fn field_twins_lie_within_their_intervals() {
         let scene = sim::scene::load("field-imu", &settings).unwrap();
         let path = folder.path().join(format!("{k}.mcap"));
         field_log(&scene, &path);
-        let (mut field, window) = Field::read(&path).unwrap();
+        let (mut field, told) = Field::read(&path, None, false).unwrap();
         (field.onset_s, field.build_up_s) = (5.0, 11.0);
         field.handles_m.clone_from(&scene.carriers.handles_m);
-        fit(&field, window)
+        fit(&field, told.window)
     };
     let mut hits = std::collections::BTreeMap::new();
     let stop = std::sync::atomic::AtomicBool::new(false);

@@ -1,8 +1,10 @@
 //! `study fit FILE...`: parameters of the model from recordings.
 
-use super::{Format, print};
+use super::{Format, Input, print};
+use analyze::roles::RolesFile;
 use anyhow::Result;
 use serde_json::json;
+use sim::scene::load;
 use std::path::PathBuf;
 use study::fit::{Estimate, Field, Outcome, fit};
 use study::statistics::summarise;
@@ -15,9 +17,16 @@ pub struct Args {
     #[arg(required = true)]
     files: Vec<PathBuf>,
     /// The scene that says when the music begins, how it builds up, and, for a recording of sensors alone, where the handles are and
-    /// what the body weighs. Default: `music`, and no weight.
+    /// what the body weighs. Default: the scene attached to the recording; without one `music`, and no weight.
     #[arg(long, value_name = "SCENE")]
     scene: Option<String>,
+    /// TOML that says which signal plays which role, and what the sensors do not say of themselves, as for `analyze`
+    #[arg(long, value_name = "FILE")]
+    roles: Option<PathBuf>,
+    /// Put the carriers' clocks on the rath's first, by taps and by their heave. That takes away some of the lag by which a pull is seen, so
+    /// it is for clocks that are known to differ.
+    #[arg(long)]
+    put_clocks_right: bool,
     /// What to print.
     #[arg(long, value_enum, default_value_t = Format::Table)]
     format: Format,
@@ -32,22 +41,42 @@ A field recording (inertial sensors on the rath and on every carrier, stamped by
 handles carry for long enough, stiffness and damping; it may have come through `analyze FILE --annotate OUT.mcap` or not.";
 
 /// Fits every file, and says what they have in common.
-pub fn run(args: &Args) -> Result<()> {
-    let scene = sim::scene::load(args.scene.as_deref().unwrap_or("music"), &[])?;
-    let (onset_s, build_up_s) = scene
-        .effects
-        .music
-        .map_or((0.0, 0.0), |m| (m.onset_s, m.build_up_s));
+pub fn run(args: &Args) -> Result<Input> {
+    let said = match &args.scene {
+        Some(scene) => Some(load(scene, &[])?),
+        None => None,
+    };
+    let usual = load("music", &[])?;
+    let roles = match &args.roles {
+        Some(path) => Some(RolesFile::read(path).map_err(anyhow::Error::msg)?),
+        None => None,
+    };
+    let mut input = Input::Whole;
     let mut all: Vec<(String, Vec<Outcome>)> = Vec::new();
     for file in &args.files {
         let name = file.display().to_string();
-        let (mut field, window) = Field::read(file)?;
-        (field.onset_s, field.build_up_s) = (onset_s, build_up_s);
+        let (mut field, told) = Field::read(file, roles.as_ref(), args.put_clocks_right)?;
+        let known = said.as_ref().or(told.scene.as_ref());
+        let scene = known.unwrap_or(&usual);
+        (field.onset_s, field.build_up_s) = match &scene.effects.music {
+            Some(music) => (music.onset_s, music.build_up_s),
+            None => (0.0, 0.0),
+        };
         field.handles_m.clone_from(&scene.carriers.handles_m);
-        if args.scene.is_some() {
+        if known.is_some() {
             field.inputs.mass_kg.get_or_insert(scene.body.mass_kg);
         }
-        all.push((name, fit(&field, window)));
+        for clock in &told.clocks_apart {
+            recording::note!(
+                "study: {name}: {}; here clocks are left as they are: --put-clocks-right",
+                clock.trim_end_matches("; put right")
+            );
+        }
+        if let Some(damage) = told.damage {
+            recording::note!("study: {damage}");
+            input = Input::Damaged;
+        }
+        all.push((name, fit(&field, told.window)));
     }
     let together = common(&all);
     match args.format {
@@ -75,7 +104,7 @@ pub fn run(args: &Args) -> Result<()> {
                     )
                 })
                 .collect();
-            print(&format!("{:#}\n", json!({"files": files, "mean": mean})))
+            print(&format!("{:#}\n", json!({"files": files, "mean": mean})))?;
         }
         Format::Table => {
             let mut text = String::new();
@@ -94,9 +123,10 @@ pub fn run(args: &Args) -> Result<()> {
                     text += &line(e, &format!("  ({n} files)"));
                 }
             }
-            print(&text)
+            print(&text)?;
         }
     }
+    Ok(input)
 }
 
 fn line(e: &Estimate, after: &str) -> String {

@@ -68,6 +68,15 @@ pub enum Format {
     Json,
 }
 
+/// What was read.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Input {
+    /// As it was written.
+    Whole,
+    /// With losses; the rest was used.
+    Damaged,
+}
+
 /// Runs the command; errors go to stderr, one sentence first, then the causes.
 pub fn run() -> ExitCode {
     let mut words: Vec<OsString> = std::env::args_os().collect();
@@ -75,24 +84,26 @@ pub fn run() -> ExitCode {
         if is_file(&first) {
             words.insert(1, "run".into());
         } else if let Some(message) = unknown(&first) {
-            eprintln!("study: {message}");
+            recording::note!("study: {message}");
             return ExitCode::from(1);
         }
     }
+    let whole = |()| Input::Whole;
     let outcome = match Args::parse_from(words).command {
-        Command::Paper(args) => paper::run(&args),
-        Command::Predictions(args) => predictions::run(&args),
-        Command::Twin(args) => twin::run(&args),
-        Command::Run(args) => sweep::run(&args),
+        Command::Paper(args) => paper::run(&args).map(whole),
+        Command::Predictions(args) => predictions::run(&args).map(whole),
+        Command::Twin(args) => twin::run(&args).map(whole),
+        Command::Run(args) => sweep::run(&args).map(whole),
         Command::Fit(args) => fit::run(&args),
-        Command::Status(args) => status::run(&args),
-        Command::Merge(args) => merge::run(&args),
-        Command::Submit(args) => submit::run(&args),
+        Command::Status(args) => status::run(&args).map(whole),
+        Command::Merge(args) => merge::run(&args).map(whole),
+        Command::Submit(args) => submit::run(&args).map(whole),
     };
     match outcome {
-        Ok(()) => ExitCode::SUCCESS,
+        Ok(Input::Whole) => ExitCode::SUCCESS,
+        Ok(Input::Damaged) => ExitCode::from(3),
         Err(error) => {
-            eprintln!("study: {error:#}");
+            recording::note!("study: {error:#}");
             ExitCode::from(1)
         }
     }

@@ -92,7 +92,7 @@ pub fn run(args: &Args) -> Result<()> {
         Format::Table => text,
         Format::Json => format!("{:#}\n", to_json(&conditions, wall_s)),
     };
-    eprintln!(
+    recording::note!(
         "{} runs in {wall_s:.2} s",
         conditions.iter().map(|c| c.runs.len()).sum::<usize>()
     );

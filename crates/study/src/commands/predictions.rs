@@ -65,7 +65,7 @@ pub fn run(args: &Args) -> Result<()> {
         };
         let finding = (e.run)(&lab).map_err(|why| anyhow::anyhow!("{}: {why}", e.name))?;
         bar.finish_and_clear();
-        eprintln!(
+        recording::note!(
             "{}: {} ({} pieces of work, {:.0} s so far)",
             e.name,
             finding.verdict.map_or("done", |v| v.word()),

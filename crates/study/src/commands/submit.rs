@@ -92,7 +92,7 @@ pub fn run(args: &Args) -> Result<()> {
     let mut command = Command::new("sbatch");
     command.arg("--parsable").args(&args.options).arg(&job);
     if args.dry_run {
-        eprintln!("{} is written; nothing was submitted", job.display());
+        recording::note!("{} is written; nothing was submitted", job.display());
         return print(
             &format!("sbatch {} {}\n", args.options.join(" "), job.display()).replace("  ", " "),
         );
@@ -100,7 +100,7 @@ pub fn run(args: &Args) -> Result<()> {
     match command.output() {
         Ok(done) if done.status.success() => {
             let id = String::from_utf8_lossy(&done.stdout);
-            eprintln!(
+            recording::note!(
                 "{} runs in {} tasks submitted; `study status {}` says how far they are, `study merge {}` puts them together",
                 plan.runs(),
                 args.tasks,

@@ -86,7 +86,7 @@ pub fn run(args: &Args) -> Result<()> {
     let shard = match &args.shard {
         Some(text) => Some(Shard::parse(text).map_err(|e| anyhow!("--shard: {e}"))?),
         None => told.map_err(sentence)?.map(|(shard, name)| {
-            eprintln!("shard {shard}, as {name} says");
+            recording::note!("shard {shard}, as {name} says");
             shard
         }),
     };
@@ -122,7 +122,7 @@ pub fn run(args: &Args) -> Result<()> {
             if bar.is_hidden() && said.elapsed() > Duration::from_secs(60) {
                 said = Instant::now();
                 let rate = finished as f64 / began.elapsed().as_secs_f64();
-                eprintln!(
+                recording::note!(
                     "{finished} of {left} runs, {rate:.1}/s, {:.0} s left",
                     (left - finished) as f64 / rate
                 );
@@ -141,7 +141,7 @@ pub fn run(args: &Args) -> Result<()> {
         );
     }
     let wall_s = began.elapsed().as_secs_f64();
-    eprintln!(
+    recording::note!(
         "{} runs in {wall_s:.2} s ({:.1}/s), {} without a result{}",
         written.runs,
         written.runs as f64 / wall_s.max(1e-9),
@@ -152,7 +152,7 @@ pub fn run(args: &Args) -> Result<()> {
         }
     );
     if shard.is_some() {
-        eprintln!(
+        recording::note!(
             "`study merge {}` puts the parts together when all are there",
             out.display()
         );
@@ -168,10 +168,10 @@ pub fn report(plan: &Plan, store: &Store, out: &Path, figures: bool, format: For
         let folder = out.join("figures");
         let drawn =
             study::sweep::figures::draw(plan, store, &folder).map_err(anyhow::Error::msg)?;
-        eprintln!("{}: {drawn} figures", folder.display());
+        recording::note!("{}: {drawn} figures", folder.display());
     }
     let table = store.table();
-    eprintln!(
+    recording::note!(
         "{}: {} rows; summary.csv beside it",
         table.display(),
         summary.runs

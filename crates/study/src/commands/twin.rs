@@ -37,7 +37,7 @@ pub fn run(args: &Args) -> Result<()> {
     let found = twins(args.first_seed, args.seeds, args.jobs, stop, || bar.inc(1))
         .map_err(anyhow::Error::msg)?;
     bar.finish_and_clear();
-    eprintln!(
+    recording::note!(
         "{} twins in {:.1} s",
         found.iter().map(|f| f.twins.len()).sum::<usize>(),
         began.elapsed().as_secs_f64()

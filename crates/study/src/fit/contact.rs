@@ -1,11 +1,16 @@
 //! What the body feels: stiffness and damping at the handles, and the pendulum of its roll.
 
-use super::squares::{Block, bootstrapped, solve};
+use super::squares::{Block, bootstrapped, solve, unexplained};
 use super::{BLOCK_S, CARRIES, EDGE, Field, KEPT_S, Outcome, budgeted, pair};
 use analyze::imu::interval::Budget;
 use analyze::inputs::{Window, mean_step_s};
 use analyze::mechanism::spline_derivatives;
 use std::ops::Range;
+
+/// Compression that changes by less is none, m.
+const STILL_M: f64 = 1e-6;
+/// Share of the roll's acceleration that may have another cause than a pendulum's.
+const OTHER: f64 = 0.5;
 
 /// Stiffness and damping where contact is kept for a second and longer.
 pub(super) fn contact(field: &Field) -> Result<Vec<Outcome>, String> {
@@ -39,6 +44,13 @@ pub(super) fn contact(field: &Field) -> Result<Vec<Outcome>, String> {
         }
         blocks
     };
+    let moved = field.compression_m.iter().flatten();
+    let (least, most) = moved.fold((f64::INFINITY, f64::NEG_INFINITY), |(a, b), x| {
+        (a.min(*x), b.max(*x))
+    });
+    if !(most - least > STILL_M) {
+        return Err("the load stands still".into());
+    }
     let blocks = sums(1);
     let why = || "contact is never kept for a second".to_owned();
     let (value, interval) = bootstrapped(&blocks, |p| [p[0], p[1]]).ok_or_else(why)?;
@@ -198,6 +210,13 @@ pub(super) fn pendulum(field: &Field, window: Window) -> Result<Vec<Outcome>, St
     }
     let (value, interval) =
         bootstrapped(&blocks, |p| [p[0], p[1]]).ok_or("the roll does not move")?;
+    let other = unexplained(&blocks).unwrap_or(1.0);
+    if other > OTHER {
+        return Err(format!(
+            "the roll does not swing as a pendulum: {:.0} % of its acceleration has another cause",
+            100.0 * other
+        ));
+    }
     let names = [("pendulum", "1/(kg·m)"), ("roll damping", "1/s")];
     Ok(pair(names, value, interval))
 }

@@ -23,148 +23,333 @@ pub(super) fn gait(field: &Field) -> Result<Vec<Outcome>, String> {
     if i.phases_are_measured {
         return gait_from_steps(i, from);
     }
-    let t_s = &t_s[from..];
+    let heard: Vec<f64> = i.beat_phase_rad.iter().skip(from).copied().collect();
     let phases: Vec<Vec<f64>> = i.phase_rad.iter().map(|p| unwrap(&p[from..])).collect();
     if phases.iter().flatten().any(|p| !p.is_finite()) {
         return Err("phases have gaps".into());
     }
-    let (n, carriers) = (t_s.len(), phases.len());
-    let middle = 0.5 * (t_s[0] + t_s[n - 1]);
-    let grown = |t: f64| match field.build_up_s {
+    let t_s = &t_s[from..];
+    let grown = t_s.iter().map(|t| match field.build_up_s {
         0.0 => 1.0,
         tau => 1.0 - (-(t - field.onset_s) / tau).exp(),
+    });
+    let problem = Increments {
+        t_s,
+        phases,
+        grown: grown.collect(),
     };
-    // In the last third the carriers follow the beat if they ever do: where the search begins.
-    let third = 2 * n / 3;
-    let span = t_s[n - 1] - t_s[third];
-    let mean = phases
-        .iter()
-        .map(|p| (p[n - 1] - p[third]) / span)
-        .sum::<f64>()
-        / carriers as f64;
-    // Unknowns: A = K cos ψ, B = K sin ψ (ψ at the middle), Ω, ω_1 …
-    let size = 3 + carriers;
-    let normal = |omega: f64, a: f64, b: f64, own: &[f64]| {
-        let mut gram = DMatrix::<f64>::zeros(size, size);
-        let mut right = DVector::<f64>::zeros(size);
-        let (mut squares, mut kept) = (0.0, 0.0);
+    if heard.iter().filter(|psi| psi.is_finite()).count() >= 100 {
+        problem.under_a_beat(&heard)
+    } else {
+        problem.under_a_hidden_beat()
+    }
+}
+
+/// Phases of the carriers after the onset of the music, and how far its pull has grown.
+struct Increments<'a> {
+    t_s: &'a [f64],
+    phases: Vec<Vec<f64>>,
+    grown: Vec<f64>,
+}
+
+/// The pull, as parts that go with the sine and the cosine of the beat, rad/s; the own frequencies, rad/s.
+#[derive(Clone)]
+struct Drive {
+    a: f64,
+    b: f64,
+    own: Vec<f64>,
+}
+
+/// What came out; pull and own frequencies (rad/s) with their variances.
+struct Answer {
+    beat: Outcome,
+    /// Of the beat, rad/s.
+    rate: f64,
+    pull: (f64, f64),
+    own: Vec<(f64, f64)>,
+}
+
+/// A linear problem about a drive. Unknowns: A, B, Ω, ω_1 …
+struct Normal {
+    gram: DMatrix<f64>,
+    right: DVector<f64>,
+    /// Sum of squares of what is missed, times dt.
+    squares: f64,
+    /// Share of the noise's power that the pull leaves within an increment, summed.
+    kept: f64,
+    /// Σ e_k e_{k+1} of what is missed, a carrier's increment by the next.
+    with_next: f64,
+    rows: usize,
+}
+
+impl Normal {
+    /// Variance of the phase noise, rad²/s.
+    fn variance(&self, unknowns: usize) -> f64 {
+        self.squares / (self.rows - unknowns) as f64
+    }
+
+    /// Whether what is missed looks like noise: the one increment says nothing of the next. What is missed next to nothing of need not.
+    fn is_white(&self, pull: f64, dt: f64) -> bool {
+        let likeness = self.with_next / self.squares;
+        let missed = (self.squares / (self.rows as f64 * dt)).sqrt();
+        likeness.abs() < ALIKE || missed < 0.01 * pull
+    }
+}
+
+/// Likeness of neighbouring residuals that white noise does not show.
+const ALIKE: f64 = 0.2;
+/// A pull that is not so many standard errors is none: the best of many frequencies has some by chance.
+const SURE: f64 = 6.0;
+
+impl Increments<'_> {
+    fn unknowns(&self) -> usize {
+        3 + self.phases.len()
+    }
+
+    /// Rates of all increments, linear in the unknowns about `drive`, under a beat whose phase at sample k is `psi(k)` and whose phase turns with
+    /// Ω by `turn_s(k)`.
+    fn normal(
+        &self,
+        psi: impl Fn(usize) -> f64,
+        turn_s: impl Fn(usize) -> f64,
+        drive: &Drive,
+    ) -> Normal {
+        let size = self.unknowns();
+        let mut out = Normal {
+            gram: DMatrix::zeros(size, size),
+            right: DVector::zeros(size),
+            squares: 0.0,
+            kept: 0.0,
+            with_next: 0.0,
+            rows: 0,
+        };
+        let (a, b) = (drive.a, drive.b);
         let mut row = DVector::<f64>::zeros(size);
-        for (c, phase) in phases.iter().enumerate() {
-            for k in 1..n {
-                let dt = t_s[k] - t_s[k - 1];
+        for (c, phase) in self.phases.iter().enumerate() {
+            let mut before = 0.0;
+            for k in 1..self.t_s.len() {
+                let dt = self.t_s[k] - self.t_s[k - 1];
                 let rate = (phase[k] - phase[k - 1]) / dt;
+                if !(psi(k - 1) + psi(k)).is_finite() {
+                    before = 0.0;
+                    continue;
+                }
                 let (mut s, mut co, mut turn, mut back) = (0.0, 0.0, 0.0, 0.0);
                 // At the end of the increment the phase that is to be expected from its beginning. The one that was observed holds the
                 // increment's own noise, which on both sides took half of a pull of 2.7 rad/s away at 0.3 rad/√s.
                 let mut off = 0.0;
                 for j in [k - 1, k] {
-                    let x = omega * (t_s[j] - middle) - phase[j] + off;
-                    let (sin, cos) = x.sin_cos();
-                    let m = grown(t_s[j]);
+                    let (sin, cos) = (psi(j) - phase[j] + off).sin_cos();
+                    let m = self.grown[j];
                     s += 0.5 * m * sin;
                     co += 0.5 * m * cos;
                     let held = 0.5 * m * (a * cos - b * sin);
-                    turn += held * (t_s[j] - middle);
+                    turn += held * turn_s(j);
                     back += held;
-                    off = (rate - own[c] - m * (a * sin + b * cos)) * dt;
+                    off = (rate - drive.own[c] - m * (a * sin + b * cos)) * dt;
                 }
                 row.fill(0.0);
                 (row[0], row[1], row[2], row[3 + c]) = (s, co, turn, 1.0);
-                let miss = rate - own[c] - a * s - b * co;
+                let miss = rate - drive.own[c] - a * s - b * co;
                 // Increments over dt have variance σ²/dt: weight dt, the same for an even clock.
-                gram.ger(dt, &row, &row, 1.0);
-                right.axpy(dt * miss, &row, 1.0);
-                squares += dt * miss * miss;
+                out.gram.ger(dt, &row, &row, 1.0);
+                out.right.axpy(dt * miss, &row, 1.0);
+                out.squares += dt * miss * miss;
+                out.with_next += before * dt.sqrt() * miss;
+                before = dt.sqrt() * miss;
                 // Less what the pull takes back of the noise within dt.
-                kept += (1.0 - back * dt).max(0.1);
+                out.kept += (1.0 - back * dt).max(0.1);
+                out.rows += 1;
             }
         }
-        (gram, right, squares, kept)
-    };
-    // Where in its turn the beat is, and how strong: a coarse look before the descent.
-    let own0 = vec![mean; carriers];
-    let mut best = (f64::INFINITY, mean, 0.0, 0.0, own0.clone());
-    for step in -20..=20 {
-        let omega: f64 = mean + f64::from(step) * 0.25 / span;
-        let (gram, right, ..) = normal(omega, 0.0, 0.0, &own0);
-        // Without Ω the problem is linear.
-        let keep: Vec<usize> = (0..size).filter(|k| *k != 2).collect();
-        let small = gram.select_rows(&keep).select_columns(&keep);
-        let Some(x) = small.lu().solve(&right.select_rows(&keep)) else {
-            continue;
-        };
-        let own: Vec<f64> = (0..carriers).map(|c| mean + x[2 + c]).collect();
-        let (_, _, squares, _) = normal(omega, x[0], x[1], &own);
-        if squares < best.0 {
-            best = (squares, omega, x[0], x[1], own);
-        }
+        out
     }
-    let (mut squares, mut omega, mut a, mut b, mut own) = best;
-    for _ in 0..50 {
-        let (gram, right, ..) = normal(omega, a, b, &own);
-        let step = gram
-            .lu()
-            .solve(&right)
-            .ok_or("beat and gait cannot be told apart")?;
-        // Half steps until it is better: far from the answer the beat's frequency overshoots.
-        let mut part = 1.0;
-        loop {
-            let new_own: Vec<f64> = own
-                .iter()
+
+    /// Where the beat was recorded: everything but its tempo is linear.
+    fn under_a_beat(&self, heard: &[f64]) -> Result<Vec<Outcome>, String> {
+        let known: Vec<(f64, f64)> = self
+            .t_s
+            .iter()
+            .copied()
+            .zip(heard.iter().copied())
+            .collect();
+        let longest = known
+            .chunk_by(|a, b| a.1.is_finite() == b.1.is_finite())
+            .filter(|stretch| stretch[0].1.is_finite())
+            .max_by_key(|stretch| stretch.len())
+            .ok_or("no beat")?;
+        let (t_s, psi): (Vec<f64>, Vec<f64>) = longest.iter().copied().unzip();
+        let (omega, omega_half) = tempo(&t_s, &unwrap(&psi));
+        let carriers = self.phases.len();
+        // Of the unknowns A and the own frequencies.
+        let keep: Vec<usize> = std::iter::once(0).chain(3..3 + carriers).collect();
+        let psi = |k: usize| heard[k];
+        let mut drive = Drive {
+            a: 0.0,
+            b: 0.0,
+            own: vec![omega; carriers],
+        };
+        let no_tempo = |_: usize| 0.0;
+        for _ in 0..50 {
+            let found = self.normal(psi, no_tempo, &drive);
+            let gram = found.gram.select_rows(&keep).select_columns(&keep);
+            let step = gram
+                .lu()
+                .solve(&found.right.select_rows(&keep))
+                .ok_or(APART)?;
+            drive.a += step[0];
+            drive
+                .own
+                .iter_mut()
                 .enumerate()
-                .map(|(c, w)| w + part * step[3 + c])
-                .collect();
-            let new = (
-                omega + part * step[2],
-                a + part * step[0],
-                b + part * step[1],
-            );
-            let found = normal(new.0, new.1, new.2, &new_own).2;
-            if found <= squares || part < 1e-3 {
-                (omega, a, b, own, squares) = (new.0, new.1, new.2, new_own, found);
+                .for_each(|(c, w)| *w += step[1 + c]);
+            if step.norm() < 1e-10 {
                 break;
             }
-            part *= 0.5;
         }
-        if step.norm() < 1e-10 {
-            break;
+        let found = self.normal(psi, no_tempo, &drive);
+        let variance = found.variance(keep.len());
+        let gram = found.gram.select_rows(&keep).select_columns(&keep);
+        let cover = gram.try_inverse().ok_or(APART)? * variance;
+        let own = drive.own.into_iter().enumerate();
+        let answer = Answer {
+            beat: estimate("beat", "Hz", omega / TAU, omega_half / TAU),
+            rate: omega,
+            pull: (drive.a, cover[(0, 0)]),
+            own: own.map(|(c, w)| (w, cover[(1 + c, 1 + c)])).collect(),
+        };
+        self.told(answer, &found, keep.len())
+    }
+
+    /// Where nobody recorded the beat: its tempo and phase are looked for.
+    fn under_a_hidden_beat(&self) -> Result<Vec<Outcome>, String> {
+        let (t_s, phases) = (self.t_s, &self.phases);
+        let (n, carriers, size) = (t_s.len(), phases.len(), self.unknowns());
+        let middle = 0.5 * (t_s[0] + t_s[n - 1]);
+        let from_middle = |k: usize| t_s[k] - middle;
+        let normal =
+            |omega: f64, drive: &Drive| self.normal(|k| omega * from_middle(k), from_middle, drive);
+        // In the last third the carriers follow the beat if they ever do: where the search begins.
+        let third = 2 * n / 3;
+        let span = t_s[n - 1] - t_s[third];
+        let mean = phases
+            .iter()
+            .map(|p| (p[n - 1] - p[third]) / span)
+            .sum::<f64>()
+            / carriers as f64;
+        // Where in its turn the beat is, and how strong: a coarse look before the descent.
+        let alone = Drive {
+            a: 0.0,
+            b: 0.0,
+            own: vec![mean; carriers],
+        };
+        let mut best = (f64::INFINITY, mean, alone.clone());
+        for step in -20..=20 {
+            let omega: f64 = mean + f64::from(step) * 0.25 / span;
+            let found = normal(omega, &alone);
+            // Without Ω the problem is linear.
+            let keep: Vec<usize> = (0..size).filter(|k| *k != 2).collect();
+            let small = found.gram.select_rows(&keep).select_columns(&keep);
+            let Some(x) = small.lu().solve(&found.right.select_rows(&keep)) else {
+                continue;
+            };
+            let drive = Drive {
+                a: x[0],
+                b: x[1],
+                own: (0..carriers).map(|c| mean + x[2 + c]).collect(),
+            };
+            let squares = normal(omega, &drive).squares;
+            if squares < best.0 {
+                best = (squares, omega, drive);
+            }
         }
+        let (mut squares, mut omega, mut drive) = best;
+        for _ in 0..50 {
+            let found = normal(omega, &drive);
+            let step = found.gram.lu().solve(&found.right).ok_or(APART)?;
+            // Half steps until it is better: far from the answer the beat's frequency overshoots.
+            let mut part = 1.0;
+            loop {
+                let own = drive.own.iter().enumerate();
+                let new = Drive {
+                    a: drive.a + part * step[0],
+                    b: drive.b + part * step[1],
+                    own: own.map(|(c, w)| w + part * step[3 + c]).collect(),
+                };
+                let new_omega = omega + part * step[2];
+                let found = normal(new_omega, &new).squares;
+                if found <= squares || part < 1e-3 {
+                    (omega, drive, squares) = (new_omega, new, found);
+                    break;
+                }
+                part *= 0.5;
+            }
+            if step.norm() < 1e-10 {
+                break;
+            }
+        }
+        let found = normal(omega, &drive);
+        let cover = found.gram.clone().try_inverse().ok_or(APART)? * found.variance(size);
+        let pull = drive.a.hypot(drive.b);
+        let (ca, cb) = (drive.a / pull, drive.b / pull);
+        let pull_variance =
+            ca * ca * cover[(0, 0)] + 2.0 * ca * cb * cover[(0, 1)] + cb * cb * cover[(1, 1)];
+        let own = drive.own.into_iter().enumerate();
+        let answer = Answer {
+            beat: estimate("beat", "Hz", omega / TAU, half(cover[(2, 2)]) / TAU),
+            rate: omega,
+            pull: (pull, pull_variance),
+            own: own.map(|(c, w)| (w, cover[(3 + c, 3 + c)])).collect(),
+        };
+        self.told(answer, &found, size)
     }
-    let (gram, _, squares, kept) = normal(omega, a, b, &own);
-    let variance = squares / ((n - 1) * carriers - size) as f64;
-    let inverse = gram
-        .try_inverse()
-        .ok_or("beat and gait cannot be told apart")?;
-    let cover = inverse * variance;
-    let half = |v: f64| 1.96 * v.max(0.0).sqrt();
-    let pull = a.hypot(b);
-    let (ca, cb) = (a / pull, b / pull);
-    let pull_variance =
-        ca * ca * cover[(0, 0)] + 2.0 * ca * cb * cover[(0, 1)] + cb * cb * cover[(1, 1)];
-    let mut out = vec![
-        estimate("beat", "Hz", omega / TAU, half(cover[(2, 2)]) / TAU),
-        estimate("pull", "rad/s", pull, half(pull_variance)),
-    ];
-    for (c, w) in own.iter().enumerate() {
-        let k = 3 + c;
-        out.push(estimate(
-            format!("gait {}", c + 1),
-            "Hz",
-            w / TAU,
-            half(cover[(k, k)]) / TAU,
-        ));
+
+    /// Everything that was found, or why it is nothing.
+    fn told(
+        &self,
+        answer: Answer,
+        found: &Normal,
+        unknowns: usize,
+    ) -> Result<Vec<Outcome>, String> {
+        let step_s = (self.t_s[self.t_s.len() - 1] - self.t_s[0]) / (self.t_s.len() - 1) as f64;
+        let (pull, pull_variance) = answer.pull;
+        // What the mean of both ends of an increment is off, where a carrier runs at another rate than the beat.
+        let off = |w: f64| pull * ((w - answer.rate) * step_s).powi(2) / 12.0;
+        let rough = answer.own.iter().map(|(w, _)| off(*w)).fold(0.0, f64::max);
+        let pull_half = half(pull_variance).hypot(rough);
+        if !found.is_white(pull.abs(), step_s) {
+            return Err(format!(
+                "the phases do not follow one beat: what it leaves of one increment is like the next (by {:.2})",
+                found.with_next / found.squares
+            ));
+        }
+        if !(pull > SURE / 1.96 * pull_half) {
+            return Err(format!(
+                "no pull shows in the phases (at most {:.2} rad/s)",
+                pull.max(0.0) + pull_half
+            ));
+        }
+        let mut out = vec![answer.beat, estimate("pull", "rad/s", pull, pull_half)];
+        for (c, (w, variance)) in answer.own.into_iter().enumerate() {
+            let name = format!("gait {}", c + 1);
+            out.push(estimate(name, "Hz", w / TAU, half(variance) / TAU));
+        }
+        // The noise: its variance has itself a known spread.
+        let rows = found.rows as f64;
+        let sigma = (found.variance(unknowns) * rows / found.kept).sqrt();
+        let count = rows - unknowns as f64;
+        let spread = 1.96 * sigma / (2.0 * count).sqrt();
+        out.push(estimate("phase noise", "rad/√s", sigma, spread));
+        Ok(out)
     }
-    // The noise: its variance has itself a known spread.
-    let all = ((n - 1) * carriers) as f64;
-    let sigma = (variance * all / kept).sqrt();
-    let count = all - size as f64;
-    out.push(estimate(
-        "phase noise",
-        "rad/√s",
-        sigma,
-        1.96 * sigma / (2.0 * count).sqrt(),
-    ));
-    Ok(out)
+}
+
+/// Why beat and gait give no answer.
+const APART: &str = "beat and gait cannot be told apart";
+
+/// Half of a 95 % interval.
+fn half(variance: f64) -> f64 {
+    1.96 * variance.max(0.0).sqrt()
 }
 
 /// The same where steps tell the phases and a recorder or a topic the beats: Adler's test, which knows what a step detector does. What is walked

@@ -3,18 +3,38 @@
 use super::Field;
 use analyze::Window;
 use analyze::examine::{Request, examine};
+use analyze::quality::Quality;
+use analyze::roles::RolesFile;
 use anyhow::{Result, anyhow};
 use recording::import::{ImportOptions, ingest};
 use recording::read::{ReadOptions, Recording};
 use recording::write::{RecordingWriter, WriterOptions};
+use sim::scene::Scene;
 use std::path::Path;
 
+/// What a recording says beside its columns.
+pub struct Told {
+    /// Its window of analysis.
+    pub window: Window,
+    /// The scene that it was made from, where one is attached.
+    pub scene: Option<Scene>,
+    /// What is lost, where it is damaged: one sentence.
+    pub damage: Option<String>,
+    /// What `analyze` would put right in the clocks of sensors, where that was not asked for.
+    pub clocks_apart: Vec<String>,
+}
+
 impl Field {
-    /// The columns of a recording, or of a log of the paper's archive (.npz), and its window of analysis.
+    /// The columns of a recording, or of a log of the paper's archive (.npz), and what else it says; `roles` says what it does not. With
+    /// `put_clocks_right` the carriers' clocks are put on the rath's first.
     ///
     /// # Errors
     /// One sentence where it cannot be read, or nothing in it moves.
-    pub fn read(file: &Path) -> Result<(Self, Window)> {
+    pub fn read(
+        file: &Path,
+        roles: Option<&RolesFile>,
+        put_clocks_right: bool,
+    ) -> Result<(Self, Told)> {
         let name = file.display().to_string();
         let log = file
             .extension()
@@ -32,7 +52,8 @@ impl Field {
         };
         // To put clocks right by the carriers' own lags would take away what the pull is seen by.
         let request = Request {
-            one_clock: true,
+            one_clock: !put_clocks_right,
+            roles: roles.cloned(),
             ..Request::default()
         };
         let analysis = examine(&name, &recording, &request)?;
@@ -50,11 +71,34 @@ impl Field {
                 "{name}: nothing in it moves: no state and no inertial sensor was found"
             ));
         }
+        let scene = recording
+            .attachment("scene.toml")
+            .and_then(|text| String::from_utf8(text).ok())
+            .and_then(|text| sim::scene::parse("scene.toml", &text, &[]).ok());
+        // Only sensors have clocks of their own.
+        let clocks_apart = match put_clocks_right || analysis.inputs.heave_m.is_empty() {
+            true => Vec::new(),
+            false => {
+                let request = Request {
+                    one_clock: false,
+                    ..request
+                };
+                let found = examine(&name, &recording, &request)?;
+                let clocks = found.quality.iter().filter(|q| q.kind == "clock_offset");
+                clocks.map(Quality::told).collect()
+            }
+        };
+        let told = Told {
+            window: analysis.window,
+            scene,
+            damage: analysis.damage(),
+            clocks_apart,
+        };
         let field = Field {
             inputs: analysis.inputs,
             compression_m,
             ..Field::default()
         };
-        Ok((field, analysis.window))
+        Ok((field, told))
     }
 }

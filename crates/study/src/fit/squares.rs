@@ -9,6 +9,7 @@ use sim::random::{Stream, uniform_pair};
 pub(super) struct Block<const N: usize> {
     gram: SMatrix<f64, N, N>,
     right: SVector<f64, N>,
+    square: f64,
 }
 
 impl<const N: usize> Block<N> {
@@ -16,6 +17,7 @@ impl<const N: usize> Block<N> {
         Self {
             gram: SMatrix::zeros(),
             right: SVector::zeros(),
+            square: 0.0,
         }
     }
 
@@ -23,6 +25,7 @@ impl<const N: usize> Block<N> {
         let x = SVector::from(x);
         self.gram += x * x.transpose();
         self.right += x * y;
+        self.square += y * y;
     }
 }
 
@@ -47,6 +50,14 @@ pub(super) fn solve<const N: usize>(
             .solve(&sum.right.component_mul(&scale))
             .component_mul(&scale)
     })
+}
+
+/// Share of Σ y² that the parameters leave unexplained.
+pub(super) fn unexplained<const N: usize>(blocks: &[Block<N>]) -> Option<f64> {
+    let p = solve(blocks, |k| k)?;
+    let right: SVector<f64, N> = blocks.iter().map(|b| b.right).sum();
+    let square: f64 = blocks.iter().map(|b| b.square).sum();
+    Some(1.0 - p.dot(&right) / square)
 }
 
 /// What `of` makes of the parameters, with intervals by the bootstrap.
