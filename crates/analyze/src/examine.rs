@@ -124,6 +124,27 @@ impl Analysis {
         self.skipped_messages > 0 || self.quality.iter().any(|q| q.loss)
     }
 
+    /// What is lost, where something is: one sentence.
+    pub fn damage(&self) -> Option<String> {
+        self.lost().then(|| {
+            let losses = self.quality.iter().filter(|q| q.loss);
+            let told: Vec<String> = losses.map(Quality::told).collect();
+            let lost = match self.skipped_messages {
+                0 if self.quality.iter().any(|q| q.kind == "truncated") => {
+                    "its end is missing".to_owned()
+                }
+                0 => "no whole message is known to be lost".to_owned(),
+                1 => "1 message is lost".to_owned(),
+                n => format!("{n} messages are lost"),
+            };
+            format!(
+                "{}: the file is damaged; {lost}, the rest was used: {}",
+                self.file,
+                told.join("; ")
+            )
+        })
+    }
+
     /// Whether there is a signal that could be used.
     pub fn is_empty(&self) -> bool {
         self.signals.is_empty()
@@ -159,6 +180,7 @@ pub fn examine(
         .unwrap_or_default();
     let duration_s = ((i128::from(info.end_ns) - i128::from(info.start_ns)) as f64 / 1e9).max(0.0);
     let said = request.roles.as_ref();
+    warnings.extend(said.iter().flat_map(|said| pass.misnamed(said)));
     let mut inputs = pass.inputs(&metadata, said);
     let window = window(request, &metadata, said, duration_s, &mut warnings);
     let mut field = match estimates(recording, &roles, request) {
@@ -377,7 +399,7 @@ impl<'a> Pass<'a> {
             self.push(entry, batch, column.rows, column.values, column.finite);
         }
         let mut quaternions = std::mem::take(&mut self.quaternions);
-        quaternions.each(batch, |path, values| {
+        quaternions.each(batch, |path, rows, values| {
             if wanted(path, self.request, self.roles) {
                 let entry = match self.by_path.get(path) {
                     Some(entry) => *entry,
@@ -387,7 +409,7 @@ impl<'a> Pass<'a> {
                         entry
                     }
                 };
-                self.push(entry, batch, None, values, false);
+                self.push(entry, batch, rows, values, false);
             }
         });
         self.quaternions = quaternions;
@@ -624,6 +646,55 @@ impl<'a> Pass<'a> {
             .unzip()
     }
 
+    /// What a roles file names and the recording does not have, or has too much of.
+    fn misnamed(&self, said: &RolesFile) -> Vec<String> {
+        let mut out = Vec::new();
+        for role in Role::ALL {
+            for name in &said.patterns(role) {
+                let name = name.as_str();
+                let names: Vec<&str> = match role.is_topic() {
+                    true => self
+                        .recording
+                        .info()
+                        .channels
+                        .iter()
+                        .map(|c| c.topic.as_str())
+                        .collect(),
+                    false => self.entries.iter().map(|e| e.path.as_str()).collect(),
+                };
+                let found = names.iter().filter(|path| matches(name, path)).count();
+                let role = role.name();
+                if found == 0 {
+                    let near = names
+                        .iter()
+                        .min_by_key(|path| strsim::damerau_levenshtein(path, name));
+                    let near = near
+                        .filter(|path| 3 * strsim::damerau_levenshtein(path, name) <= name.len());
+                    let hint = near.map_or(String::new(), |path| format!("; did you mean {path}?"));
+                    out.push(format!(
+                        "the roles file's {role}, {name}, is not in the recording{hint}"
+                    ));
+                }
+            }
+            if role.is_single()
+                && !said.patterns(role).is_empty()
+                && self.player(role).is_none()
+                && self.players(role).next().is_some()
+            {
+                let found = self.players(role).count();
+                out.push(format!("the roles file's {} fits {found} signals, where one is expected: none is taken", role.name()));
+            }
+        }
+        out
+    }
+
+    /// The one that plays a role; where several would, none does.
+    fn player(&self, role: Role) -> Option<&Entry> {
+        let mut players = self.players(role);
+        let first = players.next()?;
+        players.all(|p| p.path == first.path).then_some(first)
+    }
+
     fn inputs(&self, metadata: &[(String, String)], said: Option<&RolesFile>) -> Inputs {
         let mut inputs = Inputs {
             mass_kg: said
@@ -641,7 +712,7 @@ impl<'a> Pass<'a> {
         }
         // Motion: the time axis of the roll, else of whatever is there.
         for role in [Role::Roll, Role::Height, Role::Pitch, Role::Yaw] {
-            let Some(entry) = self.players(role).next() else {
+            let Some(entry) = self.player(role) else {
                 continue;
             };
             let (t_s, x) = self.column(entry);
@@ -665,7 +736,7 @@ impl<'a> Pass<'a> {
         }
         (inputs.force_t_s, inputs.normal_n) = self.columns(Role::Forces);
         (inputs.phase_t_s, inputs.phase_rad) = self.columns(Role::Phases);
-        if let Some(entry) = self.players(Role::BeatPhase).next() {
+        if let Some(entry) = self.player(Role::BeatPhase) {
             let (t_s, psi) = self.column(entry);
             if inputs.phase_t_s.is_empty() {
                 inputs.phase_t_s.clone_from(&t_s);

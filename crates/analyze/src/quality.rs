@@ -32,6 +32,14 @@ impl Quality {
             loss: false,
         }
     }
+
+    /// The text with its topic.
+    pub fn told(&self) -> String {
+        match self.topic.as_str() {
+            "" => self.text.clone(),
+            topic => format!("{topic}: {}", self.text),
+        }
+    }
 }
 
 impl From<Finding> for Quality {

@@ -30,9 +30,9 @@ pub fn angles(x: f64, y: f64, z: f64, w: f64) -> [f64; 3] {
 /// Finds the quaternions among a batch's columns.
 #[derive(Default)]
 pub(crate) struct Quaternions {
-    /// By channel: the columns of a batch, each with whether every message has it, and what was found among them. Another batch of the channel
-    /// may have others, or the same in another order.
-    known: HashMap<usize, (Vec<(usize, bool)>, Vec<Found>)>,
+    /// By channel: the columns of a batch, and what was found among them. Another batch of the channel may have others, or the same in another
+    /// order.
+    known: HashMap<usize, (Vec<usize>, Vec<Found>)>,
     values: [Vec<f64>; 3],
 }
 
@@ -42,14 +42,19 @@ struct Found {
 }
 
 impl Quaternions {
-    /// Gives path and values of every angle of every quaternion in the batch.
-    pub fn each(&mut self, batch: &Batch<'_>, mut sink: impl FnMut(&str, &[f64])) {
+    /// Gives path, rows and values of every angle of every quaternion in the batch: in the messages that have all of it.
+    pub fn each(&mut self, batch: &Batch<'_>, mut sink: impl FnMut(&str, Option<&[u32]>, &[f64])) {
         let entry = self.known.entry(batch.channel).or_default();
-        let columns = || batch.columns.iter().map(|c| (c.id, c.rows.is_none()));
+        let columns = || batch.columns.iter().map(|c| c.id);
         if !entry.0.iter().copied().eq(columns()) {
             *entry = (columns().collect(), find(batch));
         }
         for found in &entry.1 {
+            let rows = batch.columns[found.columns[0]].rows;
+            // Where its parts are in other messages each, it is in none.
+            if found.columns.iter().any(|c| batch.columns[*c].rows != rows) {
+                continue;
+            }
             let [x, y, z, w] = found.columns.map(|c| batch.columns[c].values);
             self.values.iter_mut().for_each(Vec::clear);
             for (((x, y), z), w) in x.iter().zip(y).zip(z).zip(w) {
@@ -58,19 +63,18 @@ impl Quaternions {
                 }
             }
             for (path, values) in found.paths.iter().zip(&self.values) {
-                sink(path, values);
+                sink(path, rows, values);
             }
         }
     }
 }
 
-/// Columns that end in .x, .y, .z and .w after the same path, with a value in every message.
+/// Columns that end in .x, .y, .z and .w after the same path.
 fn find(batch: &Batch<'_>) -> Vec<Found> {
     let place: HashMap<&str, usize> = batch
         .columns
         .iter()
         .enumerate()
-        .filter(|(_, c)| c.rows.is_none())
         .map(|(k, c)| (c.path, k))
         .collect();
     let mut found = Vec::new();
@@ -114,14 +118,16 @@ mod tests {
                 columns,
             };
             let mut count = 0;
-            quaternions.each(&batch, |path, _| {
+            quaternions.each(&batch, |path, _, _| {
                 count += usize::from(path.starts_with("/a.q."))
             });
             count
         };
         let rows = [0];
         let first = [0, 1, 2, 4, 3].map(|id| column(id, (id == 1).then_some(&rows[..])));
-        assert_eq!(found(&first), 0, "y is not in every message");
+        assert_eq!(found(&first), 0, "y is in other messages than x");
+        let late = [0, 1, 2, 4, 3].map(|id| column(id, Some(&rows[..])));
+        assert_eq!(found(&late), 3, "all of it is in some messages");
         assert_eq!(found(&[0, 1, 2, 4, 3].map(|id| column(id, None))), 3);
         assert_eq!(found(&[4, 3, 2, 1, 0].map(|id| column(id, None))), 3);
         assert_eq!(found(&[0, 1, 2, 4].map(|id| column(id, None))), 0);

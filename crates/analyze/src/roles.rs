@@ -1,6 +1,7 @@
 //! Which signal is what: named by the user, inferred from schemas otherwise, printed always.
 
 use std::collections::BTreeMap;
+use std::path::Path;
 
 use serde::Deserialize;
 
@@ -65,6 +66,11 @@ impl Role {
         }
     }
 
+    /// Whether one signal alone plays the role.
+    pub fn is_single(self) -> bool {
+        !self.is_topic() && !matches!(self, Role::Forces | Role::Phases)
+    }
+
     /// Whether the role is played by whole topics, not by single signals.
     pub fn is_topic(self) -> bool {
         matches!(self, Role::Imu | Role::Carriers | Role::Beats | Role::Truth)
@@ -92,10 +98,13 @@ pub struct RolesFile {
     beats: Option<String>,
     truth: Option<String>,
     /// Mass of what is carried (kg); stands over the recording's own.
+    #[serde(default, deserialize_with = "above_zero")]
     pub mass_kg: Option<f64>,
     /// Gravity [m/s²]; stands over the recording's own.
+    #[serde(default, deserialize_with = "above_zero")]
     pub gravity_m_per_s2: Option<f64>,
     /// Start of the analysis window (s), where `--window` does not say.
+    #[serde(default, deserialize_with = "not_negative")]
     pub analysis_start_s: Option<f64>,
     /// The load's sensor: its place from the centre of mass, forward, left, up (m).
     #[serde(default, deserialize_with = "place")]
@@ -125,6 +134,29 @@ fn one_or_more<'de, D: serde::Deserializer<'de>>(from: D) -> Result<Vec<String>,
     })
 }
 
+/// What a mass and gravity can be.
+fn above_zero<'de, D: serde::Deserializer<'de>>(from: D) -> Result<Option<f64>, D::Error> {
+    number(from, f64::MIN_POSITIVE, "a number above zero")
+}
+
+fn not_negative<'de, D: serde::Deserializer<'de>>(from: D) -> Result<Option<f64>, D::Error> {
+    number(from, 0.0, "zero or more")
+}
+
+fn number<'de, D: serde::Deserializer<'de>>(
+    from: D,
+    least: f64,
+    expected: &str,
+) -> Result<Option<f64>, D::Error> {
+    let x = f64::deserialize(from)?;
+    if !(least..=1e18).contains(&x) {
+        return Err(serde::de::Error::custom(format!(
+            "found {x:e}, expected {expected}"
+        )));
+    }
+    Ok(Some(x))
+}
+
 /// An age that a sensor's sample can have.
 fn age<'de, D: serde::Deserializer<'de>>(from: D) -> Result<Option<f64>, D::Error> {
     let age_s = f64::deserialize(from)?;
@@ -148,7 +180,19 @@ fn place<'de, D: serde::Deserializer<'de>>(from: D) -> Result<Option<[f64; 3]>, 
 }
 
 impl RolesFile {
-    fn patterns(&self, role: Role) -> Vec<String> {
+    /// Reads one.
+    ///
+    /// # Errors
+    /// A sentence where it cannot be read or says what is none.
+    pub fn read(path: &Path) -> Result<Self, String> {
+        let name = path.display();
+        let text = recording::text::read_text(path)
+            .map_err(|why| format!("{name}: the roles cannot be read: {why}"))?;
+        toml::from_str(&text).map_err(|why| format!("{name}: is not a roles file: {why}"))
+    }
+
+    /// What it says of a role: paths of signals, or topics.
+    pub fn patterns(&self, role: Role) -> Vec<String> {
         match role {
             Role::Height => self.height.iter().cloned().collect(),
             Role::Roll => self.roll.iter().cloned().collect(),

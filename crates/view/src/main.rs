@@ -57,7 +57,7 @@ fn main() -> ExitCode {
     match run(&Arguments::parse()) {
         Ok(findings) => report(&findings),
         Err(error) => {
-            eprintln!("view: {error:#}");
+            recording::note!("view: {error:#}");
             ExitCode::FAILURE
         }
     }
@@ -67,7 +67,7 @@ fn main() -> ExitCode {
 fn report(findings: &[Finding]) -> ExitCode {
     let lost: Vec<&Finding> = findings.iter().filter(|f| f.kind.is_loss()).collect();
     for finding in &lost {
-        eprintln!("view: {finding}");
+        recording::note!("view: {finding}");
     }
     if lost.is_empty() {
         ExitCode::SUCCESS
@@ -78,6 +78,8 @@ fn report(findings: &[Finding]) -> ExitCode {
 
 fn run(arguments: &Arguments) -> anyhow::Result<Vec<Finding>> {
     if let Some(path) = &arguments.save {
+        recording::whole::apart([path.as_path()], [arguments.file.as_path()])
+            .map_err(anyhow::Error::msg)?;
         return save(&arguments.file, path);
     }
     if let Some(url) = &arguments.connect {
@@ -285,7 +287,7 @@ fn show(file: &Path, kind: Kind) -> anyhow::Result<Vec<Finding>> {
         Ok(findings)
     });
     if sent.is_err() && child.try_wait()?.is_none() {
-        eprintln!(
+        recording::note!(
             "view: not all could be read; the viewer shows what came before, until it is closed"
         );
         child.wait()?;

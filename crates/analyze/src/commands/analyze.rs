@@ -9,6 +9,7 @@ use analyze::report;
 use analyze::roles::RolesFile;
 use anyhow::{Context, bail};
 use recording::read::{ReadOptions, Recording, STDIN};
+use recording::whole;
 
 use super::{AnalyzeArgs, Done, Format, Limits, annotate, complain, print};
 
@@ -27,6 +28,8 @@ pub(super) fn run(args: &AnalyzeArgs) -> anyhow::Result<Done> {
             );
         }
     }
+    let outputs = single.iter().filter_map(|(_, path)| path.as_deref());
+    whole::apart(outputs, args.files.iter().map(AsRef::as_ref)).map_err(anyhow::Error::msg)?;
     let mut analyses = Vec::new();
     let mut failed = false;
     for file in &args.files {
@@ -44,7 +47,7 @@ pub(super) fn run(args: &AnalyzeArgs) -> anyhow::Result<Done> {
         draw(&analyses, folder)?;
     }
     let text = match args.format {
-        Format::Json => report::json(&analyses),
+        Format::Json => report::json(&analyses, args.files.len()),
         Format::Csv => report::csv(&analyses),
         Format::Table if analyses.len() == 1 => {
             report::table(&analyses[0], !request.signals.is_empty())
@@ -52,11 +55,12 @@ pub(super) fn run(args: &AnalyzeArgs) -> anyhow::Result<Done> {
         Format::Table => report::ensemble(&analyses),
     };
     print(&text)?;
-    let lost: Vec<&Analysis> = analyses.iter().filter(|a| a.lost()).collect();
-    for a in &lost {
-        eprintln!("analyze: {}", loss(a));
+    let mut whole = true;
+    for damage in analyses.iter().filter_map(Analysis::damage) {
+        whole = false;
+        recording::note!("analyze: {damage}");
     }
-    Ok(match (failed, lost.is_empty()) {
+    Ok(match (failed, whole) {
         (true, _) => Done::Partly,
         (false, false) => Done::WithLoss,
         (false, true) => Done::Well,
@@ -66,7 +70,7 @@ pub(super) fn run(args: &AnalyzeArgs) -> anyhow::Result<Done> {
 fn request(args: &AnalyzeArgs) -> anyhow::Result<Request> {
     let roles = match &args.roles {
         None => None,
-        Some(path) => Some(roles(path)?),
+        Some(path) => Some(RolesFile::read(path).map_err(anyhow::Error::msg)?),
     };
     let window = args.window.unwrap_or((None, None));
     Ok(Request {
@@ -78,13 +82,6 @@ fn request(args: &AnalyzeArgs) -> anyhow::Result<Request> {
         one_clock: args.one_clock,
         traces: args.draws(),
     })
-}
-
-fn roles(path: &Path) -> anyhow::Result<RolesFile> {
-    let name = path.display();
-    let text = recording::text::read_text(path)
-        .with_context(|| format!("{name}: the roles cannot be read"))?;
-    toml::from_str(&text).with_context(|| format!("{name}: is not a roles file"))
 }
 
 /// Opens a recording, or what comes through standard input.
@@ -134,14 +131,12 @@ fn one(path: &Path, args: &AnalyzeArgs, request: &Request) -> anyhow::Result<Ana
     }
     if let Some(out) = &args.report {
         let page = report::html(&analysis, &command_line());
-        recording::whole::write_whole(out, |file| file.write_all(page.as_bytes())).with_context(
-            || {
-                format!(
-                    "{}: cannot be written; no file of that name was made or changed",
-                    out.display()
-                )
-            },
-        )?;
+        whole::write_whole(out, |file| file.write_all(page.as_bytes())).with_context(|| {
+            format!(
+                "{}: cannot be written; no file of that name was made or changed",
+                out.display()
+            )
+        })?;
     }
     if let Some(out) = &args.annotate {
         annotate::write(&recording, &analysis, out)?;
@@ -171,7 +166,7 @@ fn draw(analyses: &[Analysis], folder: &Path) -> anyhow::Result<()> {
             .len();
         }
     }
-    eprintln!("analyze: {written} files written to {}", folder.display());
+    recording::note!("analyze: {written} files written to {}", folder.display());
     Ok(())
 }
 
@@ -218,7 +213,7 @@ fn nothing(a: &Analysis, request: &Request) -> String {
     let why: Vec<String> = (a.quality.iter())
         .filter(|q| q.loss || q.kind == "no_decoder")
         .take(20)
-        .map(told)
+        .map(Quality::told)
         .collect();
     let why = if why.is_empty() {
         String::new()
@@ -247,29 +242,5 @@ fn nothing(a: &Analysis, request: &Request) -> String {
         "{}: holds no numeric signal that can be used; found {}{why}",
         a.file,
         found.join(", ")
-    )
-}
-
-/// A remark with its topic.
-fn told(q: &Quality) -> String {
-    match q.topic.as_str() {
-        "" => q.text.clone(),
-        topic => format!("{topic}: {}", q.text),
-    }
-}
-
-fn loss(a: &Analysis) -> String {
-    let told: Vec<String> = a.quality.iter().filter(|q| q.loss).map(told).collect();
-    let cut = a.quality.iter().any(|q| q.kind == "truncated");
-    let lost = match a.skipped_messages {
-        0 if cut => "its end is missing".to_owned(),
-        0 => "no whole message is known to be lost".to_owned(),
-        1 => "1 message is lost".to_owned(),
-        n => format!("{n} messages are lost"),
-    };
-    format!(
-        "{}: the file is damaged; {lost}, the rest was used: {}",
-        a.file,
-        told.join("; ")
     )
 }

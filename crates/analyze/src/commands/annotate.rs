@@ -16,10 +16,18 @@ use recording::write::{RawChannel, RecordingWriter, WriterOptions};
 /// Length of the moving stretch whose RMS roll is written (s).
 const STRETCH_S: f64 = analyze::metrics::ONSET_STRETCH_S;
 
+/// What was found in an earlier round makes room for what is found now.
+fn is_found(topic: &str) -> bool {
+    topic.starts_with("/findings/")
+}
+
 /// Copies every message as it is and adds `/findings/...`; the file appears whole or not at all.
 pub(super) fn write(recording: &Recording, analysis: &Analysis, out: &Path) -> anyhow::Result<()> {
     let mut writer = RecordingWriter::create(out, &WriterOptions::default())?;
     for (name, values) in &recording.info().metadata {
+        if name == "findings" {
+            continue;
+        }
         writer.metadata(name, values)?;
     }
     writer.metadata("findings", &findings(analysis))?;
@@ -30,7 +38,10 @@ pub(super) fn write(recording: &Recording, analysis: &Analysis, out: &Path) -> a
     }
     let mut channels = Vec::new();
     for c in &recording.info().channels {
-        channels.push(writer.raw_channel(&RawChannel::from(c))?);
+        channels.push(match is_found(&c.topic) {
+            true => None,
+            false => Some(writer.raw_channel(&RawChannel::from(c))?),
+        });
     }
     let start_ns = recording.info().start_ns;
     let mut own = own(analysis, start_ns);
@@ -54,7 +65,10 @@ pub(super) fn write(recording: &Recording, analysis: &Analysis, out: &Path) -> a
             while let Some(message) = own.next_if(|m| m.t_ns <= raw.log_time_ns) {
                 put(&mut writer, &topics, &message)?;
             }
-            Ok(writer.message(channels[raw.channel], raw.log_time_ns, raw.data)?)
+            if let Some(channel) = channels[raw.channel] {
+                writer.message(channel, raw.log_time_ns, raw.data)?;
+            }
+            Ok(())
         };
         if result.is_ok() {
             result = both();

@@ -60,14 +60,14 @@ pub(super) fn run(args: &IngestArgs) -> anyhow::Result<Done> {
     let done = import::ingest(&args.files, &options, &mut writer)?;
     writer.finish()?;
     for note in done.notes.iter().chain(&done.losses) {
-        eprintln!("analyze: {note}");
+        recording::note!("analyze: {note}");
     }
     let topics: Vec<String> = done
         .topics
         .iter()
         .map(|(topic, messages)| format!("{topic} ({messages})"))
         .collect();
-    eprintln!(
+    recording::note!(
         "analyze: {} written: {}",
         args.out.display(),
         topics.join(", ")

@@ -249,6 +249,19 @@ fn beyond_the_budget(name: &str, motion: &Motion, window: Window) -> f64 {
             let edges = 2 * unloadings(t_s, ratio).len();
             EDGE_SAMPLES * edges as f64 * period_s / length_s
         }
+        // The transform has no taper: each line is as high as it falls on a bin of 1/T, and the estimate's T is not the window's. While an end
+        // moves through a period, both fall everywhere.
+        "h2_ratio" => {
+            let cuts = |hz: f64| (1..=8).map(move |k| [0.0, f64::from(k) / (8.0 * hz)]);
+            let hz = metrics_of(inputs, window, |n| n == "peak_hz").number("peak_hz");
+            hz.map_or(0.0, |hz| farthest(name, inputs, window, cuts(hz)) / 1.96)
+        }
+        // Thirds of a window without its ends are other thirds: as far off as if as much were missing once more.
+        "growth_ratio" => {
+            let lost_s = (range.len() - seen.len()) as f64 * period_s;
+            let cuts = [[lost_s, 0.0], [0.0, lost_s]].into_iter();
+            farthest(name, inputs, window, cuts) / 1.96
+        }
         // The ends have no height. Stretches of their length swing so much more or less than the whole.
         "rms_z_m" => {
             let lost = range.len() - seen.len();
@@ -268,6 +281,35 @@ fn beyond_the_budget(name: &str, motion: &Motion, window: Window) -> f64 {
         }
         _ => 0.0,
     }
+}
+
+/// How far a metric of the height goes when so much (s) is cut off the beginning and the end of what is known of it.
+fn farthest(
+    name: &str,
+    inputs: &Inputs,
+    window: Window,
+    cuts_s: impl Iterator<Item = [f64; 2]>,
+) -> f64 {
+    let range = window.range(&inputs.t_s);
+    let known = |k: &usize| inputs.height_m[*k].is_finite();
+    let (first, last) = (range.clone().find(known), range.rev().find(known));
+    let (Some(first), Some(last)) = (first, last) else {
+        return 0.0;
+    };
+    let of = |[head_s, tail_s]: [f64; 2]| {
+        let window = Window {
+            start_s: inputs.t_s[first] + head_s,
+            end_s: inputs.t_s[last] - tail_s,
+        };
+        metrics_of(inputs, window, |n| n == name).number(name)
+    };
+    let Some(whole) = of([0.0; 2]) else {
+        return 0.0;
+    };
+    cuts_s
+        .filter_map(of)
+        .map(|x| (x - whole).abs())
+        .fold(0.0, f64::max)
 }
 
 /// The window's columns as they might have come out of an equally good sensor, at 30 Hz.

@@ -4,11 +4,11 @@ use serde::ser::{Serialize, SerializeMap, Serializer};
 
 use crate::examine::{Analysis, Topic};
 
-/// One object for one recording, an array for several; ends with a line break.
-pub fn json(analyses: &[Analysis]) -> String {
+/// One object where one recording was asked for, an array where several were, however many could be read; ends with a line break.
+pub fn json(analyses: &[Analysis], asked: usize) -> String {
     // OK because the types below have string keys only and numbers are finite or null.
     let text = match analyses {
-        [one] => serde_json::to_string_pretty(one),
+        [one] if asked == 1 => serde_json::to_string_pretty(one),
         many => serde_json::to_string_pretty(many),
     };
     text.expect("plain data") + "\n"
