@@ -308,7 +308,11 @@ fn window(
         Some(start_s) => start_s,
         None if own < end_s || own == 0.0 => own,
         None => {
-            warnings.push(format!("the recording ends at {end_s:.3} s, before its analysis would start at {own} s: all of it is analysed"));
+            let what = match request.window.1 {
+                Some(_) => "window",
+                None => "recording",
+            };
+            warnings.push(format!("the {what} ends at {end_s:.3} s, before the recording's own analysis would start at {own} s: all of it from 0 s on is analysed"));
             0.0
         }
     };

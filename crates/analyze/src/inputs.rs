@@ -189,10 +189,10 @@ fn whole(t_s: &[f64]) -> bool {
 
 /// The parts of an ascending time axis between its holes, as ranges of samples; steps up to `least_s` are never one.
 pub fn stretches(t_s: &[f64], least_s: f64) -> Vec<Range<usize>> {
-    if whole(t_s) {
-        return vec![0..t_s.len()];
-    }
-    let longest_s = longest_step_s(t_s).max(least_s);
+    let longest_s = match whole(t_s) {
+        true => f64::INFINITY,
+        false => longest_step_s(t_s).max(least_s),
+    };
     let mut out = Vec::new();
     let mut start = 0;
     for end in 1..=t_s.len() {

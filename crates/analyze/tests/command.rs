@@ -388,6 +388,146 @@ fn annotate_keeps_every_message_and_adds_findings() {
 }
 
 #[test]
+fn findings_of_an_earlier_round_make_room() {
+    let folder = tempfile::tempdir().unwrap();
+    let file = recording(folder.path());
+    let [once, twice] = ["once.mcap", "twice.mcap"].map(|name| folder.path().join(name));
+    for (from, to) in [(&file, &once), (&once, &twice)] {
+        let out = analyze(&[from.to_str().unwrap(), "--annotate", to.to_str().unwrap()]);
+        assert!(out.status.success(), "{}", text(&out.stderr));
+    }
+    let of = |path: &Path| json(&[path.to_str().unwrap(), "--format", "json"])["recording"].clone();
+    assert_eq!(of(&once)["topics"], of(&twice)["topics"]);
+}
+
+#[test]
+fn no_input_is_written_over() {
+    let folder = tempfile::tempdir().unwrap();
+    let file = recording(folder.path());
+    let name = file.to_str().unwrap();
+    let before = std::fs::read(&file).unwrap();
+    let both = folder.path().join("both");
+    let both = both.to_str().unwrap();
+    for args in [
+        &[name, "--report", name][..],
+        &[name, "--annotate", name],
+        &[name, "--out", name],
+        &[name, "--out", both, "--report", both],
+    ] {
+        let out = analyze(args);
+        assert_eq!(out.status.code(), Some(1), "{args:?}");
+        assert!(text(&out.stderr).contains("named twice"), "{args:?}");
+    }
+    assert!(std::fs::read(&file).unwrap() == before);
+}
+
+#[test]
+fn a_role_that_nothing_or_too_much_plays_is_said() {
+    let folder = tempfile::tempdir().unwrap();
+    let file = recording(folder.path());
+    let roles = folder.path().join("roles.toml");
+    for (said, words) in [
+        (
+            "roll = \"/rath/state.rol_rad\"",
+            "did you mean /rath/state.roll_rad?",
+        ),
+        ("roll = \"/rath/state.*\"", "signals, where one is expected"),
+        (
+            "imu = \"/imu/rath\"",
+            "imu, /imu/rath, is not in the recording",
+        ),
+    ] {
+        std::fs::write(&roles, said).unwrap();
+        let found = json(&[
+            file.to_str().unwrap(),
+            "--roles",
+            roles.to_str().unwrap(),
+            "--format",
+            "json",
+        ]);
+        let warnings = found["recording"]["warnings"].to_string();
+        assert!(warnings.contains(words), "{said}: {warnings}");
+        let known = said.starts_with("imu");
+        assert_eq!(found["metrics"]["rms_roll_deg"]["value"].is_number(), known);
+    }
+    for said in ["mass_kg = -60.0", "mass_kg = nan", "gravity_m_per_s2 = 0.0"] {
+        std::fs::write(&roles, said).unwrap();
+        let out = analyze(&[file.to_str().unwrap(), "--roles", roles.to_str().unwrap()]);
+        assert_eq!(out.status.code(), Some(1), "{said}");
+        assert!(text(&out.stderr).contains("expected a number above zero"));
+    }
+}
+
+#[test]
+fn several_that_were_asked_for_are_an_array() {
+    let folder = tempfile::tempdir().unwrap();
+    let file = recording(folder.path());
+    let out = analyze(&[file.to_str().unwrap(), "/no/such.mcap", "--format", "json"]);
+    assert_eq!(out.status.code(), Some(1));
+    let found: Value = serde_json::from_slice(&out.stdout).unwrap();
+    assert_eq!(found.as_array().unwrap().len(), 1);
+}
+
+/// Where nothing can be said, what was done still counts.
+#[cfg(target_os = "linux")]
+#[test]
+fn nobody_has_to_listen() {
+    let folder = tempfile::tempdir().unwrap();
+    let file = recording(folder.path());
+    let whole = std::fs::read(&file).unwrap();
+    let cut = folder.path().join("cut.mcap");
+    std::fs::write(&cut, &whole[..whole.len() / 2]).unwrap();
+    let full = || {
+        std::fs::OpenOptions::new()
+            .write(true)
+            .open("/dev/full")
+            .unwrap()
+    };
+    for (file, code) in [(&file, 0), (&cut, 3), (&folder.path().join("none"), 1)] {
+        let status = Command::new(env!("CARGO_BIN_EXE_analyze"))
+            .arg(file)
+            .stderr(full())
+            .stdout(std::process::Stdio::null())
+            .status()
+            .unwrap();
+        assert_eq!(status.code(), Some(code), "{}", file.display());
+    }
+}
+
+/// A quaternion that a topic's first messages lack.
+#[test]
+fn an_orientation_that_comes_late_is_turned_into_angles() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("late.mcap");
+    let mut w = RecordingWriter::create(&path, &WriterOptions::default()).unwrap();
+    let channel = w
+        .raw_channel(&recording::write::RawChannel {
+            topic: "/pose",
+            message_encoding: "json",
+            schema_name: "",
+            schema_encoding: "",
+            schema_data: &[],
+            metadata: &Default::default(),
+        })
+        .unwrap();
+    for k in 0..1000i64 {
+        let roll = 0.3 * (0.1 * k as f64).sin();
+        let (x, w_) = (roll / 2.0).sin_cos();
+        let message = match k % 2 == 1 && k > 5 {
+            true => format!("{{\"q\":{{\"x\":{x},\"y\":0,\"z\":0,\"w\":{w_}}},\"n\":1}}"),
+            false => "{\"n\":1}".to_owned(),
+        };
+        w.message(channel, k * 10_000_000, message.as_bytes())
+            .unwrap();
+    }
+    w.finish().unwrap();
+    let found = json(&[path.to_str().unwrap(), "--format", "json"]);
+    let roll = &found["signals"]["/pose.q.roll"];
+    assert_eq!(roll["count"], 497, "{roll}");
+    assert!((roll["max"].as_f64().unwrap() - 0.3).abs() < 1e-3);
+}
+
+#[test]
 fn a_report_is_one_page_that_loads_nothing() {
     let folder = tempfile::tempdir().unwrap();
     let file = recording(folder.path());

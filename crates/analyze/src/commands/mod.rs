@@ -19,14 +19,14 @@ Examples:
   analyze runs/*.mcap --format csv                one line per file and metric
   analyze bag.mcap --signal '/imu/*' --window 10..70
   analyze bag.mcap --signal '*.angular_velocity.*' --out gyro.csv
-  analyze bag.mcap --roles roles.toml             say which signal is the roll, the height, a handle's force
+  analyze bag.mcap --roles roles.toml             say which signal is roll, height, a force
   analyze run.mcap --report run.html              plots and numbers as one page, for any browser
   analyze run.mcap --figures pictures             the same plots as SVG and PNG
   analyze run.mcap --annotate seen.mcap           the recording with what was found, for any viewer
   analyze ingest logs.npz --out run.mcap          a log of another format becomes a recording
   sim record --out - | analyze -                  from standard input
 
-Exit codes: 0 done; 1 it could not; 2 wrong usage; 3 done, but the input was damaged and part of it is lost.";
+Exit codes: 0 done; 1 it could not; 2 wrong usage; 3 done, but the input was damaged.";
 
 /// What a recording says about how a carried thing moves: metrics, spectra, events, and what is wrong with the data.
 #[derive(Parser)]

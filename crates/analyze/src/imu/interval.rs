@@ -138,17 +138,25 @@ pub fn metrics(motion: &Motion, window: Window) -> Metrics {
         };
         value.ci95 = Some([(x - half).max(0.0), (x + half).min(most)]);
     }
-    if out
-        .number("rms_roll_deg")
-        .is_some_and(|roll| roll.to_radians() < SEEN * motion.settings.budget.tilt_offset_rad)
-    {
-        for (name, value) in &mut out.0 {
-            if OF_ROLL.contains(name) {
-                *value = Value {
-                    unit: value.unit,
-                    ..Value::missing("so small a roll has no line that the sensor could tell from its own wandering").source("imu")
-                };
-            }
+    let budget = &motion.settings.budget;
+    let below = |name: &str, least: f64| out.number(name).is_some_and(|x| x < least);
+    let unseen = [
+        (
+            below("rms_roll_deg", SEEN * budget.tilt_offset_rad.to_degrees()),
+            "roll",
+            OF_ROLL,
+        ),
+        (below("rms_z_m", budget.height_wander_m), "heave", OF_HEAVE),
+    ];
+    for (_, what, names) in unseen.into_iter().filter(|(small, ..)| *small) {
+        for (_, value) in out.0.iter_mut().filter(|(name, _)| names.contains(name)) {
+            *value = Value {
+                unit: value.unit,
+                ..Value::missing(format!(
+                    "so small a {what} has no line that the sensor could tell from its own wandering"
+                ))
+                .source("imu")
+            };
         }
     }
     out
@@ -209,6 +217,14 @@ fn variance(x: &[f64]) -> f64 {
 
 /// Metrics of the roll's lines.
 const OF_ROLL: &[&str] = &["roll_peak_hz", "subharmonic_ratio"];
+/// Metrics of the heave's lines and growth: none where its RMS is below the budget's wandering.
+const OF_HEAVE: &[&str] = &[
+    "peak_hz",
+    "h2_ratio",
+    "subharmonic_ratio",
+    "growth_ratio",
+    "mechanism",
+];
 /// RMS roll from which its lines are looked for, in standard deviations of the tilt's constant error.
 const SEEN: f64 = 5.0;
 

@@ -85,6 +85,16 @@ pub enum MotionError {
         /// Rate found, Hz.
         found_hz: f64,
     },
+    /// Gravity is there, but does not keep its direction.
+    #[error(
+        "the accelerometer shows gravity ({norm_m_per_s2:.2} m/s² on average), but turned by the gyroscope it has a mean of {found_m_per_s2:.2} m/s² only: give angular velocities in rad/s, on the axes of the accelerometer"
+    )]
+    Turning {
+        /// Norm of the mean over the recording, turned to earth, m/s².
+        found_m_per_s2: f64,
+        /// Mean norm as measured, m/s².
+        norm_m_per_s2: f64,
+    },
     /// Gravity is not there.
     #[error(
         "the mean specific force is {found_m_per_s2:.2} m/s², not gravity: give accelerations with gravity, in m/s² (an app's \"linear acceleration\" has lost it)"
@@ -160,7 +170,19 @@ pub fn motion(track: &Track, settings: &Settings) -> Result<Motion, MotionError>
     let mut estimate = orientation::batch(&track, settings.orientation);
     let found = mean_specific_force(&track, &estimate);
     let g = settings.gravity_m_per_s2;
-    if !(0.8 * g..=1.2 * g).contains(&found) {
+    let is_gravity = |f: f64| (0.8 * g..=1.2 * g).contains(&f);
+    if !is_gravity(found) {
+        let norms = track
+            .accel_m_per_s2
+            .iter()
+            .map(|a| Vector3::from(*a).norm());
+        let norm = norms.sum::<f64>() / track.len() as f64;
+        if is_gravity(norm) {
+            return Err(MotionError::Turning {
+                found_m_per_s2: found,
+                norm_m_per_s2: norm,
+            });
+        }
         return Err(MotionError::NoGravity {
             found_m_per_s2: found,
         });
@@ -632,6 +654,16 @@ mod tests {
         let [low, high] = found.get("rms_roll_deg").unwrap().ci95.unwrap();
         let true_deg = rms(roll[4000..7600].iter().copied()).to_degrees();
         assert!(low < true_deg && true_deg < high, "{low} {true_deg} {high}");
+    }
+
+    #[test]
+    fn a_gyroscope_in_degrees_is_said() {
+        let (mut track, ..) = twin([0.0; 3], UnitQuaternion::identity());
+        for w in track.gyro_rad_per_s.iter_mut().flatten() {
+            *w = w.to_degrees();
+        }
+        let error = motion(&track, &Settings::default()).unwrap_err();
+        assert!(matches!(error, MotionError::Turning { .. }), "{error}");
     }
 
     #[test]

@@ -121,7 +121,8 @@ pub fn subharmonic_ratio(c: &Context) -> Value {
             line.hz
         ));
     };
-    if shares.at_f <= 0.0 {
+    // A share of a transform's rounding is none.
+    if shares.at_f <= 1e-24 {
         return Value::missing("no roll power near the strongest line of the height");
     }
     Value::number(shares.at_half / shares.at_f)

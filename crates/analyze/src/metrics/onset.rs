@@ -16,9 +16,7 @@ pub const ONSET_ROLL_DEG: f64 = 10.0;
 /// θ roll (rad), Δt the mean step (s); m = 60 both at 30 Hz and at the archive's 30.303 Hz. Stretches lie wholly inside
 /// the given samples and span no hole of them, so the answer is never below t\[m − 1\]. Source: archive, stats.json (`uncontrolled_onset_time`).
 pub fn onset_s(t_s: &[f64], roll_rad: &[f64]) -> Option<f64> {
-    let step_s = mean_step_s(t_s)?;
-    // A thousandth of a sample of slack: times are rounded to nanoseconds.
-    let m = ((ONSET_STRETCH_S / step_s + 1e-3).floor() as usize).max(1);
+    let m = stretch_samples(t_s)?;
     let limit = m as f64 * ONSET_ROLL_DEG.to_radians().powi(2);
     stretches(t_s, 0.0).into_iter().find_map(|stretch| {
         let (mut sum, first) = (0.0, stretch.start);
@@ -32,13 +30,25 @@ pub fn onset_s(t_s: &[f64], roll_rad: &[f64]) -> Option<f64> {
     })
 }
 
+/// Samples of a stretch.
+fn stretch_samples(t_s: &[f64]) -> Option<usize> {
+    // A thousandth of a sample of slack: times are rounded to nanoseconds.
+    let m = (ONSET_STRETCH_S / mean_step_s(t_s)? + 1e-3).floor() as usize;
+    Some(m.max(1))
+}
+
 pub fn onset_time_s(c: &Context) -> Value {
     c.onset()
         .map_or_else(|| Value::missing("no onset"), Value::number)
 }
 
 pub fn unstable(c: &Context) -> Value {
-    Value::bool(c.onset().is_some())
+    let roll = c.roll();
+    let longest = stretches(&roll.t_s, 0.0).into_iter().map(|s| s.len()).max();
+    match stretch_samples(&roll.t_s).is_some_and(|m| longest >= Some(m)) {
+        true => Value::bool(c.onset().is_some()),
+        false => Value::missing("the window holds no 2 s of roll without a hole"),
+    }
 }
 
 #[cfg(test)]

@@ -133,9 +133,12 @@ fn tiles(out: &mut String, a: &Analysis) {
         let chance = (name == "synchrony")
             .then(|| a.metrics.number("synchrony_chance"))
             .flatten();
-        let beside = chance
+        let mut beside = chance
             .map(|c| format!(", {} by chance", figures(c)))
             .unwrap_or_default();
+        if let Some([low, high]) = value.ci95 {
+            let _ = write!(beside, " ({} … {})", figures(low), figures(high));
+        }
         let _ = writeln!(
             out,
             "<div class=\"tile\"><b>{}</b><span>{label}{beside}</span></div>",

@@ -369,7 +369,7 @@ impl<'a> Worker<'a> {
 impl<'a> ChannelState<'a> {
     fn new(recording: &Recording, index: usize, select: Selection<'a>) -> Self {
         let info = &recording.info.channels[index];
-        let mut rows = Rows::new(&info.topic, select, recording.options.max_items);
+        let mut rows = Rows::new(&info.topic, select, recording.most_items(&info.schema));
         let schema = SchemaRef {
             name: &info.schema,
             encoding: &info.schema_encoding,

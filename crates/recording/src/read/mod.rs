@@ -47,11 +47,14 @@ pub struct ReadOptions {
     pub max_chunk_bytes: u64,
     /// A message longer than this in a large chunk is left out.
     pub max_message_bytes: u64,
-    /// A sequence becomes signals only where it has at most so many items.
+    /// A sequence becomes signals only where it has at most so many items; in the project's own messages, whose lists are people, up to 4096.
     pub max_items: usize,
     /// Threads that unpack and decode, the caller's included; 0 asks the machine.
     pub threads: usize,
 }
+
+/// Lists in the project's own messages hold a value for each carrier.
+const OWN_ITEMS: usize = 4096;
 
 impl Default for ReadOptions {
     fn default() -> Self {
@@ -410,6 +413,12 @@ impl Recording {
         select: &(dyn Fn(&str) -> bool + Sync),
     ) -> Result<(Vec<Signal>, Vec<Finding>), ReadError> {
         collect::signals(self, select)
+    }
+
+    /// Items that a sequence in messages of a type may have to become signals.
+    fn most_items(&self, schema: &str) -> usize {
+        let own = schema.starts_with("rath.");
+        self.options.max_items.max(if own { OWN_ITEMS } else { 0 })
     }
 
     /// Gives the messages of the topics that `select` wants as they are, in the order of the file; messages of damaged chunks are

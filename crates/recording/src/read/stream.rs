@@ -554,7 +554,7 @@ impl<'a> Taker<'a> {
                 say(Kind::AbsentField, *count, None, text);
             }
             for (field, count) in &watch.long {
-                let limit = self.recording.options.max_items;
+                let limit = self.recording.most_items(&info.schema);
                 say(
                     Kind::LongSequence,
                     *count,

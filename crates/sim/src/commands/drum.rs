@@ -1,5 +1,6 @@
 //! `sim drum`: the drum of a scene as a WAV file.
 
+use super::setting;
 use anyhow::{Context, Result, anyhow};
 use recording::whole::write_whole;
 use sim::model::Model;
@@ -20,7 +21,7 @@ pub struct Args {
     #[arg(long, short, value_name = "FILE.wav", default_value = "drum.wav")]
     out: PathBuf,
     /// Change a value of the scene; may be repeated.
-    #[arg(long, value_name = "KEY=VALUE")]
+    #[arg(long, value_name = "KEY=VALUE", value_parser = setting)]
     set: Vec<String>,
 }
 

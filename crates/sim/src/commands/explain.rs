@@ -1,6 +1,6 @@
 //! `sim explain`: what a scene turns on, what state that needs, and what it costs.
 
-use super::{Format, number};
+use super::{Format, number, setting};
 use anyhow::Result;
 use serde_json::{Value, json};
 use sim::effects::{Entry, TABLE};
@@ -18,7 +18,7 @@ pub struct Args {
     #[arg(default_value = "music")]
     scene: String,
     /// Change a value of the scene; may be repeated.
-    #[arg(long, value_name = "KEY=VALUE")]
+    #[arg(long, value_name = "KEY=VALUE", value_parser = setting)]
     set: Vec<String>,
     /// Table for people, or JSON.
     #[arg(long, default_value = "table")]

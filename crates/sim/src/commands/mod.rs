@@ -36,6 +36,14 @@ enum Format {
     Json,
 }
 
+/// Takes a `--set`.
+fn setting(text: &str) -> Result<String, String> {
+    match text.split_once('=') {
+        Some((key, _)) if !key.trim().is_empty() => Ok(text.to_owned()),
+        _ => Err("expected KEY=VALUE".into()),
+    }
+}
+
 /// Runs a command; errors go to stderr, one sentence first, then the causes.
 pub fn run(command: Command) -> ExitCode {
     let outcome = match command {

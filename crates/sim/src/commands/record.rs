@@ -1,13 +1,14 @@
 //! `sim record`: a scene becomes a recording.
 
-use anyhow::{Context, Result, anyhow};
+use super::setting;
+use anyhow::{Context, Result, anyhow, bail};
 use indicatif::{ProgressBar, ProgressStyle};
 use recording::whole::apart;
 use recording::write::{RecordingWriter, WriterOptions, remove_unfinished_files};
 use sim::model::Model;
 use sim::record::Recorder;
 use sim::run::{Listener, Sample, method_name, method_of, run_model, settings};
-use sim::scene::load;
+use sim::scene::{SceneError, load};
 use sim::sensors::Reading;
 use sim::solve::Stopped;
 use std::path::{Path, PathBuf};
@@ -31,7 +32,7 @@ pub struct Args {
     #[arg(long, value_name = "S", allow_negative_numbers = true)]
     duration: Option<f64>,
     /// Change a value of the scene; `effects.NAME=false` takes an effect away. May be repeated.
-    #[arg(long, value_name = "KEY=VALUE")]
+    #[arg(long, value_name = "KEY=VALUE", value_parser = setting)]
     set: Vec<String>,
     /// Integration method.
     #[arg(long)]
@@ -52,11 +53,52 @@ const EXAMPLES: &str = "Examples:
 pub fn run(args: &Args) -> Result<()> {
     let mut settings_given = args.set.clone();
     // The flags are settings like any other, so that they are checked and reported alike.
-    settings_given.extend(args.seed.map(|seed| format!("seed={seed}")));
-    settings_given.extend(args.duration.map(|s| format!("duration_s={s:?}")));
-    settings_given.extend(args.method.as_ref().map(|m| format!("solver.method={m:?}")));
-    settings_given.extend(args.tolerance.map(|x| format!("solver.tolerance={x:?}")));
-    let scene = load(&args.scene, &settings_given)?;
+    let flags = [
+        ("--seed", "seed", args.seed.map(|seed| seed.to_string())),
+        (
+            "--duration",
+            "duration_s",
+            args.duration.map(|s| format!("{s:?}")),
+        ),
+        (
+            "--method",
+            "solver.method",
+            args.method.as_ref().map(|m| format!("{m:?}")),
+        ),
+        (
+            "--tolerance",
+            "solver.tolerance",
+            args.tolerance.map(|x| format!("{x:?}")),
+        ),
+    ];
+    for (flag, key, value) in &flags {
+        let Some(value) = value else { continue };
+        if args
+            .set
+            .iter()
+            .any(|s| s.split('=').next().is_some_and(|k| k.trim() == *key))
+        {
+            bail!("{flag} and --set {key} say the same; leave one out");
+        }
+        settings_given.push(format!("{key}={value}"));
+    }
+    let scene = load(&args.scene, &settings_given).map_err(|error| match error {
+        SceneError::Value { origin, message } if origin == "--set" => {
+            let mut given = flags.iter().filter(|(.., value)| value.is_some());
+            let flag = given.find(|(_, key, _)| message.starts_with(key));
+            SceneError::Value {
+                origin: flag.map_or(origin, |(flag, ..)| (*flag).to_owned()),
+                message,
+            }
+        }
+        other => other,
+    })?;
+    if args.tolerance.is_some() && !method_of(&scene).adaptive {
+        bail!(
+            "--tolerance: {} takes steps of one length, which --set solver.step_s sets",
+            scene.solver.method
+        );
+    }
 
     let interrupted = catch_interrupts()?;
     let to_stdout = args.out.as_deref() == Some(Path::new("-"));

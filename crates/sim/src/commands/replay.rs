@@ -1,6 +1,6 @@
 //! `sim replay`: a recording drives a scene.
 
-use super::{Format, print};
+use super::{Format, print, setting};
 use anyhow::{Context, Result, anyhow};
 use recording::read::{ReadOptions, Recording};
 use recording::topics::{BEAT, FORCES, PHASES, STATE};
@@ -38,7 +38,7 @@ pub struct Args {
     #[arg(long, value_name = "S")]
     settle: Option<f64>,
     /// Change a value of the scene; `effects.NAME=false` takes an effect away. May be repeated.
-    #[arg(long, value_name = "KEY=VALUE")]
+    #[arg(long, value_name = "KEY=VALUE", value_parser = setting)]
     set: Vec<String>,
     /// Where to write. Default: FILE-replay.mcap here.
     #[arg(long, short, value_name = "FILE.mcap")]
@@ -82,8 +82,6 @@ Examples:
 
 /// Left out at the beginning where the body's start was not measured, s.
 const SETTLE_S: f64 = 3.0;
-/// Longest list in a message that becomes signals: as many carriers may be replayed.
-const MOST_CARRIERS: usize = 4096;
 
 /// How the recording was found.
 pub enum Input {
@@ -95,11 +93,7 @@ pub enum Input {
 /// Replays, records, compares.
 pub fn run(args: &Args) -> Result<Input> {
     let scene = load(&args.scene, &args.set)?;
-    let options = ReadOptions {
-        max_items: MOST_CARRIERS,
-        ..ReadOptions::default()
-    };
-    let recording = Recording::open(&args.file, &options)?;
+    let recording = Recording::open(&args.file, &ReadOptions::default())?;
     let name = args.file.display().to_string();
     let take = Take::read(&recording)?;
     let drive = match args.drive {
@@ -247,6 +241,10 @@ impl Compared {
     /// The measured course, in the unit of the comparison.
     fn of(&self, take: &Take, replay: &Replay) -> Option<Course> {
         let mut course = take.course(self.field, replay.stretch_s[0])?;
+        // Exactly 0 throughout is a field that nobody filled in, or a coordinate that was held.
+        if course.x.iter().all(|x| *x == 0.0) {
+            return None;
+        }
         course.x.iter_mut().for_each(|x| *x *= self.factor);
         Some(course)
     }

@@ -1,5 +1,6 @@
 //! `sim scenes`: what comes with the program.
 
+use super::setting;
 use anyhow::{Result, anyhow};
 use sim::scene::{BUILTIN, SceneError, builtin, json_schema, load, parse, to_toml};
 
@@ -15,7 +16,7 @@ pub struct Args {
     /// Print this scene as TOML.
     name: Option<String>,
     /// Change a value of the scene, which is then printed with every default; may be repeated.
-    #[arg(long, value_name = "KEY=VALUE", requires = "name")]
+    #[arg(long, value_name = "KEY=VALUE", value_parser = setting, requires = "name")]
     set: Vec<String>,
     /// Print the JSON Schema of scenes, for editors that check TOML.
     #[arg(long, conflicts_with = "name")]

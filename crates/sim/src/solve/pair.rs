@@ -390,7 +390,7 @@ impl<'m, P: Pair, const EVENTS: bool> Run<'m, P, EVENTS> {
             let e = error.max(1e-10);
             first.held(|| {
                 let could = (SAFETY * e.powf(-P::EXPONENT)).clamp(SHRINK, GROW);
-                (!cut).then(|| h * could)
+                (!cut).then_some(h * could)
             });
             let ln_error = e.ln();
             let factor = SAFETY * (P::EXPONENT * (0.2 * ln_error_before - 0.8 * ln_error)).exp();

@@ -13,7 +13,7 @@ use study::paper::{CONDITIONS, Condition, FIRST_SEED, RUNS, table, to_json};
 #[command(after_help = EXAMPLES)]
 pub struct Args {
     /// Seeds per condition, from 1001 on.
-    #[arg(long, value_name = "N", allow_negative_numbers = true)]
+    #[arg(long, value_name = "N", allow_negative_numbers = true, value_parser = clap::value_parser!(u64).range(1..))]
     seeds: Option<u64>,
     /// Threads; 0 is one per core. The result does not depend on it.
     #[arg(long, value_name = "N", default_value_t = 0)]
@@ -35,9 +35,6 @@ const EXAMPLES: &str = "Examples:
 pub fn run(args: &Args) -> Result<()> {
     let began = Instant::now();
     let seeds = args.seeds.unwrap_or(RUNS);
-    if seeds == 0 {
-        bail!("--seeds is 0; at least one run is needed");
-    }
     let mut scenes: Vec<Scene> = Vec::new();
     for name in CONDITIONS {
         for seed in FIRST_SEED..FIRST_SEED + seeds {

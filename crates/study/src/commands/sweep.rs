@@ -18,7 +18,7 @@ pub struct Args {
     /// The study file (docs/studies.md).
     file: PathBuf,
     /// Runs of every point, instead of the file's own `seeds`.
-    #[arg(long, value_name = "N", allow_negative_numbers = true)]
+    #[arg(long, value_name = "N", allow_negative_numbers = true, value_parser = clap::value_parser!(u64).range(1..))]
     seeds: Option<u64>,
     /// Threads; 0 is one per core. The result does not depend on it.
     #[arg(long, value_name = "N", default_value_t = 0)]
@@ -28,8 +28,8 @@ pub struct Args {
     out: Option<PathBuf>,
     /// Compute only part K of N, and leave what is there already; `merge` puts all parts together.
     /// Slurm, AWS Batch and PBS say K and N by themselves, Kubernetes says K.
-    #[arg(long, value_name = "K/N")]
-    shard: Option<String>,
+    #[arg(long, value_name = "K/N", value_parser = Shard::parse)]
+    shard: Option<Shard>,
     /// N of `--shard`, where the scheduler says only K.
     #[arg(long, value_name = "N", conflicts_with = "shard")]
     shards: Option<u64>,
@@ -73,9 +73,6 @@ pub fn plan(file: &Path) -> Result<Plan> {
 pub fn run(args: &Args) -> Result<()> {
     let mut plan = plan(&args.file)?;
     if let Some(seeds) = args.seeds {
-        if seeds == 0 {
-            bail!("--seeds is 0; at least one run of every point is needed");
-        }
         plan = plan.with_seeds(seeds).map_err(anyhow::Error::msg)?;
     }
     let out = folder(&args.file, args.out.as_ref());
@@ -84,7 +81,7 @@ pub fn run(args: &Args) -> Result<()> {
 
     let told = Shard::of_environment(args.shards, |name| std::env::var(name).ok());
     let shard = match &args.shard {
-        Some(text) => Some(Shard::parse(text).map_err(|e| anyhow!("--shard: {e}"))?),
+        Some(shard) => Some(*shard),
         None => told.map_err(sentence)?.map(|(shard, name)| {
             recording::note!("shard {shard}, as {name} says");
             shard

@@ -24,7 +24,7 @@ pub struct Args {
 }
 
 const EXAMPLES: &str = "Examples:
-  study twin                        field-imu in music and in baseline, clocks right and off: the table in docs/field.md
+  study twin                        music and baseline, clocks right and off: docs/field.md
   study twin --seeds 3
   study twin --first-seed 2001      others than those by which the intervals were set
   study twin --format json > twins.json";

@@ -152,6 +152,13 @@ fn check(spec: &mut Spec) -> Result<(), String> {
         let taken = super::FIXED_COLUMNS.contains(&name.as_str())
             || spec.metrics.contains(name)
             || spec.axes[..k].iter().any(|a| a.name == *name);
+        let key = &spec.axes[k].key;
+        if let Some(before) = spec.axes[..k].iter().find(|a| a.key == *key) {
+            return Err(format!(
+                "axes.{k}: `{key}` is the key of axis `{}` already; one of the two would not count",
+                before.name
+            ));
+        }
         if taken {
             return Err(format!(
                 "axes.{k}: there is a column `{name}` already; give the axis another `name`"

@@ -3,7 +3,7 @@
 mod figure;
 mod hard;
 
-use super::{Format, number};
+use super::{Format, number, setting};
 use anyhow::{Context, Result, anyhow};
 use indicatif::{ProgressBar, ProgressStyle};
 use recording::whole::write_whole;
@@ -23,7 +23,7 @@ pub struct Args {
     #[arg(default_value = "music")]
     scene: String,
     /// Change a value of the scene; `effects.NAME=false` takes an effect away. May be repeated.
-    #[arg(long, value_name = "KEY=VALUE")]
+    #[arg(long, value_name = "KEY=VALUE", value_parser = setting)]
     set: Vec<String>,
     /// Table for people, or JSON.
     #[arg(long, default_value = "table")]
@@ -42,7 +42,7 @@ pub struct Args {
 const EXAMPLES: &str = "Examples:
   sim accuracy
   sim accuracy baseline --out accuracy/
-  sim accuracy music --set effects.contact.stiffness_n_per_m=3e6 --set effects.contact.damping_n_s_per_m=12650
+  sim accuracy music --set effects.contact.stiffness_n_per_m=3e6
   sim accuracy mine.toml --format json
   sim accuracy --hard";
 
