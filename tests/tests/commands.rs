@@ -117,7 +117,33 @@ fn bad_input_gets_one_sentence_and_leaves_nothing() {
         (
             &["record", "--duration", "-5"],
             None,
-            "duration_s: found -5, expected a number above zero",
+            "--duration: duration_s: found -5, expected a number above zero",
+        ),
+        (
+            &["record", "--tolerance", "1e-20"],
+            None,
+            "--tolerance: solver.tolerance: found 1e-20",
+        ),
+        (
+            &["record", "--method", "rk4", "--tolerance", "1e-3"],
+            None,
+            "--tolerance: rk4 takes steps of one length",
+        ),
+        (
+            &[
+                "record",
+                "--method",
+                "auto",
+                "--set",
+                "solver.method=\"rk4\"",
+            ],
+            None,
+            "--method and --set solver.method say the same",
+        ),
+        (
+            &["record", "mine.toml", "--out", "mine.toml"],
+            Some("name = \"x\"\n"),
+            "mine.toml: is named twice",
         ),
         (
             &["record", "--out", "no/such/folder/x.mcap"],
@@ -136,6 +162,10 @@ fn bad_input_gets_one_sentence_and_leaves_nothing() {
         assert!(out.stdout.is_empty());
     }
     assert_eq!(files(folder.path()), ["mine.toml"], "nothing half-written");
+    for wrong in ["foo", "=3"] {
+        let out = run_in(folder.path(), "sim", &["record", "--set", wrong]);
+        assert_eq!(out.status.code(), Some(2), "{wrong}");
+    }
     assert_eq!(
         run_in(folder.path(), "sim", &["record", "--nonsense"])
             .status
@@ -159,6 +189,19 @@ fn a_file_that_is_not_there_is_said_once() {
         assert!(said.contains("none.mcap: cannot be read"), "{said}");
         assert_eq!(said.matches("os error").count(), 1, "{said}");
         assert_eq!(said.lines().count(), 1, "{said}");
+    }
+}
+
+/// What the physics was not asked to do is said: nobody carries a load from metres away.
+#[test]
+fn a_load_that_is_left_behind_is_said() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let scene = "name = \"left\"\nduration_s = 5.0\n[start]\nvelocity_m_per_s = [0.5, 0.0, 0.0]\n[effects.contact]\n";
+    for (more, told) in [("", true), ("[effects.hold]\n", false)] {
+        std::fs::write(folder.path().join("left.toml"), format!("{scene}{more}")).expect("written");
+        let out = good(run_in(folder.path(), "sim", &["record", "left.toml"]));
+        let said = String::from_utf8_lossy(&out.stderr);
+        assert_eq!(said.contains("beside its shoulder"), told, "{said}");
     }
 }
 

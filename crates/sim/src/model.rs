@@ -11,13 +11,17 @@
 //! music has begun are fixed for a *segment* and change only between two of them.
 
 mod eight;
+mod heading;
 mod rest;
+mod sideways;
 mod term;
 mod workspace;
 
 pub use eight::Registers;
 pub(crate) use eight::{Octet, SideBySide};
+pub use heading::Heading;
 pub(crate) use rest::Bend;
+pub(crate) use sideways::Sideways;
 pub use term::{
     Account, AsWhole, Book, Local, OnBlock, OnEight, Power, PowerOnEight, Stage, Switch, Term,
     Whole,
@@ -27,7 +31,6 @@ pub use workspace::{All, Block, Pair, Part, Workspace};
 use crate::beat::Beat;
 use crate::body::Body;
 use crate::effects;
-use crate::effects::path::Heading;
 use crate::freedoms::{Freedoms, Six, choose};
 use crate::lanes::{self, f64x2, pack, pairs};
 #[cfg(target_arch = "x86_64")]

@@ -51,10 +51,7 @@ impl Feedback {
 
     pub(super) fn build(&self, scene: &Scene, model: &mut Model) {
         let n = scene.carriers.count();
-        let gravity = scene.body.gravity_m_per_s2;
-        let path = scene.effects.path.as_ref();
-        let [.., along_z] = path.map_or(gravity, |path| path.lean(gravity));
-        let share_n = -scene.body.mass_kg * along_z / n as f64;
+        let share_n = -model.body.mass_kg * model.body.gravity_m_per_s2.z / n as f64;
         model.need_phases();
         let first = model.add_states((1..=n).map(|i| (format!("felt_load_{i}"), 1.0)));
         let law = Law {

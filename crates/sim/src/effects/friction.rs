@@ -20,9 +20,8 @@
 //!
 //! Source: paper, section 3.3 ("regularized friction"); Stewart & Trinkle (1996) for what is regularised.
 
-use super::hold::Sideways;
 use crate::lanes::{LANES, Moments, Number};
-use crate::model::{Local, Model, Part, Stage, Workspace};
+use crate::model::{Local, Model, Part, Sideways, Stage, Workspace};
 use crate::scene::{Checker, Problem, Scene, problem};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};

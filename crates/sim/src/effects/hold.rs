@@ -9,7 +9,7 @@
 //! Source: paper, section 3.3 ("tangential forces can be added"); palanquin-bench, law of T.
 
 use crate::lanes::{Moments, Number, f64x2, pack};
-use crate::model::{Book, Local, Model, Pair, Part, Power, Stage, Workspace};
+use crate::model::{Book, Local, Model, Pair, Part, Power, Sideways, Stage, Workspace};
 use crate::scene::{Checker, PerCarrier, Problem, Scene};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -74,32 +74,6 @@ impl Local for SpringDampers {
             for axis in 0..2 {
                 p.tangential[axis] = c.madd(p.gap_rate[axis], k * p.gap[axis]);
             }
-        }
-    }
-}
-
-/// Books the whole sideways force, whatever laws set it. It stores nothing: what it gives back counts as dissipated until then.
-#[derive(Debug)]
-pub(super) struct Sideways;
-
-impl Book for Sideways {
-    #[inline(always)]
-    fn power<N: Moments>(
-        &self,
-        _w: &Workspace<N>,
-        pairs: &[Pair<N>],
-        _first: usize,
-    ) -> Power<N::Each> {
-        let (mut work, mut absorbed) = (N::Pair::splat(0.0), N::Pair::splat(0.0));
-        for p in pairs {
-            for axis in 0..2 {
-                work = p.tangential[axis].madd(p.base_rate[axis], work);
-                absorbed = p.tangential[axis].madd(p.gap_rate[axis], absorbed);
-            }
-        }
-        Power {
-            work_w: N::sum(work),
-            dissipated_w: N::sum(absorbed),
         }
     }
 }

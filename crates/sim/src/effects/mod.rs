@@ -86,6 +86,8 @@ macro_rules! entry {
 
 /// Every effect, in the order in which terms of the same kind are applied.
 pub const TABLE: &[Entry] = &[
+    // Before who asks where gravity points.
+    entry!(path, "the way slopes and turns"),
     entry!(
         frequency_spread,
         "natural gait frequencies differ from carrier to carrier"
@@ -114,9 +116,8 @@ pub const TABLE: &[Entry] = &[
         feedback,
         "the load that a carrier feels shifts the gait's phase"
     ),
-    // After everything that has a say in phase rates, before what moves the party.
+    // After everything that has a say in phase rates.
     entry!(measured, "carriers move as somebody measured"),
-    entry!(path, "the way slopes and turns"),
     entry!(flexure, "poles bend: their first mode"),
     entry!(imu, "virtual inertial sensors on body and carriers"),
     entry!(drum, "the sound of the drum, as a microphone hears it"),

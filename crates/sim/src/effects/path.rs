@@ -16,7 +16,7 @@
 //! least jerk (Flash & Hogan 1985).
 
 use crate::lanes::f64x2;
-use crate::model::{Model, Stage, Switch, Term, Workspace};
+use crate::model::{Heading, Model, Stage, Switch, Term, Workspace};
 use crate::scene::{Checker, Freedom, Problem, Scene, problem, shown};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -79,8 +79,12 @@ impl Path {
                 "the party would turn away from its load; free x, y and yaw",
             ));
         }
-        let effects = &scene.effects;
-        if effects.hold.is_none() && effects.friction.is_none() && effects.sling.is_none() {
+        let held = [
+            scene.effects.hold.is_some(),
+            scene.effects.friction.is_some(),
+            scene.effects.sling.is_some(),
+        ];
+        if !held.contains(&true) {
             return Err(problem(
                 key,
                 "the party would turn away from its load, which nothing holds sideways; add `effects.hold`, `friction` or `sling`",
@@ -90,7 +94,7 @@ impl Path {
     }
 
     /// Gravity as the sloping ground sees it.
-    pub(super) fn lean(&self, gravity: [f64; 3]) -> [f64; 3] {
+    fn lean(&self, gravity: [f64; 3]) -> [f64; 3] {
         let size = gravity.iter().map(|g| g * g).sum::<f64>().sqrt();
         let (s, b) = (self.slope_deg.to_radians(), self.bank_deg.to_radians());
         [
@@ -102,9 +106,9 @@ impl Path {
 
     fn heading(&self) -> Heading {
         Heading {
-            turn: self.turn_deg.to_radians(),
+            turn_rad: self.turn_deg.to_radians(),
             start_s: self.turn_start_s,
-            per_s: 1.0 / self.turn_time_s,
+            time_s: self.turn_time_s,
         }
     }
 
@@ -129,24 +133,6 @@ impl Path {
             self.turn_start_s,
             self.turn_start_s + self.turn_time_s,
         ]));
-    }
-}
-
-/// Where the party faces.
-#[derive(Clone, Copy, Debug)]
-pub struct Heading {
-    turn: f64,
-    start_s: f64,
-    per_s: f64,
-}
-
-impl Heading {
-    /// χ (rad), χ̇ (rad/s)
-    pub fn at(&self, t_s: f64) -> [f64; 2] {
-        let u = ((t_s - self.start_s) * self.per_s).clamp(0.0, 1.0);
-        let heading = u * u * u * (10.0 + u * (6.0 * u - 15.0));
-        let rate = 30.0 * u * u * (1.0 - u) * (1.0 - u) * self.per_s;
-        [self.turn * heading, self.turn * rate]
     }
 }
 

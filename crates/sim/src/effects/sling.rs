@@ -12,9 +12,8 @@
 //! left, the same ratio at every amplitude, and is free in flight: a force in proportion to the load does that (with
 //! h = 0.1 m, M = 60 kg and a = 0.04795 it asks for L = 0.70 m and I_xx = 2.68 kg·m²), a spring of its own does not.
 
-use super::hold::Sideways;
 use crate::lanes::{Moments, Number};
-use crate::model::{Local, Model, Pair, Part, Stage, Workspace};
+use crate::model::{Local, Model, Pair, Part, Sideways, Stage, Workspace};
 use crate::scene::{Checker, Problem, Scene};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
