@@ -1,6 +1,5 @@
 //! `--annotate OUT.mcap`: the recording again, with what was found as topics beside it.
 
-use std::f64::consts::FRAC_PI_2;
 use std::path::Path;
 
 use analyze::examine::Analysis;
@@ -235,13 +234,13 @@ fn states(i: &Inputs) -> Vec<(f64, &'static str, Content)> {
     i.t_s.iter().enumerate().filter_map(state).collect()
 }
 
-/// Phases that steps tell, as the project's own recordings count them: sin φ is up. A step, where the walker pushes hardest, is at −π/2.
+/// Phases that steps tell.
 fn gait(i: &Inputs) -> Vec<(f64, &'static str, Content)> {
     if i.sources.phases != "imu" {
         return Vec::new();
     }
     let message = |(k, t_s): (usize, &f64)| {
-        let phase_rad: Vec<f64> = i.phase_rad.iter().map(|p| p[k] - FRAC_PI_2).collect();
+        let phase_rad: Vec<f64> = i.phase_rad.iter().map(|p| p[k]).collect();
         let beat = i.beat_phase_rad.get(k).copied().filter(|b| b.is_finite());
         phase_rad.iter().all(|p| p.is_finite()).then(|| {
             let each: Vec<&[f64]> = phase_rad.chunks(1).collect();

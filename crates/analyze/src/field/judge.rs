@@ -29,6 +29,7 @@ const ERRORS: &[(&str, &str)] = &[
     ("plv", "plv_error"),
     ("beat_synchrony", "beat_synchrony_error"),
     ("beat_hz", "beat_hz_error"),
+    ("beat_lead_deg", "beat_lead_deg_error"),
     ("detuning_rad_per_s", "detuning_rad_per_s_error"),
     ("pull_rad_per_s", "pull_rad_per_s_error"),
     ("captured", "captured_error"),
@@ -359,8 +360,13 @@ fn difference(estimate: &Value, truth: &Value) -> Value {
     let same = |a: bool| Value::number(if a { 0.0 } else { 1.0 });
     let mut value = match (&estimate.datum, &truth.datum) {
         (Datum::Number(e), Datum::Number(t)) => {
-            let mut v = Value::number(e - t);
-            v.ci95 = estimate.ci95.map(|[a, b]| [a - t, b - t]);
+            // Angles by the shorter way.
+            let off = match truth.unit {
+                "deg" => (e - t + 180.0).rem_euclid(360.0) - 180.0,
+                _ => e - t,
+            };
+            let mut v = Value::number(off);
+            v.ci95 = estimate.ci95.map(|ci95| ci95.map(|x| off + (x - e)));
             Value {
                 unit: truth.unit,
                 ..v

@@ -12,6 +12,7 @@ mod sound;
 mod thin;
 
 use std::collections::BTreeMap;
+use std::f64::consts::FRAC_PI_2;
 
 use recording::read::{ReadError, Recording};
 use recording::signal::{Signal, seconds_since};
@@ -298,7 +299,9 @@ impl Field {
     }
 
     fn fill_phases(&self, inputs: &mut Inputs, t_s: Vec<f64>, phases: Vec<Vec<f64>>) {
-        inputs.phase_rad = phases;
+        // As the project's own recordings count phases: 0 is on the way up, and a step, where the walker pushes hardest, at −π/2.
+        let counted = |phase: Vec<f64>| phase.into_iter().map(|p| p - FRAC_PI_2).collect();
+        inputs.phase_rad = phases.into_iter().map(counted).collect();
         inputs.phases_are_measured = true;
         inputs.sources.phases = "imu".into();
         if self.beat_s.len() >= 3 {

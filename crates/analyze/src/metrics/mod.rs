@@ -298,7 +298,7 @@ pub const METRICS: &[Metric] = &[
         needs: &[Need::Phases, Need::Beat],
         compute: beat::beat_lead_deg,
         origin: "Mardia & Jupp 2000",
-        definition: "Circular mean of φ_j − ψ over the part of W in which a beat sounds, positive ahead of the beat; `per` lists the carriers. A step detector's own offset is in it.",
+        definition: "Circular mean of φ_j − ψ over the part of W in which a beat sounds, positive ahead of the beat; `per` lists the carriers. Phases that steps tell are counted as a model's: 0 on the way up, a step at −90°.",
     },
     Metric {
         name: "detuning_rad_per_s",
