@@ -310,12 +310,16 @@ pub fn wrap(angle_rad: f64) -> f64 {
     (angle_rad + PI).rem_euclid(TAU) - PI
 }
 
-/// `numpy.unwrap`: adds multiples of 2π so that neighbours differ by at most π.
+/// `numpy.unwrap`: adds multiples of 2π so that neighbours differ by at most π; but what is not finite stays so, and is no neighbour.
 pub fn unwrap(phase_rad: &[f64]) -> Vec<f64> {
     let mut out = Vec::with_capacity(phase_rad.len());
     let mut turns = 0.0;
     let mut last: Option<f64> = None;
     for phi in phase_rad {
+        if !phi.is_finite() {
+            out.push(f64::NAN);
+            continue;
+        }
         if let Some(last) = last {
             turns -= ((phi - last) / TAU).round();
         }
@@ -328,6 +332,16 @@ pub fn unwrap(phase_rad: &[f64]) -> Vec<f64> {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn a_hole_does_not_swallow_what_comes_after_it() {
+        let found = unwrap(&[f64::NAN, 3.0, -3.0, f64::INFINITY, 3.1]);
+        assert!(found[0].is_nan() && found[3].is_nan());
+        let expected = [3.0, TAU - 3.0, 3.1];
+        for (a, b) in [found[1], found[2], found[4]].iter().zip(expected) {
+            assert!((a - b).abs() < 1e-12, "{found:?}");
+        }
+    }
 
     #[test]
     fn val_chance_level_of_two_is_two_over_pi() {
