@@ -133,11 +133,12 @@ fn tiles(out: &mut String, a: &Analysis) {
         let chance = (name == "synchrony")
             .then(|| a.metrics.number("synchrony_chance"))
             .flatten();
-        let mut beside = chance
-            .map(|c| format!(", {} by chance", figures(c)))
-            .unwrap_or_default();
+        let mut beside = String::new();
         if let Some([low, high]) = value.ci95 {
             let _ = write!(beside, " ({} … {})", figures(low), figures(high));
+        }
+        if let Some(chance) = chance {
+            let _ = write!(beside, ", {} by chance", figures(chance));
         }
         let _ = writeln!(
             out,
