@@ -631,7 +631,7 @@ fn what_is_no_recording_is_refused_in_a_sentence() {
     );
     assert_eq!(
         error(b"t,x,y\n1,2,3\n"),
-        "standard input: is not an MCAP recording (it begins with \"t,x,y\\n1,\"); logs of other formats can be ingested"
+        "standard input: is not an MCAP recording (it begins with \"t,x,y\\n1,\"); `analyze ingest` turns logs of other formats into one"
     );
     let error = Recording::open(std::path::Path::new("no/such.mcap"), &options())
         .expect_err("refused")

@@ -179,17 +179,19 @@ fn own(a: &Analysis, start_ns: i64) -> Vec<Message> {
     }
     let step_s = analyze::inputs::mean_step_s(&i.t_s).unwrap_or(1.0);
     let m = ((STRETCH_S / step_s + 1e-3).floor() as usize).max(1);
-    if i.roll_rad.len() >= m && i.roll_rad.iter().all(|r| r.is_finite()) {
-        let rms: Vec<f64> = i
-            .roll_rad
-            .windows(m)
-            .map(|w| {
-                (w.iter().map(|r| r * r).sum::<f64>() / m as f64)
-                    .sqrt()
-                    .to_degrees()
-            })
-            .collect();
-        series("/findings/rms_roll_2s_deg", &i.t_s[m - 1..], &rms);
+    // No stretch of 2 s spans a hole.
+    for stretch in analyze::inputs::stretches(&i.t_s, 0.0) {
+        let roll_rad = i.roll_rad.get(stretch.clone()).unwrap_or_default();
+        if roll_rad.len() < m || !roll_rad.iter().all(|r| r.is_finite()) {
+            continue;
+        }
+        let rms = |w: &[f64]| {
+            (w.iter().map(|r| r * r).sum::<f64>() / m as f64)
+                .sqrt()
+                .to_degrees()
+        };
+        let rms: Vec<f64> = roll_rad.windows(m).map(rms).collect();
+        series("/findings/rms_roll_2s_deg", &i.t_s[stretch][m - 1..], &rms);
     }
     out.extend(
         states(i)

@@ -75,7 +75,7 @@ struct AnalyzeArgs {
     /// List the signals of these topics only, * for anything
     #[arg(long, value_name = "TOPIC")]
     topic: Vec<String>,
-    /// Write the signals to a table; columns are named by their paths
+    /// Write the signals to a table; columns are named by their paths (in CSV with their units)
     #[arg(long, value_name = "FILE.parquet|.csv")]
     out: Option<PathBuf>,
     /// Write one row in so many, for --out

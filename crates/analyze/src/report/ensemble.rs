@@ -74,9 +74,10 @@ pub fn ensemble(analyses: &[Analysis]) -> String {
         let mean = x.iter().sum::<f64>() / n;
         // The sample's standard deviation: these files stand for others like them.
         let sd = if x.len() > 1 {
-            (x.iter().map(|x| (x - mean).powi(2)).sum::<f64>() / (n - 1.0)).sqrt()
+            let squares = x.iter().map(|x| (x - mean).powi(2)).sum::<f64>();
+            figures((squares / (n - 1.0)).sqrt())
         } else {
-            0.0
+            "–".into()
         };
         let label = if metric.unit == "1" {
             metric.label.to_owned()
@@ -87,7 +88,7 @@ pub fn ensemble(analyses: &[Analysis]) -> String {
             out,
             "{label:<32} {:>10} {:>10} {:>10} {:>10} {:>5}  {}",
             figures(mean),
-            figures(sd),
+            sd,
             figures(x[0]),
             figures(x[x.len() - 1]),
             x.len(),

@@ -90,7 +90,7 @@ pub enum ReadError {
     },
     /// It is something else.
     #[error(
-        "{name}: is not an MCAP recording (it begins with {found}); logs of other formats can be ingested"
+        "{name}: is not an MCAP recording (it begins with {found}); `analyze ingest` turns logs of other formats into one"
     )]
     NotMcap {
         /// The file.

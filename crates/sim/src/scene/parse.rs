@@ -316,6 +316,13 @@ fn readable(message: &str) -> String {
     ] {
         message = message.replace(theirs, ours);
     }
+    // An effect is a table: `hold = true` is near, but none.
+    if let Some((found, _)) = message.split_once(", expected struct ") {
+        return format!("{found}, expected a table; `{{}}` is one with every default");
+    }
+    if message == "missing field `name`" {
+        return "the scene has no `name`; begin with name = \"…\"".into();
+    }
     let mut ticks = message.split('`').skip(1).step_by(2);
     if (message.starts_with("unknown field") || message.starts_with("unknown variant"))
         && let Some(word) = ticks.next()

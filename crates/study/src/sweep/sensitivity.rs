@@ -124,6 +124,9 @@ pub fn estimate(rows: &[Vec<f64>], axis: usize) -> Option<(Estimate, Estimate)> 
 
 /// For people.
 pub fn table(indices: &[Index]) -> String {
+    if indices.is_empty() {
+        return "\nno sensitivity: fewer than two base points with a result, or metrics that never change\n".into();
+    }
     let mut out = format!(
         "\n{:<20}{:<40}{:>24}{:>24}{:>8}\n",
         "sensitivity of", "to", "alone (95 %)", "with others (95 %)", "points"
