@@ -103,6 +103,81 @@ fn noise_does_not_bias_the_pull() {
     assert!(held >= 36, "{held}");
 }
 
+/// A scene's columns, its beat hidden or not, and what is found in them.
+fn found_in(scene: &str, hide_the_beat: bool) -> Vec<study::fit::Outcome> {
+    let scene = sim::scene::load(scene, &["solver.energy=false".to_owned()]).unwrap();
+    let mut compression_m = vec![Vec::new(); scene.carriers.count()];
+    let mut keep = |s: &sim::run::Sample| {
+        let each = compression_m.iter_mut().zip(&s.compression_m);
+        each.for_each(|(c, d): (&mut Vec<f64>, &f64)| c.push(*d));
+        true
+    };
+    let (mut inputs, _, outcome) = study::ensemble::observe(&scene, None, &mut keep);
+    outcome.unwrap();
+    if hide_the_beat {
+        inputs.beat_phase_rad.clear();
+    }
+    let (onset_s, build_up_s) = match &scene.effects.music {
+        Some(music) => (music.onset_s, music.build_up_s),
+        None => (0.0, 0.0),
+    };
+    let field = Field {
+        inputs,
+        compression_m,
+        onset_s,
+        build_up_s,
+        ..Field::default()
+    };
+    fit(&field, analyze::Window::from(15.0))
+}
+
+#[test]
+fn a_recorded_beat_tells_the_pull_where_nobody_follows_it() {
+    for scene in ["music", "detuned-beat", "tempo-change"] {
+        let found = found_in(scene, false);
+        let pull = find(&found, "pull");
+        let [low, high] = pull.interval;
+        assert!(
+            low <= 2.7 && 2.7 <= high && high - low < 0.05,
+            "{scene}: {pull:?}"
+        );
+    }
+    let hidden = found_in("music", true);
+    let [low, high] = find(&hidden, "pull").interval;
+    assert!(low <= 2.7 && 2.7 <= high && high - low < 0.05);
+}
+
+#[test]
+fn where_the_model_does_not_hold_the_reason_stands() {
+    for (scene, hide, name, words) in [
+        ("baseline", false, "pull", "no pull shows"),
+        ("detuned-beat", true, "pull", "do not follow one beat"),
+        (
+            "baseline",
+            false,
+            "roll damping",
+            "does not swing as a pendulum",
+        ),
+        (
+            "strict-contact",
+            false,
+            "roll damping",
+            "does not swing as a pendulum",
+        ),
+        ("stand-still", false, "stiffness", "stands still"),
+        ("stand-still", false, "roll damping", "does not move"),
+    ] {
+        let found = found_in(scene, hide);
+        let why = found
+            .iter()
+            .find_map(|f| f.as_ref().err().filter(|(n, _)| n == name));
+        assert!(
+            why.is_some_and(|(_, why)| why.contains(words)),
+            "{scene}: {found:?}"
+        );
+    }
+}
+
 /// The drum pauses for five beats, nobody knows how many: the tempo is that of the beats that were heard one after the other.
 #[test]
 fn a_pause_of_the_drum_does_not_slow_the_beat() {

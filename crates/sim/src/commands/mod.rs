@@ -44,6 +44,14 @@ fn setting(text: &str) -> Result<String, String> {
     }
 }
 
+/// Takes a time within a recording.
+fn seconds(text: &str) -> Result<f64, String> {
+    match text.parse::<f64>() {
+        Ok(x) if x.abs() <= 1e10 => Ok(x),
+        _ => Err("expected a number of seconds, up to 1e10".into()),
+    }
+}
+
 /// Runs a command; errors go to stderr, one sentence first, then the causes.
 pub fn run(command: Command) -> ExitCode {
     let outcome = match command {

@@ -1,7 +1,7 @@
 //! `sim replay`: a recording drives a scene.
 
-use super::{Format, print, setting};
-use anyhow::{Context, Result, anyhow};
+use super::{Format, print, seconds, setting};
+use anyhow::{Context, Result, anyhow, bail};
 use recording::read::{ReadOptions, Recording};
 use recording::topics::{BEAT, FORCES, PHASES, STATE};
 use recording::whole::apart;
@@ -29,13 +29,13 @@ pub struct Args {
     #[arg(long, value_enum, default_value_t = What::Phases)]
     drive: What,
     /// From, s after the recording's start. Default: where what drives begins.
-    #[arg(long, value_name = "S")]
+    #[arg(long, value_name = "S", value_parser = seconds)]
     from: Option<f64>,
     /// To, s after the recording's start. Default: where what drives ends.
-    #[arg(long, value_name = "S")]
+    #[arg(long, value_name = "S", value_parser = seconds)]
     to: Option<f64>,
     /// Left out of the misfit at the beginning, s. Default: 0 where the body starts as measured, else 3.
-    #[arg(long, value_name = "S")]
+    #[arg(long, value_name = "S", value_parser = seconds)]
     settle: Option<f64>,
     /// Change a value of the scene; `effects.NAME=false` takes an effect away. May be repeated.
     #[arg(long, value_name = "KEY=VALUE", value_parser = setting)]
@@ -109,6 +109,18 @@ pub fn run(args: &Args) -> Result<Input> {
     let replay = take
         .scene(&scene, &options)
         .map_err(|why| anyhow!("{name}: {why}"))?;
+    let settle_s = args.settle.unwrap_or(if replay.starts_as_measured {
+        0.0
+    } else {
+        SETTLE_S
+    });
+    if settle_s >= replay.scene.duration_s {
+        bail!(
+            "--settle leaves {settle_s} s out, but the replay lasts {} s only",
+            replay.scene.duration_s
+        );
+    }
+    let window_s = [settle_s, replay.scene.duration_s];
     let out = args.out.clone().unwrap_or_else(|| {
         let stem = args.file.file_stem().unwrap_or_default().to_string_lossy();
         PathBuf::from(format!("{stem}-replay.mcap"))
@@ -146,12 +158,6 @@ pub fn run(args: &Args) -> Result<Input> {
             });
         }
     }
-    let settle_s = args.settle.unwrap_or(if replay.starts_as_measured {
-        0.0
-    } else {
-        SETTLE_S
-    });
-    let window_s = [settle_s, replay.scene.duration_s];
     let found: Vec<Misfit> = COMPARED
         .iter()
         .filter_map(|c| {
