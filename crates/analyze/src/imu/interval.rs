@@ -272,10 +272,13 @@ fn beyond_the_budget(name: &str, motion: &Motion, window: Window) -> f64 {
             let hz = metrics_of(inputs, window, |n| n == "peak_hz").number("peak_hz");
             hz.map_or(0.0, |hz| farthest(name, inputs, window, cuts(hz)) / 1.96)
         }
-        // Thirds of a window without its ends are other thirds: as far off as if as much were missing once more.
+        // Thirds of a window without its ends are other thirds: as far off as if as much were missing once, twice, thrice more.
         "growth_ratio" => {
             let lost_s = (range.len() - seen.len()) as f64 * period_s;
-            let cuts = [[lost_s, 0.0], [0.0, lost_s]].into_iter();
+            let cuts = [1.0, 2.0, 3.0].map(|k| k * lost_s);
+            let cuts = cuts
+                .into_iter()
+                .flat_map(|cut_s| [[cut_s, 0.0], [0.0, cut_s]]);
             farthest(name, inputs, window, cuts) / 1.96
         }
         // The ends have no height. Stretches of their length swing so much more or less than the whole.
