@@ -149,7 +149,11 @@ fn what_cannot_be_replayed_ends_in_one_sentence() {
         (&gap, &[], "has a gap from 6.9"),
         (&gap, &["--to", "30"], "change --from or --to"),
         (&gap, &["--from", "3", "--to", "2"], "change --from or --to"),
-        (&gap, &["--from", "nan"], "change --from or --to"),
+        (
+            &gap,
+            &["--from", "1", "--to", "3", "--settle", "2"],
+            "--settle leaves 2 s out",
+        ),
         (
             &gap,
             &["--drive", "shoulders"],
@@ -180,6 +184,8 @@ fn what_cannot_be_replayed_ends_in_one_sentence() {
         );
         assert!(!out.exists() && done.stdout.is_empty());
     }
+    let args = ["replay", gap.to_str().unwrap(), "--from", "nan"];
+    assert_eq!(sim(&args).status.code(), Some(2));
     // What is beside the gap is good, wrapped phases are phases, and without the body's motion there is nothing to compare.
     phases(&at("wrapped.mcap"), 2, |_, t| {
         (!(7.0..9.0).contains(&t)).then_some((12.0 * t).rem_euclid(std::f64::consts::TAU))
