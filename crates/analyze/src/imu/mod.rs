@@ -9,10 +9,12 @@
 //! | [`orientation`] | sensor → earth (z up), causal and batch |
 //! | [`vertical`] | height by drift-free double integration, with its valid band |
 //! | [`rath`] | the body's motion |
+//! | [`budget`] | how sure a sensor can be |
 //! | [`interval`] | every metric that rests on the motion, with its interval |
 //! | [`unloading`] | when the support falls below a share of the weight |
 //! | [`truth`] | errors against a recorded truth |
 
+pub mod budget;
 pub mod interval;
 pub mod orientation;
 pub mod rath;

@@ -11,7 +11,7 @@
 //!
 //! What an inertial sensor cannot give: mean height, heading, forces of single handles. Those stay missing, with the reason. The numbers made of it, and how sure they are: [`super::interval`].
 
-use super::interval::Budget;
+use super::budget::Budget;
 use super::orientation::{self, Estimate, Options};
 use super::track::Track;
 use super::vertical;

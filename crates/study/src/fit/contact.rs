@@ -2,7 +2,7 @@
 
 use super::squares::{Block, bootstrapped, solve, unexplained};
 use super::{BLOCK_S, CARRIES, EDGE, Field, KEPT_S, Outcome, budgeted, pair};
-use analyze::imu::interval::Budget;
+use analyze::imu::budget::Budget;
 use analyze::inputs::{Window, mean_step_s};
 use analyze::mechanism::spline_derivatives;
 use std::ops::Range;

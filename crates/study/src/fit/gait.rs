@@ -3,7 +3,7 @@
 use super::squares::{Block, bootstrapped};
 use super::{BLOCK_S, Estimate, Field, Outcome, budgeted, estimate};
 use analyze::beat::adler::Adler;
-use analyze::imu::interval::Budget;
+use analyze::imu::budget::Budget;
 use analyze::inputs::{Inputs, Window, interpolate, mean_step_s};
 use analyze::phase::unwrap;
 use nalgebra::{DMatrix, DVector};
