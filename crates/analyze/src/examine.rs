@@ -119,16 +119,11 @@ pub struct Trace {
 const MOST_TRACES: usize = 24;
 
 impl Analysis {
-    /// Whether data were lost: the exit code is 3 then.
-    pub fn lost(&self) -> bool {
-        self.skipped_messages > 0 || self.quality.iter().any(|q| q.loss)
-    }
-
-    /// What is lost, where something is: one sentence.
+    /// What is lost, where something is: one sentence; the exit code is 3 then.
     pub fn damage(&self) -> Option<String> {
-        self.lost().then(|| {
-            let losses = self.quality.iter().filter(|q| q.loss);
-            let told: Vec<String> = losses.map(Quality::told).collect();
+        let losses = self.quality.iter().filter(|q| q.loss);
+        let told: Vec<String> = losses.map(Quality::told).collect();
+        (self.skipped_messages > 0 || !told.is_empty()).then(|| {
             let lost = match self.skipped_messages {
                 0 if self.quality.iter().any(|q| q.kind == "truncated") => {
                     "its end is missing".to_owned()
@@ -653,40 +648,32 @@ impl<'a> Pass<'a> {
     /// What a roles file names and the recording does not have, or has too much of.
     fn misnamed(&self, said: &RolesFile) -> Vec<String> {
         let mut out = Vec::new();
+        let channels = &self.recording.info().channels;
         for role in Role::ALL {
-            for name in &said.patterns(role) {
-                let name = name.as_str();
-                let names: Vec<&str> = match role.is_topic() {
-                    true => self
-                        .recording
-                        .info()
-                        .channels
-                        .iter()
-                        .map(|c| c.topic.as_str())
-                        .collect(),
-                    false => self.entries.iter().map(|e| e.path.as_str()).collect(),
-                };
-                let found = names.iter().filter(|path| matches(name, path)).count();
-                let role = role.name();
-                if found == 0 {
-                    let near = names
-                        .iter()
-                        .min_by_key(|path| strsim::damerau_levenshtein(path, name));
-                    let near = near
-                        .filter(|path| 3 * strsim::damerau_levenshtein(path, name) <= name.len());
-                    let hint = near.map_or(String::new(), |path| format!("; did you mean {path}?"));
-                    out.push(format!(
-                        "the roles file's {role}, {name}, is not in the recording{hint}"
-                    ));
+            let (patterns, word) = (said.patterns(role), role.name());
+            let names: Vec<&str> = match role.is_topic() {
+                true => channels.iter().map(|c| c.topic.as_str()).collect(),
+                false => self.entries.iter().map(|e| e.path.as_str()).collect(),
+            };
+            for pattern in &patterns {
+                if names.iter().any(|name| matches(pattern, name)) {
+                    continue;
                 }
+                let far = |name| (strsim::damerau_levenshtein(name, pattern), name);
+                let nearest = names.iter().copied().map(far).min_by_key(|(far, _)| *far);
+                let near = nearest.filter(|(far, _)| 3 * far <= pattern.len());
+                let hint =
+                    near.map_or(String::new(), |(_, name)| format!("; did you mean {name}?"));
+                out.push(format!(
+                    "the roles file's {word}, {pattern}, is not in the recording{hint}"
+                ));
             }
-            if role.is_single()
-                && !said.patterns(role).is_empty()
-                && self.player(role).is_none()
-                && self.players(role).next().is_some()
+            let found = self.players(role).count();
+            if role.is_single() && !patterns.is_empty() && found > 0 && self.player(role).is_none()
             {
-                let found = self.players(role).count();
-                out.push(format!("the roles file's {} fits {found} signals, where one is expected: none is taken", role.name()));
+                out.push(format!(
+                    "the roles file's {word} fits {found} signals, where one is expected: none is taken"
+                ));
             }
         }
         out

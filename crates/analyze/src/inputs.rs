@@ -179,12 +179,12 @@ fn usual(last: usize) -> usize {
 
 /// Whether an axis has no hole, told without sorting its steps.
 fn whole(t_s: &[f64]) -> bool {
-    let steps = || t_s.windows(2).map(|w| HOLE * (w[1] - w[0]));
+    let steps = || t_s.windows(2).map(|w| w[1] - w[0]);
     let Some(last) = t_s.len().checked_sub(2) else {
         return false;
     };
-    let longest = steps().fold(0.0, f64::max) / HOLE;
-    steps().filter(|step| *step >= longest).count() > last - usual(last)
+    let longest = steps().fold(0.0, f64::max);
+    steps().filter(|step| HOLE * step >= longest).count() > last - usual(last)
 }
 
 /// The parts of an ascending time axis between its holes, as ranges of samples; steps up to `least_s` are never one.

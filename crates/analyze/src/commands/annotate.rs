@@ -3,17 +3,15 @@
 use std::path::Path;
 
 use analyze::examine::Analysis;
-use analyze::inputs::Inputs;
-use analyze::{metrics::Datum, phase};
+use analyze::inputs::{Inputs, stretches};
+use analyze::metrics::{Datum, stretch_samples};
+use analyze::phase;
 use nalgebra::UnitQuaternion;
 use recording::cdr::{Float64, Log, Time};
 use recording::read::Recording;
 use recording::schema::rath;
 use recording::topics::MessageKind;
 use recording::write::{RawChannel, RecordingWriter, WriterOptions};
-
-/// Length of the moving stretch whose RMS roll is written (s).
-const STRETCH_S: f64 = analyze::metrics::ONSET_STRETCH_S;
 
 /// What was found in an earlier round makes room for what is found now.
 fn is_found(topic: &str) -> bool {
@@ -177,10 +175,9 @@ fn own(a: &Analysis, start_ns: i64) -> Vec<Message> {
             .collect();
         series("/findings/support_ratio", i.force_times(), &ratio);
     }
-    let step_s = analyze::inputs::mean_step_s(&i.t_s).unwrap_or(1.0);
-    let m = ((STRETCH_S / step_s + 1e-3).floor() as usize).max(1);
-    // No stretch of 2 s spans a hole.
-    for stretch in analyze::inputs::stretches(&i.t_s, 0.0) {
+    // The onset's stretches of 2 s, of which none spans a hole.
+    let m = stretch_samples(&i.t_s).unwrap_or(usize::MAX);
+    for stretch in stretches(&i.t_s, 0.0) {
         let roll_rad = i.roll_rad.get(stretch.clone()).unwrap_or_default();
         if roll_rad.len() < m || !roll_rad.iter().all(|r| r.is_finite()) {
             continue;

@@ -5,6 +5,7 @@ use std::path::PathBuf;
 use anyhow::bail;
 use clap::Args;
 use recording::import;
+use recording::whole::apart;
 use recording::write::{RecordingWriter, WriterOptions};
 
 use super::Done;
@@ -40,12 +41,7 @@ pub(super) struct IngestArgs {
 }
 
 pub(super) fn run(args: &IngestArgs) -> anyhow::Result<Done> {
-    if args.files.contains(&args.out) {
-        bail!(
-            "{}: is read and cannot be written at the same time",
-            args.out.display()
-        );
-    }
+    apart([&*args.out], args.files.iter().map(AsRef::as_ref)).map_err(anyhow::Error::msg)?;
     if args.sound_start.abs() > 1e6 || args.sound_start.is_nan() {
         bail!(
             "--sound-start: found {}, expected seconds up to 1000000",

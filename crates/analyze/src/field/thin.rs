@@ -53,8 +53,8 @@ pub fn factors(recording: &Recording, roles: &Roles) -> Result<BTreeMap<String, 
     Err(factors.keys().map(|topic| messages(topic)).sum())
 }
 
-/// The inertial columns and stamps of the topics whose factor is above 1: means over so many samples in the order of the file, at log times. Samples that are
-/// not finite are left out, and of a sensor that gives angular velocities those without one.
+/// The inertial columns and stamps of the topics whose factor is above 1: means over so many samples in the order of the file, at log times.
+/// Samples that are not finite are left out, and of a sensor that gives angular velocities those without one.
 pub fn read(
     recording: &Recording,
     factors: &BTreeMap<String, usize>,

@@ -9,7 +9,8 @@
 //! derivative [rad/s²], R body → earth, g gravity [m/s²]. Only contact lifts the body, so its specific force *is* the support force over its
 //! mass: no force sensor is needed for T_float. With r unknown (0) the term in brackets stays in, up to r·ω² and r·α.
 //!
-//! What an inertial sensor cannot give: mean height, heading, forces of single handles. Those stay missing, with the reason. The numbers made of it, and how sure they are: [`super::interval`].
+//! What an inertial sensor cannot give: mean height, heading, forces of single handles. Those stay missing, with the reason. The numbers
+//! made of the motion, and how sure they are: [`super::interval`].
 
 use super::budget::Budget;
 use super::orientation::{self, Estimate, Options};

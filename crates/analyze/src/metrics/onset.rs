@@ -30,8 +30,8 @@ pub fn onset_s(t_s: &[f64], roll_rad: &[f64]) -> Option<f64> {
     })
 }
 
-/// Samples of a stretch.
-fn stretch_samples(t_s: &[f64]) -> Option<usize> {
+/// Samples of such a stretch; `None` where no step is known.
+pub fn stretch_samples(t_s: &[f64]) -> Option<usize> {
     // A thousandth of a sample of slack: times are rounded to nanoseconds.
     let m = (ONSET_STRETCH_S / mean_step_s(t_s)? + 1e-3).floor() as usize;
     Some(m.max(1))
@@ -43,10 +43,13 @@ pub fn onset_time_s(c: &Context) -> Value {
 }
 
 pub fn unstable(c: &Context) -> Value {
-    let roll = c.roll();
-    let longest = stretches(&roll.t_s, 0.0).into_iter().map(|s| s.len()).max();
-    match stretch_samples(&roll.t_s).is_some_and(|m| longest >= Some(m)) {
-        true => Value::bool(c.onset().is_some()),
+    if c.onset().is_some() {
+        return Value::bool(true);
+    }
+    let t_s = &c.roll().t_s;
+    let holds = |m| stretches(t_s, 0.0).iter().any(|stretch| stretch.len() >= m);
+    match stretch_samples(t_s).is_some_and(holds) {
+        true => Value::bool(false),
         false => Value::missing("the window holds no 2 s of roll without a hole"),
     }
 }
