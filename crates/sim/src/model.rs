@@ -399,9 +399,9 @@ impl Model {
         &self.imus
     }
 
-    /// Where the party faces, where its way turns.
-    pub fn heading(&self) -> Option<Heading> {
-        self.heading
+    /// Where the party faces, rad, and how fast it turns, rad/s.
+    pub fn heading(&self, t_s: f64) -> [f64; 2] {
+        self.heading.map_or([0.0; 2], |heading| heading.at(t_s))
     }
 
     /// How many carriers there are.

@@ -293,7 +293,7 @@ impl<'m> Recorder<'m> {
             s.pose.position_m,
             Quaternion { x, y, z, w },
         ));
-        let [heading, _] = self.model.heading().map_or([0.0; 2], |way| way.at(s.t_s));
+        let [heading, _] = self.model.heading(s.t_s);
         let (z, w) = (0.5 * heading).sin_cos();
         let upright = Quaternion {
             x: 0.0,

@@ -70,7 +70,7 @@ impl<'m> Sensors<'m> {
         }
         let party = on_carriers.then(|| imu::PartyMotion {
             shoulders_m_per_s2: &self.shoulders,
-            heading: model.heading().map_or([0.0; 2], |way| way.at(t_s)),
+            heading: model.heading(t_s),
         });
         for (imu, memory) in model
             .imus()

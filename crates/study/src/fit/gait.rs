@@ -167,18 +167,7 @@ impl Increments<'_> {
 
     /// Where the beat was recorded: everything but its tempo is linear.
     fn under_a_beat(&self, heard: &[f64]) -> Result<Vec<Outcome>, String> {
-        let known: Vec<(f64, f64)> = self
-            .t_s
-            .iter()
-            .copied()
-            .zip(heard.iter().copied())
-            .collect();
-        let longest = known
-            .chunk_by(|a, b| a.1.is_finite() == b.1.is_finite())
-            .filter(|stretch| stretch[0].1.is_finite())
-            .max_by_key(|stretch| stretch.len())
-            .ok_or("no beat")?;
-        let (t_s, psi): (Vec<f64>, Vec<f64>) = longest.iter().copied().unzip();
+        let (t_s, psi) = longest_heard(self.t_s, heard).ok_or("no beat")?;
         let (omega, omega_half) = tempo(&t_s, &unwrap(&psi));
         let carriers = self.phases.len();
         // Of the unknowns A and the own frequencies.
@@ -357,17 +346,13 @@ fn half(variance: f64) -> f64 {
 fn gait_from_steps(i: &Inputs, from: usize) -> Result<Vec<Outcome>, String> {
     // Before the first beat that was heard, in pauses and after the last, nobody knows its phase, nor how many beats a pause holds: the tempo is
     // that of the longest stretch without one.
-    let times = i.phase_times().iter().skip(from).copied();
-    let beats: Vec<(f64, f64)> = times
-        .zip(i.beat_phase_rad.iter().skip(from).copied())
-        .collect();
-    let heard = beats
-        .chunk_by(|a, b| a.1.is_finite() == b.1.is_finite())
-        .filter(|stretch| stretch[0].1.is_finite())
-        .max_by_key(|stretch| stretch.len())
-        .filter(|stretch| stretch.len() >= 100)
+    let heard = longest_heard(
+        &i.phase_times()[from..],
+        i.beat_phase_rad.get(from..).unwrap_or_default(),
+    );
+    let (t_s, psi) = heard
+        .filter(|(t_s, _)| t_s.len() >= 100)
         .ok_or("too few beats after the onset of the music")?;
-    let (t_s, psi): (Vec<f64>, Vec<f64>) = heard.iter().copied().unzip();
     let (omega, half) = tempo(&t_s, &unwrap(&psi));
     let mut out = vec![estimate("beat", "Hz", omega / TAU, half / TAU)];
     match Adler::of(i) {
@@ -405,6 +390,15 @@ fn gait_from_steps(i: &Inputs, from: usize) -> Result<Vec<Outcome>, String> {
     let why = "steps err by as much as carriers wander";
     out.push(Err(("phase noise".into(), why.into())));
     Ok(out)
+}
+
+/// Times (s) and phases (rad) of the longest stretch in which a beat was heard.
+fn longest_heard(t_s: &[f64], beat_rad: &[f64]) -> Option<(Vec<f64>, Vec<f64>)> {
+    let known: Vec<(f64, f64)> = t_s.iter().copied().zip(beat_rad.iter().copied()).collect();
+    let stretches = known.chunk_by(|a, b| a.1.is_finite() == b.1.is_finite());
+    let heard = stretches.filter(|stretch| stretch[0].1.is_finite());
+    let longest = heard.max_by_key(|stretch| stretch.len())?;
+    Some(longest.iter().copied().unzip())
 }
 
 /// Frequency of a beat that was heard, rad/s, and half of its 95 % interval: a straight line through its phase, every beat one
