@@ -1,33 +1,147 @@
 //! Files that appear whole or not at all.
 
-use std::io::{Error, Write};
-use std::path::Path;
+use std::{
+    fs,
+    io::{self, BufWriter, Write},
+    path::{Path, PathBuf},
+    sync::Mutex,
+};
 
 /// Fills a temporary file in the folder of `path` and gives it that name when it is complete; a failure leaves what was there as it was.
+/// A link keeps pointing at what is replaced, and a device is written to.
 ///
 /// # Errors
 /// What the system says, or what `fill` returns.
-pub fn write_whole<E: From<Error>>(
+pub fn write_whole<E: From<io::Error>>(
     path: &Path,
-    fill: impl FnOnce(&mut std::fs::File) -> Result<(), E>,
+    fill: impl FnOnce(&mut Sink) -> Result<(), E>,
 ) -> Result<(), E> {
-    let folder = path
-        .parent()
-        .filter(|p| !p.as_os_str().is_empty())
-        .unwrap_or(Path::new("."));
-    let mut builder = tempfile::Builder::new();
-    builder.prefix(".whole-").suffix(".part");
-    #[cfg(unix)]
-    {
-        use std::os::unix::fs::PermissionsExt;
-        // As any other new file: the user's mask takes its part away.
-        builder.permissions(std::fs::Permissions::from_mode(0o666));
+    let mut sink = Sink::beside(path)?;
+    fill(&mut sink)?;
+    Ok(sink.commit()?)
+}
+
+/// Temporary files that are being written, for [`remove_unfinished_files`].
+static UNFINISHED: Mutex<Vec<PathBuf>> = Mutex::new(Vec::new());
+
+/// Removes all temporary files that are being written: what a program does when it is interrupted, before it exits.
+pub fn remove_unfinished_files() {
+    let mut paths = match UNFINISHED.lock() {
+        Ok(paths) => paths,
+        Err(poisoned) => poisoned.into_inner(),
+    };
+    for path in paths.drain(..) {
+        // Best effort: there is nobody left to tell.
+        let _ = fs::remove_file(path);
     }
-    let mut file = builder.tempfile_in(folder)?;
-    fill(file.as_file_mut())?;
-    file.as_file_mut().flush()?;
-    file.persist(path).map_err(|e| e.error)?;
-    Ok(())
+}
+
+fn forget(path: &Path) {
+    if let Ok(mut paths) = UNFINISHED.lock() {
+        paths.retain(|known| known != path);
+    }
+}
+
+/// Where the bytes go.
+pub enum Sink {
+    /// A file that is not complete.
+    File {
+        /// Under its temporary name.
+        file: BufWriter<tempfile::NamedTempFile>,
+        /// The name that it gets.
+        path: PathBuf,
+    },
+    /// Anything else.
+    Stream(BufWriter<Box<dyn Write + Send>>),
+}
+
+impl Sink {
+    /// A file that gets its name at the end, or straight to what is no regular file.
+    pub fn beside(path: &Path) -> io::Result<Self> {
+        match fs::metadata(path) {
+            Ok(found) if found.is_dir() => {
+                return Err(io::Error::new(
+                    io::ErrorKind::IsADirectory,
+                    "it is a folder",
+                ));
+            }
+            Ok(found) if !found.is_file() => {
+                let device = fs::OpenOptions::new().write(true).open(path)?;
+                return Ok(Sink::Stream(BufWriter::with_capacity(
+                    1 << 16,
+                    Box::new(device),
+                )));
+            }
+            Ok(found) if found.permissions().readonly() => {
+                return Err(io::Error::new(
+                    io::ErrorKind::PermissionDenied,
+                    "the file that is there is read-only",
+                ));
+            }
+            _ => {}
+        }
+        // A link keeps pointing at the file that is replaced.
+        let path = fs::canonicalize(path).unwrap_or_else(|_| path.to_owned());
+        let folder = match path.parent() {
+            Some(parent) if !parent.as_os_str().is_empty() => parent,
+            _ => Path::new("."),
+        };
+        let mut prefix = std::ffi::OsString::from(".");
+        prefix.push(path.file_name().ok_or(io::ErrorKind::InvalidInput)?);
+        prefix.push(".");
+        let mut builder = tempfile::Builder::new();
+        builder.prefix(&prefix).suffix(".part");
+        #[cfg(unix)]
+        {
+            use std::os::unix::fs::PermissionsExt as _;
+            // As any new file: the system takes away what the umask forbids.
+            builder.permissions(fs::Permissions::from_mode(0o666));
+        }
+        let file = builder.tempfile_in(folder)?;
+        if let Ok(mut paths) = UNFINISHED.lock() {
+            paths.push(file.path().to_owned());
+        }
+        Ok(Sink::File {
+            file: BufWriter::with_capacity(1 << 18, file),
+            path,
+        })
+    }
+
+    /// Writes what is left and gives a file its name.
+    pub fn commit(mut self) -> io::Result<()> {
+        self.flush()?;
+        if let Sink::File { file, path } = &mut self {
+            let temporary = file.get_ref().path().to_owned();
+            fs::rename(&temporary, path)?;
+            forget(&temporary);
+        }
+        Ok(())
+    }
+}
+
+impl Drop for Sink {
+    fn drop(&mut self) {
+        if let Sink::File { file, .. } = self {
+            // The temporary file removes itself after this; what was renamed is no longer under that name.
+            forget(file.get_ref().path());
+        }
+    }
+}
+
+impl Write for Sink {
+    fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
+        match self {
+            Sink::File { file, .. } => file.write(bytes),
+            Sink::Stream(stream) => stream.write(bytes),
+        }
+    }
+
+    fn flush(&mut self) -> io::Result<()> {
+        match self {
+            Sink::File { file, .. } => file.flush(),
+            Sink::Stream(stream) => stream.flush(),
+        }
+    }
 }
 
 /// That an output is none of the inputs, nor another output: whoever names one twice would lose it.
@@ -69,12 +183,13 @@ pub fn apart<'a>(
 #[cfg(test)]
 mod tests {
     use super::*;
+    use std::io::Error;
 
     #[test]
     fn nothing_is_read_and_written_at_once() {
         let folder = tempfile::tempdir().unwrap();
         let [x, y] = ["x", "y"].map(|name| folder.path().join(name));
-        std::fs::write(&x, "1").unwrap();
+        fs::write(&x, "1").unwrap();
         let round_about = folder
             .path()
             .join("..")
@@ -89,6 +204,21 @@ mod tests {
         assert!(apart([Path::new("/dev/null"), Path::new("/dev/null")], []).is_ok());
     }
 
+    #[cfg(unix)]
+    #[test]
+    fn a_link_stays_a_link_and_a_device_a_device() {
+        let folder = tempfile::tempdir().unwrap();
+        let [there, link] = ["there", "link"].map(|name| folder.path().join(name));
+        fs::write(&there, "old").unwrap();
+        std::os::unix::fs::symlink(&there, &link).unwrap();
+        write_whole::<Error>(&link, |f| f.write_all(b"new")).unwrap();
+        assert!(link.is_symlink());
+        assert_eq!(fs::read(&there).unwrap(), b"new");
+        let null = Path::new("/dev/null");
+        write_whole::<Error>(null, |f| f.write_all(b"new")).unwrap();
+        assert!(!null.is_file());
+    }
+
     #[test]
     fn a_failure_leaves_nothing_behind_and_the_old_file_alone() {
         let folder = tempfile::tempdir().unwrap();
@@ -99,8 +229,8 @@ mod tests {
             Err(Error::other("no more"))
         });
         assert!(failed.is_err());
-        assert_eq!(std::fs::read(&path).unwrap(), b"old");
-        assert_eq!(std::fs::read_dir(folder.path()).unwrap().count(), 1);
+        assert_eq!(fs::read(&path).unwrap(), b"old");
+        assert_eq!(fs::read_dir(folder.path()).unwrap().count(), 1);
         assert!(write_whole::<Error>(&folder.path().join("no/such/x"), |_| Ok(())).is_err());
     }
 }

@@ -10,7 +10,6 @@
 mod beside;
 mod container;
 mod options;
-mod sink;
 
 use std::{
     collections::BTreeMap,
@@ -20,12 +19,10 @@ use std::{
 
 use mcap::records::MessageHeader;
 
-use crate::{cdr, read::ChannelInfo, topics::MessageKind};
+use crate::{cdr, read::ChannelInfo, topics::MessageKind, whole::Sink};
 use beside::{Batch, Beside};
 use container::Container;
 pub use options::WriterOptions;
-use sink::Sink;
-pub use sink::remove_unfinished_files;
 
 /// A message larger than this is refused.
 const MAX_MESSAGE_BYTES: usize = 256 << 20;

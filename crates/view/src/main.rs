@@ -11,6 +11,7 @@ use anyhow::{Context, anyhow, bail};
 use clap::Parser;
 use recording::Finding;
 use recording::read::{ReadError, ReadOptions, Recording, STDIN};
+use recording::whole::write_whole;
 use view::load::{Detail, load};
 use view::store::{Encoded, Sink};
 use view::take::Take;
@@ -191,48 +192,18 @@ fn save(file: &Path, path: &Path) -> anyhow::Result<Vec<Finding>> {
     let recording = open(file)?;
     let (take, findings) = load(&name(file), &recording, Detail::Thinned)?;
     check(file, &take)?;
-    let folder = match path.parent() {
-        Some(folder) if !folder.as_os_str().is_empty() => folder,
-        _ => Path::new("."),
-    };
-    if path.is_dir() {
-        return Err(cannot(&"it is a folder"));
-    }
-    let mut temporary = tempfile::Builder::new()
-        .prefix(".view-")
-        .suffix(".rrd")
-        .permissions(permissions())
-        .tempfile_in(folder)
-        .map_err(|e| cannot(&e))?;
-    {
-        let mut encoded = Encoded::new(BufWriter::with_capacity(1 << 20, temporary.as_file_mut()))?;
+    write_whole(path, |file| {
+        let mut encoded = Encoded::new(file)?;
         view::send(
             &mut encoded,
             &view::recording_id(&take.name, recording.info()),
             &take,
-        )
-        .map_err(|e| cannot(&e))?;
-        encoded
-            .finish()
-            .map_err(|e| cannot(&e))?
-            .flush()
-            .map_err(|e| cannot(&e))?;
-    }
-    temporary.persist(path).map_err(|e| cannot(&e.error))?;
+        )?;
+        encoded.finish()?;
+        anyhow::Ok(())
+    })
+    .map_err(|e| cannot(&e))?;
     Ok(findings)
-}
-
-/// What a new file may be used for: the system's habit, which a temporary file does not follow by itself.
-#[cfg(unix)]
-fn permissions() -> std::fs::Permissions {
-    std::os::unix::fs::PermissionsExt::from_mode(0o666)
-}
-
-#[cfg(not(unix))]
-fn permissions() -> std::fs::Permissions {
-    std::fs::metadata(".")
-        .map(|m| m.permissions())
-        .expect("the working folder exists")
 }
 
 /// Sends to a viewer or server that runs already.

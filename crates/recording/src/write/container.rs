@@ -2,7 +2,8 @@
 
 use mcap::{Compression, McapResult, WriteOptions, records::MessageHeader, write::NoSeek};
 
-use super::{options::WriterOptions, sink::Sink};
+use super::options::WriterOptions;
+use crate::whole::Sink;
 
 /// MCAP, chunked and compressed.
 pub struct Container {
