@@ -9,8 +9,17 @@ use std::path::Path;
 macro_rules! note {
     ($($part:tt)*) => {{
         use std::io::Write as _;
-        let _ = writeln!(std::io::stderr(), $($part)*);
+        let _ = writeln!(std::io::stderr(), "{}", $crate::text::plain(&format!($($part)*)));
     }};
+}
+
+/// A text for a terminal: what a name in somebody's file could command it with (escape sequences, bells) stands as U+FFFD.
+pub fn plain(text: &str) -> std::borrow::Cow<'_, str> {
+    let commands = |c: char| c.is_control() && !matches!(c, '\n' | '\t');
+    match text.contains(commands) {
+        true => text.replace(commands, "\u{fffd}").into(),
+        false => text.into(),
+    }
 }
 
 /// None is longer; what is may have no end.
@@ -35,6 +44,15 @@ pub fn read_text(path: &Path) -> Result<String> {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn a_name_cannot_command_the_terminal() {
+        assert_eq!(plain("φ\t1\n"), "φ\t1\n");
+        assert_eq!(
+            plain("a\u{1b}[2J\u{7}\u{9b}"),
+            "a\u{fffd}[2J\u{fffd}\u{fffd}"
+        );
+    }
 
     #[test]
     fn what_is_no_text_is_refused() {

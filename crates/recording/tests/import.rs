@@ -251,6 +251,85 @@ fn movella_dot_wraps_and_turns_free_acceleration() {
 }
 
 #[test]
+fn the_rate_that_is_told_tells_what_sample_time_fine_counts() {
+    let folder = folder();
+    let log = |rate: &str, step: u32| {
+        let rows = (0..5).map(|i| format!("{i},{},0,0,9.8,1,0,0\n", 100 + i * step));
+        let text = format!(
+            "// General information:\n//  MT Manager version: 2022.0\n{rate}PacketCounter,SampleTimeFine,Acc_X,Acc_Y,Acc_Z,Gyr_X,Gyr_Y,Gyr_Z\n{}",
+            rows.collect::<String>()
+        );
+        let path = file(folder.path(), "mti.csv", &text);
+        ingest(folder.path(), &[path], None)
+    };
+    let rate = "// Update Rate: 100.0Hz\n";
+    for (rate, step, tick_ns, noted) in [
+        (rate, 100, 100_000, true),
+        (rate, 10_000, 1_000, false),
+        ("", 100, 1_000, false),
+    ] {
+        let got = log(rate, step).expect("ingests");
+        let times = got.times("/imu/mti");
+        assert_eq!(times[0], 100 * tick_ns);
+        assert_eq!(times[4] - times[0], 4 * i64::from(step) * tick_ns);
+        assert_eq!(got.values("/imu/mti.angular_velocity.x"), [1.0; 5]);
+        let note =
+            "SampleTimeFine counts 1/10,000 s: its usual step is 100 at an update rate of 100 Hz";
+        let notes = &got.ingested.notes;
+        assert_eq!(notes.iter().any(|n| n.ends_with(note)), noted, "{notes:?}");
+    }
+    let error = log(rate, 130).err().expect("refused").to_string();
+    assert!(
+        error.ends_with("mti.csv: has a usual step of SampleTimeFine of 130 at an update rate of 100 Hz; expected about 100 (1/10,000 s) or 10000 (microseconds)"),
+        "{error}"
+    );
+}
+
+#[test]
+fn a_last_row_that_was_cut_off_is_left_out_and_told() {
+    let folder = folder();
+    let dot =
+        "PacketCounter,SampleTimeFine,Acc_X,Acc_Y,Acc_Z\n1,5,0,0,9.8\n\n2,10005,0,0,9.8\n3,200";
+    let layout = "[time]\ncolumn = \"t\"\nunit = \"s\"\n[acceleration]\ncolumns = [\"x\", \"y\", \"z\"]\nunit = \"g\"\n";
+    let layout = file(folder.path(), "layout.toml", layout);
+    // The last name is of no column: all rows are as short.
+    let plain = "t,x,y,z,\n1,0,0,1\n2,0,0,1\n3,0,0\n";
+    for (name, text, layout, note) in [
+        (
+            "dot",
+            dot,
+            None,
+            "line 5, the last, has 2 of 5 cells: it was cut off and is left out",
+        ),
+        (
+            "plain",
+            plain,
+            layout.to_str(),
+            "line 4, the last, has 3 of 4 cells: it was cut off and is left out",
+        ),
+        ("whole", &plain[..24], layout.to_str(), ""),
+    ] {
+        let path = file(folder.path(), &format!("{name}.csv"), text);
+        let got = ingest(folder.path(), std::slice::from_ref(&path), layout).expect("ingests");
+        assert_eq!(got.ingested.topics, [(format!("/imu/{name}"), 2)]);
+        let told = format!("{}: {note}", path.display());
+        let expected = if note.is_empty() { vec![] } else { vec![told] };
+        assert_eq!(got.ingested.notes, expected);
+    }
+    let head = "time,seconds_elapsed,z,y,x\n1700000000000000001,0.1,9.8,0,0\n";
+    let files = [(
+        "TotalAcceleration.csv",
+        format!("{head}1700000000010000001,0.11,9."),
+    )];
+    let path = zipped(folder.path(), "walk.zip", &files);
+    let got = ingest(folder.path(), &[path], None).expect("ingests");
+    assert_eq!(got.ingested.topics, [("/imu/walk".to_owned(), 1)]);
+    let note =
+        "TotalAcceleration.csv: line 3, the last, has 3 of 5 cells: it was cut off and is left out";
+    assert!(got.ingested.notes.iter().any(|n| n.ends_with(note)));
+}
+
+#[test]
 fn a_device_without_a_date_beside_one_with_is_told() {
     let folder = folder();
     let dot =
@@ -338,6 +417,14 @@ fn what_is_missing_or_odd_is_named() {
             None
         ),
         "c.csv: line 2, column \"Acc_Y\": found \"x\", expected a number"
+    );
+    assert_eq!(
+        error(
+            "c.csv",
+            "PacketCounter,SampleTimeFine,Acc_X,Acc_Y,Acc_Z\n1,,0,0,9.8\n",
+            None
+        ),
+        "c.csv: has an empty SampleTimeFine in row 1; expected a count below 2^32"
     );
     assert_eq!(error("d.csv", "", None), "d.csv: is empty; expected a log");
     assert_eq!(

@@ -204,6 +204,121 @@ fn wide_text_of_either_width() {
     }
 }
 
+/// A reading that leaves what could be padding does not win over one that uses the message up.
+#[test]
+fn wide_text_before_few_bytes() {
+    // Width, characters of each message, bytes that the body is padded to.
+    let texts: [(usize, &[usize], usize); 4] = [
+        (4, &[1, 1, 1, 1], 1),
+        // Text of no characters says nothing of the width, and the first reading is taken.
+        (4, &[0, 0, 1, 1, 0, 1], 1),
+        (2, &[1, 1, 2, 0, 1], 1),
+        (2, &[2, 2, 2, 2], 4),
+    ];
+    for (width, texts, padding) in texts {
+        let found = recording(&WriterOptions::default(), |writer| {
+            let channel = RawChannel {
+                topic: "/w",
+                message_encoding: "cdr",
+                schema_name: "p/msg/W",
+                schema_encoding: "ros2msg",
+                schema_data: b"wstring w\nuint16 x\n",
+                metadata: &BTreeMap::new(),
+            };
+            let channel = writer.raw_channel(&channel).expect("opens");
+            for (i, &text) in texts.iter().enumerate() {
+                let mut body = (text as u32).to_le_bytes().to_vec();
+                for _ in 0..text {
+                    body.extend_from_slice(&(0x77u32.to_le_bytes())[..width]);
+                }
+                body.extend_from_slice(&(1000 + i as u16).to_le_bytes());
+                body.resize(body.len().next_multiple_of(padding), 0);
+                let message = [[0, 1, 0, 0].as_slice(), &body].concat();
+                writer
+                    .message(channel, i as i64, message.as_slice())
+                    .expect("writes");
+            }
+        });
+        let (signals, findings) = found.signals(&|_| true).expect("reads");
+        assert_eq!(findings, [], "{width} {texts:?}");
+        let expected: Vec<f64> = (0..texts.len()).map(|i| 1000.0 + i as f64).collect();
+        assert_eq!(signals[0].values, expected, "{width} {texts:?}");
+    }
+}
+
+/// What a reading noted that was then given up is not counted.
+#[test]
+fn readings_that_are_given_up_leave_no_counts() {
+    let found = recording(&WriterOptions::default(), |writer| {
+        let channel = RawChannel {
+            topic: "/w",
+            message_encoding: "cdr",
+            schema_name: "p/msg/W",
+            schema_encoding: "ros2msg",
+            schema_data: b"float64[9] a_covariance\nwstring w\nuint8[] long\nuint16 x\n",
+            metadata: &BTreeMap::new(),
+        };
+        let channel = writer.raw_channel(&channel).expect("opens");
+        for i in 0..6u16 {
+            let mut body = (-1f64).to_le_bytes().to_vec();
+            body.resize(72, 0);
+            body.extend_from_slice(&1u32.to_le_bytes());
+            body.extend_from_slice(&0x77u32.to_le_bytes());
+            body.extend_from_slice(&100u32.to_le_bytes());
+            body.resize(body.len() + 100, 0);
+            body.extend_from_slice(&i.to_le_bytes());
+            body.resize(body.len() + 2, 0);
+            let message = [[0, 1, 0, 0].as_slice(), &body].concat();
+            writer
+                .message(channel, i64::from(i), message.as_slice())
+                .expect("writes");
+        }
+    });
+    assert_eq!(
+        lines(&found),
+        [
+            "absent_field /w: a is declared as not given (covariance -1)",
+            "long_sequence /w: long has more than 64 items (the limit max_items) in 6 messages; it is not among the signals there",
+        ]
+    );
+}
+
+/// A struct that says of itself how long it is, in a representation that writes this down.
+#[test]
+fn appendable_structs_are_read_where_nothing_is_put_before_them() {
+    let found = recording(&WriterOptions::default(), |writer| {
+        let channel = RawChannel {
+            topic: "/a",
+            message_encoding: "cdr",
+            schema_name: "p/M",
+            schema_encoding: "ros2idl",
+            schema_data:
+                b"module p { @appendable struct In { long x; }; @final struct M { In in; }; };",
+            metadata: &BTreeMap::new(),
+        };
+        let channel = writer.raw_channel(&channel).expect("opens");
+        for (t_ns, message) in [
+            [0, 1, 0, 0, 5, 0, 0, 0].as_slice(),
+            &[0, 7, 0, 0, 4, 0, 0, 0, 5, 0, 0, 0],
+        ]
+        .iter()
+        .enumerate()
+        {
+            writer
+                .message(channel, t_ns as i64, *message)
+                .expect("writes");
+        }
+    });
+    let (signals, _) = found.signals(&|_| true).expect("reads");
+    assert_eq!(signals[0].values, [5.0]);
+    assert_eq!(
+        lines(&found),
+        [
+            "undecodable /a: 1 message could not be decoded; the first, at 0.000 s: the message holds the @appendable struct p::In, delimited in XCDR2, which has no decoder"
+        ]
+    );
+}
+
 /// Words that Python and others write though JSON does not have them are numbers that are not finite; in texts they are text.
 #[test]
 fn json_with_bare_words() {

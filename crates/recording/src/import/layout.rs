@@ -142,12 +142,14 @@ fn factor(vector: &Vector, units: &[(&str, f64)], name: &str) -> Result<f64, Imp
 }
 
 pub(super) fn read(layout: &Layout, name: &str, text: &str) -> Result<Log, ImportError> {
-    let table = Table::parse(name, text, |line| match &layout.header {
+    let mut table = Table::parse(name, text, |line| match &layout.header {
         Some(header) => line
             .trim_start_matches(['\u{feff}', '"'])
             .starts_with(header.as_str()),
         None => !line.is_empty(),
     })?;
+    let mut notes = Vec::new();
+    table.drop_cut_row(name, &mut notes);
     let time = table.find_all([layout.time.column.as_str()])?[0];
     let columns = |vector: &Option<Vector>, units: &[(&str, f64)]| match vector {
         Some(vector) => {
@@ -209,6 +211,6 @@ pub(super) fn read(layout: &Layout, name: &str, text: &str) -> Result<Log, Impor
     Ok(Log {
         name: imu::device_name(device),
         samples,
-        notes: Vec::new(),
+        notes,
     })
 }

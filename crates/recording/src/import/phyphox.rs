@@ -25,8 +25,9 @@ const SENSORS: &[(&str, &str)] = &[
 ];
 
 pub(super) fn read(files: &Files) -> Result<Log, ImportError> {
+    let mut notes = Vec::new();
     let starts = match files.ending_with("meta/time.csv") {
-        Some((name, text)) => starts(name, text)?,
+        Some((name, text)) => starts(name, text, &mut notes)?,
         None => Vec::new(),
     };
     let mut tracks: [Track; 3] = Default::default();
@@ -35,7 +36,8 @@ pub(super) fn read(files: &Files) -> Result<Log, ImportError> {
         if name.contains("meta/") || !text.lines().next().is_some_and(is_header) {
             continue;
         }
-        let table = Table::parse(name, text, is_header)?;
+        let mut table = Table::parse(name, text, is_header)?;
+        table.drop_cut_row(&files.name, &mut notes);
         seen.extend(table.columns.iter().cloned());
         for ((sensor, unit), track) in SENSORS.iter().zip(&mut tracks) {
             let names = ["x", "y", "z"].map(|axis| format!("{sensor} {axis} ({unit})"));
@@ -45,7 +47,6 @@ pub(super) fn read(files: &Files) -> Result<Log, ImportError> {
         }
     }
     let [with_gravity, without, rate] = tracks;
-    let mut notes = Vec::new();
     if starts.is_empty() {
         notes.push("there is no meta/time.csv: times begin at 0, not at a date".to_owned());
     }
@@ -74,8 +75,9 @@ pub(super) fn read(files: &Files) -> Result<Log, ImportError> {
 }
 
 /// Experiment and UNIX time of every START, s.
-fn starts(name: &str, text: &str) -> Result<Vec<(f64, f64)>, ImportError> {
-    let table = Table::parse(name, text, |line| line.contains("experiment time"))?;
+fn starts(name: &str, text: &str, notes: &mut Vec<String>) -> Result<Vec<(f64, f64)>, ImportError> {
+    let mut table = Table::parse(name, text, |line| line.contains("experiment time"))?;
+    table.drop_cut_row("", notes);
     let [event, experiment, system] =
         table.find_all(["event", "experiment time", "system time"])?;
     let mut starts = Vec::new();

@@ -18,8 +18,9 @@ pub(super) fn is_header(line: &str) -> bool {
 pub(super) fn read(files: &Files) -> Result<Log, ImportError> {
     let mut notes = Vec::new();
     let flipped = flipped(files, &mut notes)?;
-    let track = |sensor: &str| match files.named(sensor) {
-        Some((name, text)) => read_track(name, text),
+    let mut cut = Vec::new();
+    let mut track = |sensor: &str| match files.named(sensor) {
+        Some((name, text)) => read_track(name, text, &files.name, &mut cut),
         None => Ok(Track::new()),
     };
     let (total, plain, gravity) = (
@@ -65,6 +66,7 @@ pub(super) fn read(files: &Files) -> Result<Log, ImportError> {
     if rate.is_empty() {
         rate = track("GyroscopeUncalibrated.csv")?;
     }
+    notes.extend(cut);
     if force.is_empty() && rate.is_empty() {
         let names: Vec<&str> = files.texts().map(|(name, _)| name).collect();
         let problem = format!(
@@ -107,8 +109,14 @@ fn flipped(files: &Files, notes: &mut Vec<String>) -> Result<bool, ImportError> 
     Ok(ios && !standard)
 }
 
-fn read_track(name: &str, text: &str) -> Result<Track, ImportError> {
-    let table = Table::parse(name, text, is_header)?;
+fn read_track(
+    name: &str,
+    text: &str,
+    log: &str,
+    notes: &mut Vec<String>,
+) -> Result<Track, ImportError> {
+    let mut table = Table::parse(name, text, is_header)?;
+    table.drop_cut_row(log, notes);
     let [time, x, y, z] = table.find_all(["time", "x", "y", "z"])?;
     let mut track = Track::new();
     for row in 0..table.len() {

@@ -79,6 +79,32 @@ impl Table {
         })
     }
 
+    /// Leaves out a last row that was cut off, with a note; `log` is the log that this table belongs to.
+    ///
+    /// Its last cell may be half a number. Rows may all be shorter than the header: what counts is also the row before.
+    pub fn drop_cut_row(&mut self, log: &str, notes: &mut Vec<String>) {
+        let [.., last] = self.rows.as_slice() else {
+            return;
+        };
+        let before = self.rows.iter().rev().nth(1);
+        let usual = before.map_or(usize::MAX, csv::StringRecord::len);
+        let (found, expected) = (last.len(), usual.min(self.columns.len()));
+        if found >= expected {
+            return;
+        }
+        let file = if self.name == log {
+            String::new()
+        } else {
+            format!("{}: ", self.name)
+        };
+        // OK because a line's number fits where the text does.
+        let line = last.position().map_or(0, |at| at.line() as usize) + self.header_line - 1;
+        notes.push(format!(
+            "{file}line {line}, the last, has {found} of {expected} cells: it was cut off and is left out"
+        ));
+        self.rows.pop();
+    }
+
     /// The number of rows.
     pub fn len(&self) -> usize {
         self.rows.len()

@@ -1,5 +1,8 @@
-//! Movella DOT and Xsens exports: some preamble lines, then a header with `SampleTimeFine`, microseconds of the sensor's clock that
-//! wrap at 2³².
+//! Movella DOT and Xsens exports: some preamble lines, then a header with `SampleTimeFine`, a count of the sensor's clock that wraps
+//! at 2³².
+//!
+//! It counts microseconds in DOT exports and 1/10,000 s in those that MT Manager makes of MTi devices. The latter tell the rate
+//! (`// Update Rate: 100.0Hz`), and the rate tells the unit.
 //!
 //! `Acc_*` is specific force. Where only `FreeAcc_*` is there (gravity removed, earth frame), the specific force follows from
 //! it and the orientation: f = R⁻¹ (a + g ẑ). `Gyr_*` is in deg/s in DOT exports and in rad/s in those of MT Manager, which begin
@@ -17,7 +20,9 @@ pub(super) fn is_header(line: &str) -> bool {
 }
 
 pub(super) fn read(name: &str, text: &str) -> Result<Log, ImportError> {
-    let table = Table::parse(name, text, is_header)?;
+    let mut table = Table::parse(name, text, is_header)?;
+    let mut notes = Vec::new();
+    table.drop_cut_row(name, &mut notes);
     let time = table.find_all(["SampleTimeFine"])?[0];
     let all = |names: [&str; 3]| {
         names[0..]
@@ -43,7 +48,6 @@ pub(super) fn read(name: &str, text: &str) -> Result<Log, ImportError> {
             table.columns.join(", ")
         )));
     }
-    let mut notes = Vec::new();
     let radians = text.trim_start().starts_with("//");
     if rate.is_some() && !radians {
         notes.push("angular velocities were in deg/s".to_owned());
@@ -57,23 +61,10 @@ pub(super) fn read(name: &str, text: &str) -> Result<Log, ImportError> {
         );
     }
 
+    let (counts, turns) = counts(&table, time)?;
+    let tick_ns = tick_ns(&table, &counts, told_rate(text), &mut notes)?;
     let mut samples = Vec::with_capacity(table.len());
-    let (mut turns, mut last) = (0i64, None::<i64>);
-    for row in 0..table.len() {
-        let fine = table.number(row, time)?;
-        if !(0.0..4_294_967_296.0).contains(&fine) {
-            return Err(table.problem(format!(
-                "has SampleTimeFine {fine} in row {}; expected microseconds below 2^32",
-                row + 1
-            )));
-        }
-        // OK because the range was checked.
-        let fine = fine as i64;
-        // A step back of more than half the range is the clock's wrap, a smaller one is an error of the log and stays.
-        if last.is_some_and(|last| last - fine > 1 << 31) {
-            turns += 1;
-        }
-        last = Some(fine);
+    for (row, count) in counts.into_iter().enumerate() {
         let orientation = match (quaternion, euler) {
             (Some([x, y, z, w]), _) => Some([
                 table.number(row, x)?,
@@ -98,7 +89,7 @@ pub(super) fn read(name: &str, text: &str) -> Result<Log, ImportError> {
             None => None,
         };
         samples.push(Sample {
-            t_ns: (fine + (turns << 32)) * 1000,
+            t_ns: count.saturating_mul(tick_ns),
             force,
             rate,
             orientation,
@@ -112,6 +103,82 @@ pub(super) fn read(name: &str, text: &str) -> Result<Log, ImportError> {
         samples,
         notes,
     })
+}
+
+/// SampleTimeFine of every row, going on past its wraps, and how many these are.
+fn counts(table: &Table, time: usize) -> Result<(Vec<i64>, i64), ImportError> {
+    let mut counts = Vec::with_capacity(table.len());
+    let (mut turns, mut last) = (0i64, None::<i64>);
+    for row in 0..table.len() {
+        let fine = table.number(row, time)?;
+        if !(0.0..4_294_967_296.0).contains(&fine) {
+            let found = if table.text(row, time).is_empty() {
+                "an empty SampleTimeFine".to_owned()
+            } else {
+                format!("SampleTimeFine {fine}")
+            };
+            return Err(table.problem(format!(
+                "has {found} in row {}; expected a count below 2^32",
+                row + 1
+            )));
+        }
+        // OK because the range was checked.
+        let fine = fine as i64;
+        // A step back of more than half the range is the clock's wrap, a smaller one is an error of the log and stays.
+        if last.is_some_and(|last| last - fine > 1 << 31) {
+            turns += 1;
+        }
+        last = Some(fine);
+        counts.push(fine + (turns << 32));
+    }
+    Ok((counts, turns))
+}
+
+/// The rate that the preamble tells, Hz.
+fn told_rate(text: &str) -> Option<f64> {
+    let preamble = text.lines().take_while(|line| !is_header(line));
+    preamble
+        .filter_map(|line| line.trim().strip_prefix("//")?.split_once(':'))
+        .find(|(name, _)| name.trim().eq_ignore_ascii_case("update rate"))
+        .and_then(|(_, rate)| {
+            let rate = rate.trim_matches(|c: char| !c.is_ascii_digit());
+            rate.replace(',', ".").parse().ok()
+        })
+        .filter(|rate| *rate > 0.0)
+}
+
+/// What SampleTimeFine counts, ns: the unit in which the usual step fits the rate, microseconds where no rate is told.
+fn tick_ns(
+    table: &Table,
+    counts: &[i64],
+    told_hz: Option<f64>,
+    notes: &mut Vec<String>,
+) -> Result<i64, ImportError> {
+    const MICROSECOND: i64 = 1_000;
+    const TENTH_OF_MILLISECOND: i64 = 100_000;
+    /// The usual step may differ by so much from what the rate says.
+    const TOLERANCE: f64 = 0.2;
+    let mut steps: Vec<i64> = counts.windows(2).map(|pair| pair[1] - pair[0]).collect();
+    steps.retain(|step| *step > 0);
+    steps.sort_unstable();
+    let (Some(rate_hz), Some(&step)) = (told_hz, steps.get(steps.len() / 2)) else {
+        return Ok(MICROSECOND);
+    };
+    let fits = |tick_ns: &i64| ((step * tick_ns) as f64 / 1e9 * rate_hz - 1.0).abs() <= TOLERANCE;
+    match [MICROSECOND, TENTH_OF_MILLISECOND].into_iter().find(fits) {
+        Some(MICROSECOND) => Ok(MICROSECOND),
+        Some(tick_ns) => {
+            notes.push(format!(
+                "SampleTimeFine counts 1/10,000 s: its usual step is {step} at an update rate of {rate_hz} Hz"
+            ));
+            Ok(tick_ns)
+        }
+        None => Err(table.problem(format!(
+            "has a usual step of SampleTimeFine of {step} at an update rate of {rate_hz} Hz; expected about {:.0} (1/10,000 s) or {:.0} (microseconds)",
+            1e4 / rate_hz,
+            1e6 / rate_hz
+        ))),
+    }
 }
 
 /// Quaternion (x, y, z, w) of R = R_z(yaw) R_y(pitch) R_x(roll), angles in degrees.

@@ -1,8 +1,8 @@
 //! ROS 2 messages (`cdr`): XCDR1 and plain XCDR2, both byte orders, laid out by `ros2msg` or IDL text.
 //!
 //! Two points of the representation differ between implementations: whether plain XCDR2 puts a size before collections of structs
-//! and strings, and how many bytes a wide character takes. A message tells by being used up exactly; the first reading
-//! that does so is kept for the channel.
+//! and strings, and how many bytes a wide character takes. A message tells by being used up exactly; the reading that
+//! does so is tried first on the channel's next message. Only where none does, padding may be left.
 
 use super::{
     decode::{Decoder, Place, SchemaRef},
@@ -26,8 +26,8 @@ struct Cdr {
     wide: bool,
     collections: bool,
     programs: Vec<(Shape, Program)>,
-    /// The reading that fitted last, by representation.
-    fitted: Vec<(u8, Shape)>,
+    /// The readings to try, by representation; the one that fitted last comes first.
+    readings: Vec<(u8, Vec<Shape>)>,
 }
 
 pub(super) fn open_ros2msg(
@@ -67,13 +67,13 @@ fn begin(types: Types) -> Result<Box<dyn Decoder>, String> {
         wide,
         collections,
         programs: Vec::new(),
-        fitted: Vec::new(),
+        readings: Vec::new(),
     }))
 }
 
 impl Cdr {
     /// The readings to try for a representation, the likeliest first.
-    fn readings(&self, representation: u8) -> Result<Vec<Shape>, String> {
+    fn readings_of(&self, representation: u8) -> Result<Vec<Shape>, String> {
         let (big_endian, second) = match representation {
             0x00 => (true, false),
             0x01 => (false, false),
@@ -91,6 +91,11 @@ impl Cdr {
                 ));
             }
         };
+        if second && let Some(name) = &self.types.appendable {
+            return Err(format!(
+                "the message holds the @appendable struct {name}, delimited in XCDR2, which has no decoder"
+            ));
+        }
         let shape = Shape {
             big_endian,
             max_align: if second { 4 } else { 8 },
@@ -143,17 +148,20 @@ impl Decoder for Cdr {
         let Some(first) = places.first().map(|place| &block[place.bytes.clone()]) else {
             return 0;
         };
-        let Some(&(representation, shape)) = self
-            .fitted
+        let Some((representation, readings)) = self
+            .readings
             .iter()
             .find(|(known, _)| first.starts_with(&[0, *known]))
         else {
             return 0;
         };
+        let (representation, shape) = (*representation, readings[0]);
+        // Another reading might use up exactly what this one leaves padding of.
+        let may_be_left = if readings.len() == 1 { PADDING } else { 0 };
         let Some((_, program)) = self.programs.iter_mut().find(|(known, _)| *known == shape) else {
             return 0;
         };
-        if program.bytes_left().is_none_or(|left| left > PADDING) {
+        if program.bytes_left().is_none_or(|left| left > may_be_left) {
             return 0;
         }
         let suits = |message: &[u8]| message.first_chunk() == Some(&[0, representation]);
@@ -173,35 +181,52 @@ impl Decoder for Cdr {
                 "the representation identifier 0x{first:02x}{representation:02x} is not known"
             ));
         }
-        if let Some(&(_, shape)) = self
-            .fitted
+        let known = match self
+            .readings
             .iter()
-            .find(|(known, _)| *known == representation)
-            && let Ok(end) = self.run(shape, body, rows)?
-            && body.len() - end <= PADDING
+            .position(|(known, _)| *known == representation)
         {
-            return Ok(());
-        }
-        let mut best: Option<Result<usize, Fail>> = None;
-        let readings = self.readings(representation)?;
-        for &shape in &readings {
-            rows.abort();
-            rows.begin();
-            match self.run(shape, body, rows)? {
-                Ok(end) if body.len() - end <= PADDING => {
-                    self.fitted.retain(|(known, _)| *known != representation);
-                    self.fitted.push((representation, shape));
+            Some(known) => known,
+            None => {
+                let readings = self.readings_of(representation)?;
+                self.readings.push((representation, readings));
+                self.readings.len() - 1
+            }
+        };
+        let count = self.readings[known].1.len();
+        let (mut padded, mut best) = (None, None::<Result<usize, Fail>>);
+        for number in 0..count {
+            if number > 0 {
+                rows.abort();
+                rows.begin();
+            }
+            let shape = self.readings[known].1[number];
+            let result = self.run(shape, body, rows)?;
+            match result.as_ref().map(|end| body.len() - end) {
+                Ok(left) if left == 0 || (count == 1 && left <= PADDING) => {
+                    self.readings[known].1[..=number].rotate_right(1);
                     return Ok(());
                 }
-                other => {
-                    if best.is_none() || (matches!(best, Some(Err(_))) && other.is_ok()) {
-                        best = Some(other);
-                    }
-                }
+                Ok(left) if left <= PADDING && padded.is_none() => padded = Some(number),
+                _ => {}
+            }
+            if best.is_none() || (matches!(best, Some(Err(_))) && result.is_ok()) {
+                best = Some(result);
             }
         }
+        if let Some(number) = padded {
+            let shape = self.readings[known].1[number];
+            self.readings[known].1[..=number].rotate_right(1);
+            rows.abort();
+            rows.begin();
+            // It has decoded this very message before.
+            return match self.run(shape, body, rows)? {
+                Ok(_) => Ok(()),
+                Err(fail) => Err(describe(&fail, "CDR message", message.len())),
+            };
+        }
         match best {
-            Some(Ok(_)) if readings.len() == 1 => {
+            Some(Ok(_)) if count == 1 => {
                 rows.trailing += 1;
                 Ok(())
             }

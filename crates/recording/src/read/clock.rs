@@ -185,8 +185,8 @@ impl Order {
 /// Log time against header stamp: offset = log time − stamp, and its trend.
 #[derive(Debug, Default)]
 pub(super) struct Clocks {
-    /// First log time and offset: the origin of the sums, so that they keep their digits.
-    origin: Option<(i64, i64)>,
+    /// First log time with a stamp, and its offset: the origin of the sums, so that they keep their digits.
+    origin: Option<(i64, i128)>,
     weight: f64,
     t: f64,
     d: f64,
@@ -203,29 +203,30 @@ impl Clocks {
     pub fn observe(&mut self, times: &[i64], stamps: &[i64]) {
         // Means of short stretches carry offset and trend as well as every message would.
         for (times, stamps) in times.chunks(64).zip(stamps.chunks(64)) {
-            let Some((&t0, &s0)) = times.first().zip(stamps.first()) else {
-                return;
-            };
-            let (t_origin, d_origin) = *self.origin.get_or_insert((t0, t0.wrapping_sub(s0)));
-            let (mut count, mut t_sum, mut d_sum, mut differ) = (0i64, 0i64, 0i64, 0i64);
+            // Sums of dates in nanoseconds need more than 64 bits.
+            let (mut count, mut t_sum, mut s_sum, mut differ) = (0i64, 0i128, 0i128, 0i64);
+            let mut first = None;
             for (&time, &stamp) in times.iter().zip(stamps) {
                 if stamp == 0 && time != 0 {
                     self.zero.add(time);
                     continue;
                 }
-                let offset = time.wrapping_sub(stamp);
-                differ |= offset;
+                if count == 0 {
+                    first = Some((time, i128::from(time) - i128::from(stamp)));
+                }
+                differ |= time ^ stamp;
                 count += 1;
-                t_sum = t_sum.wrapping_add(time.wrapping_sub(t0));
-                d_sum = d_sum.wrapping_add(offset.wrapping_sub(d_origin));
+                t_sum += i128::from(time);
+                s_sum += i128::from(stamp);
             }
             self.differ |= differ != 0;
-            if count == 0 {
-                continue;
-            }
+            let Some(first) = first else {
+                continue; // All stamps are zero.
+            };
+            let (t_origin, d_origin) = *self.origin.get_or_insert(first);
             let n = count as f64;
-            let t = (t0.wrapping_sub(t_origin)) as f64 / 1e9 + t_sum as f64 / 1e9 / n;
-            let d = d_sum as f64 / 1e9 / n;
+            let t = (t_sum - i128::from(count) * i128::from(t_origin)) as f64 / 1e9 / n;
+            let d = (t_sum - s_sum - i128::from(count) * d_origin) as f64 / 1e9 / n;
             self.weight += n;
             self.t += n * t;
             self.d += n * d;
@@ -395,5 +396,39 @@ mod tests {
                 "log time runs 100 ppm faster than the header stamp (6.0 ms over 60.0 s)"
             ]
         );
+    }
+
+    #[test]
+    fn stamps_that_are_zero_or_far_off_leave_the_offset_right() {
+        let times: Vec<i64> = (0..1000)
+            .map(|i| 1_700_000_000_000_000_000 + i * 1_000_000)
+            .collect();
+        let report = |late_ns: i64, odd: &[(usize, i64)]| {
+            let mut stamps: Vec<i64> = times.iter().map(|time| time - late_ns).collect();
+            for &(row, stamp) in odd {
+                stamps[row] = stamp;
+            }
+            let mut clocks = Clocks::default();
+            clocks.observe(&times, &stamps);
+            let mut findings = Vec::new();
+            clocks.report("/t", times[0], &mut findings);
+            let texts = findings.into_iter().map(|finding| finding.text);
+            texts.collect::<Vec<_>>()
+        };
+        assert_eq!(
+            report(1_000_000, &[(0, 0)]),
+            ["1 header stamps are zero, first at 0.000 s"]
+        );
+        assert_eq!(
+            report(201_000_000, &[(0, 0)])[1],
+            "log time lies 0.201 s after the header stamp on average"
+        );
+        // Wherever the one stands that is off by 1e9 s, the mean is off by a thousandth of that.
+        for row in [0, 500] {
+            assert_eq!(
+                report(0, &[(row, times[row] - 1_000_000_000_000_000_000)]),
+                ["log time lies 1000000.000 s after the header stamp on average"]
+            );
+        }
     }
 }

@@ -22,17 +22,19 @@ enum Definition {
     Struct {
         base: Option<String>,
         fields: Vec<(String, Written)>,
+        appendable: bool,
     },
     Alias(Written),
     Enum,
-    /// Something that has no layout here, by its keyword.
-    Unsupported(&'static str),
+    /// Something that has no layout here, in words.
+    Unsupported(String),
 }
 
 #[derive(Default)]
 struct Definitions {
     by_name: HashMap<String, Definition>,
-    constants: HashMap<String, usize>,
+    /// The constants; none where the value is no whole number that is understood.
+    constants: HashMap<String, Option<i64>>,
 }
 
 /// Parses the definition of message `name` (`package/msg/Name` or `package::msg::Name`).
@@ -109,13 +111,20 @@ fn resolve(
             match definition {
                 Definition::Enum => Type::Prim(Prim::U32),
                 Definition::Unsupported(what) => {
-                    return Err(format!("{full} is a {what}, which has no decoder"));
+                    return Err(format!("{full} is {what}, which has no decoder"));
                 }
                 Definition::Alias(inner) => {
                     resolve(inner, inner_scope, definitions, types, known, depth + 1)?
                 }
-                Definition::Struct { base, fields } => {
+                Definition::Struct {
+                    base,
+                    fields,
+                    appendable,
+                } => {
                     let index = types.structs.len();
+                    if *appendable && index > 0 {
+                        types.appendable = Some(full.clone());
+                    }
                     types.structs.push(Struct {
                         name: full.replace("::", "/"),
                         fields: Vec::new(),
@@ -227,6 +236,32 @@ fn tokens(text: &str) -> Result<Vec<&str>, String> {
     Ok(tokens)
 }
 
+const NO_NUMBER: &str = "a size divides by zero or needs more than 64 bits";
+
+/// A number as IDL writes it: decimal, hexadecimal (`0x1F`) or octal (`017`).
+fn whole_number(token: &str) -> Option<i64> {
+    let (digits, base) = match token.strip_prefix("0x").or(token.strip_prefix("0X")) {
+        Some(digits) => (digits, 16),
+        None if token.starts_with('0') => (token, 8),
+        None => (token, 10),
+    };
+    i64::from_str_radix(digits, base).ok()
+}
+
+/// An annotation's name and what stands in parentheses behind it.
+type Annotation<'a> = (&'a str, &'a [&'a str]);
+
+/// Whether annotations give a type this extensibility: `@mutable`, or as `@extensibility(MUTABLE)`.
+fn are_of(annotations: &[Annotation<'_>], extensibility: &str) -> bool {
+    annotations.iter().any(|(name, said)| {
+        name.eq_ignore_ascii_case(extensibility)
+            || (name.eq_ignore_ascii_case("extensibility")
+                && said
+                    .iter()
+                    .any(|word| word.to_lowercase().starts_with(extensibility)))
+    })
+}
+
 struct Parser<'a> {
     tokens: &'a [&'a str],
     at: usize,
@@ -262,10 +297,13 @@ impl<'a> Parser<'a> {
         }
     }
 
-    /// Steps over annotations: `@name` and what stands in parentheses behind it.
-    fn annotations(&mut self) {
+    /// Reads annotations: `@name` and what stands in parentheses behind it.
+    fn annotations(&mut self) -> Vec<Annotation<'a>> {
+        let mut annotations = Vec::new();
         while self.peek() == "@" {
-            self.at += 2;
+            self.at += 1;
+            let name = self.next();
+            let start = self.at;
             if self.peek() == "(" {
                 let mut depth = 0;
                 while self.at < self.tokens.len() {
@@ -279,14 +317,17 @@ impl<'a> Parser<'a> {
                     }
                 }
             }
+            let said = self.tokens.get(start..self.at).unwrap_or_default();
+            annotations.push((name, said));
         }
+        annotations
     }
 
     fn definition(&mut self, depth: usize) -> Result<(), String> {
         if depth > 64 {
             return Err("modules are nested more than 64 deep".to_owned());
         }
-        self.annotations();
+        let annotations = self.annotations();
         match self.next() {
             "" | ";" => {}
             "module" => {
@@ -302,7 +343,7 @@ impl<'a> Parser<'a> {
                 self.at += 1;
                 self.scope.pop();
             }
-            "struct" => self.structure()?,
+            "struct" => self.structure(&annotations)?,
             "typedef" => {
                 let kind = self.kind(0)?;
                 loop {
@@ -321,26 +362,34 @@ impl<'a> Parser<'a> {
                 self.kind(0)?;
                 let name = self.next();
                 self.expect("=")?;
-                if let Ok(value) = self.peek().parse() {
-                    self.found.constants.insert(self.full(name), value);
-                }
+                // Not every constant is a whole number; one that is a size and is none is refused there.
+                let start = self.at;
+                let value = self.expression(0).ok().filter(|_| self.peek() == ";");
+                self.found.constants.insert(self.full(name), value);
+                self.at = start;
                 while self.at < self.tokens.len() && self.next() != ";" {}
             }
             "enum" => {
                 let name = self.next();
-                self.found.by_name.insert(self.full(name), Definition::Enum);
+                let bound = annotations
+                    .iter()
+                    .find(|(name, _)| name.eq_ignore_ascii_case("bit_bound"))
+                    .map(|(_, said)| said.concat());
+                let definition = match bound {
+                    Some(bound) if bound != "(32)" => {
+                        Definition::Unsupported(format!("an enum with @bit_bound{bound}"))
+                    }
+                    _ => Definition::Enum,
+                };
+                self.found.by_name.insert(self.full(name), definition);
                 self.skip_braces();
             }
             word @ ("union" | "bitmask" | "bitset") => {
-                let what = match word {
-                    "union" => "union",
-                    "bitmask" => "bitmask",
-                    _ => "bitset",
-                };
                 let name = self.next();
-                self.found
-                    .by_name
-                    .insert(self.full(name), Definition::Unsupported(what));
+                self.found.by_name.insert(
+                    self.full(name),
+                    Definition::Unsupported(format!("a {word}")),
+                );
                 self.skip_braces();
             }
             other => return Err(format!("expected a definition, found {other:?}")),
@@ -366,7 +415,7 @@ impl<'a> Parser<'a> {
         }
     }
 
-    fn structure(&mut self) -> Result<(), String> {
+    fn structure(&mut self, annotations: &[Annotation<'_>]) -> Result<(), String> {
         let name = self.next();
         if self.peek() == ";" {
             return Ok(()); // Announced, defined elsewhere.
@@ -378,16 +427,25 @@ impl<'a> Parser<'a> {
         }
         self.expect("{")?;
         let mut fields = Vec::new();
+        // Mutable structs are parameter lists, wherever they stand; a flag stands before members that may be missing.
+        let mut unsupported =
+            are_of(annotations, "mutable").then(|| "a @mutable struct".to_owned());
         while self.peek() != "}" {
             if self.at >= self.tokens.len() {
                 return Err(format!("the struct {name} has no closing brace"));
             }
-            self.annotations();
+            let optional = self.annotations().iter().any(|(name, said)| {
+                name.eq_ignore_ascii_case("optional")
+                    && !said.iter().any(|word| word.eq_ignore_ascii_case("false"))
+            });
             let kind = self
                 .kind(0)
                 .map_err(|problem| format!("in struct {name}: {problem}"))?;
             loop {
                 let (field, kind) = self.declarator(&kind)?;
+                if optional && unsupported.is_none() {
+                    unsupported = Some(format!("a struct with the @optional member {field}"));
+                }
                 fields.push((field, kind));
                 if self.peek() != "," {
                     break;
@@ -403,9 +461,15 @@ impl<'a> Parser<'a> {
         {
             fields.clear();
         }
-        self.found
-            .by_name
-            .insert(self.full(name), Definition::Struct { base, fields });
+        let definition = match unsupported {
+            Some(what) => Definition::Unsupported(what),
+            None => Definition::Struct {
+                base,
+                fields,
+                appendable: are_of(annotations, "appendable"),
+            },
+        };
+        self.found.by_name.insert(self.full(name), definition);
         Ok(())
     }
 
@@ -424,18 +488,76 @@ impl<'a> Parser<'a> {
         Ok((name, kind))
     }
 
-    /// A number or the name of a constant.
+    /// The size of an array.
     fn size(&mut self) -> Result<usize, String> {
+        let size = self.expression(0)?;
+        usize::try_from(size)
+            .map_err(|_| format!("an array has the size {size}; expected 0 or more"))
+    }
+
+    /// A whole number made of numbers, constants, `+ - * /` and parentheses.
+    fn expression(&mut self, depth: usize) -> Result<i64, String> {
+        let mut sum = self.product(depth)?;
+        while matches!(self.peek(), "+" | "-") {
+            let plus = self.next() == "+";
+            let next = self.product(depth)?;
+            sum = if plus {
+                sum.checked_add(next)
+            } else {
+                sum.checked_sub(next)
+            }
+            .ok_or(NO_NUMBER)?;
+        }
+        Ok(sum)
+    }
+
+    fn product(&mut self, depth: usize) -> Result<i64, String> {
+        let mut product = self.operand(depth)?;
+        while matches!(self.peek(), "*" | "/") {
+            let times = self.next() == "*";
+            let next = self.operand(depth)?;
+            product = if times {
+                product.checked_mul(next)
+            } else {
+                product.checked_div(next)
+            }
+            .ok_or(NO_NUMBER)?;
+        }
+        Ok(product)
+    }
+
+    fn operand(&mut self, depth: usize) -> Result<i64, String> {
+        if depth > 64 {
+            return Err("an expression is nested more than 64 deep".to_owned());
+        }
         let token = self.next();
-        if let Ok(size) = token.parse() {
-            return Ok(size);
+        match token {
+            "-" => return Ok(self.operand(depth + 1)?.checked_neg().ok_or(NO_NUMBER)?),
+            "+" => return self.operand(depth + 1),
+            "(" => {
+                let value = self.expression(depth + 1)?;
+                self.expect(")")?;
+                return Ok(value);
+            }
+            _ => {}
+        }
+        if let Some(value) = whole_number(token) {
+            return Ok(value);
         }
         let constants = &self.found.constants;
-        find(token, &self.scope.join("::"), |name| {
+        match find(token, &self.scope.join("::"), |name| {
             constants.contains_key(name)
         })
-        .and_then(|name| constants.get(&name).copied())
-        .ok_or_else(|| format!("the size {token:?} is neither a number nor a constant"))
+        .and_then(|name| constants.get(&name))
+        {
+            Some(Some(value)) => Ok(*value),
+            Some(None) => Err(format!(
+                "the value of the constant {token} is no whole number made with + - * /"
+            )),
+            None => Err(format!(
+                "the size {token:?} is neither a number nor a constant"
+            )),
+        }
     }
 
     /// Steps over `<bound>`.
@@ -489,8 +611,11 @@ impl<'a> Parser<'a> {
             "sequence" => {
                 self.expect("<")?;
                 let inner = self.kind(depth + 1)?;
+                // The bound, a number or an expression, changes nothing.
                 if self.peek() == "," {
-                    self.at += 2;
+                    while self.at < self.tokens.len() && self.peek() != ">" {
+                        self.at += 1;
+                    }
                 }
                 self.expect(">")?;
                 return Ok(Written::Sequence(Box::new(inner)));
@@ -536,5 +661,89 @@ mod tests {
             ]
         );
         assert_eq!(types.structs[1].fields[0].1, Type::Prim(Prim::U32));
+    }
+
+    #[test]
+    fn what_moves_numbers_and_is_not_read_is_refused() {
+        let problem = |text: &str| parse("p/M", &format!("module p {{ {text} }};")).err();
+        for (text, expected) in [
+            (
+                "struct M { long a; @optional double b; double c; };",
+                "p::M is a struct with the @optional member b, which has no decoder",
+            ),
+            (
+                "struct In { @key @optional(TRUE) long a, b; }; struct M { sequence<In> x; };",
+                "p::In is a struct with the @optional member a, which has no decoder",
+            ),
+            (
+                "@bit_bound(16) enum E { A, B }; struct M { E e; };",
+                "p::E is an enum with @bit_bound(16), which has no decoder",
+            ),
+            (
+                "@mutable struct M { long a; };",
+                "p::M is a @mutable struct, which has no decoder",
+            ),
+            (
+                "@extensibility(MUTABLE) struct In { long a; }; struct M : In { long b; };",
+                "p::In is a @mutable struct, which has no decoder",
+            ),
+            (
+                "union U switch (long) { case 1: long a; }; struct M { U u; };",
+                "p::U is a union, which has no decoder",
+            ),
+        ] {
+            assert_eq!(problem(text).as_deref(), Some(expected));
+        }
+        // Not of this message, or without effect on where numbers lie.
+        for text in [
+            "@mutable struct Other { @optional long a; }; struct M { long a; };",
+            "@final @bit_bound(32) enum E { A }; @nested struct M { @optional(FALSE) E e; @key @id(3) long b; };",
+        ] {
+            assert_eq!(problem(text), None, "{text}");
+        }
+        let appendable = |text: &str| parse("p/M", text).expect("parses").appendable;
+        let inner = "module p { @appendable struct In { long a; }; @final struct M { In x; }; };";
+        assert_eq!(appendable(inner).as_deref(), Some("p::In"));
+        let outer = "module p { @extensibility(APPENDABLE) struct M { long a; }; };";
+        assert_eq!(appendable(outer), None);
+    }
+
+    #[test]
+    fn sizes_are_worked_out() {
+        let size = |constants: &str, size: &str| {
+            let text = format!("{constants} struct M {{ octet a[{size}]; }};");
+            parse("M", &text).map(|types| match types.structs[0].fields[0].1 {
+                Type::Array(_, size) => size,
+                _ => 0,
+            })
+        };
+        let n = "const unsigned long N = 2 * 3; const long M_ = N; const long K = -(M_ - 010) * (0x10 + 2) / 4;";
+        assert_eq!(size(n, "N"), Ok(6));
+        assert_eq!(size(n, "M_"), Ok(6));
+        assert_eq!(size(n, "K"), Ok(9));
+        assert_eq!(size(n, "N + 2 * ::N - 1"), Ok(17));
+        let f = "const float F = 1.5; const long S = 1 << 3; const string T = \"a;b\";";
+        assert_eq!(size(f, "3"), Ok(3));
+        for (constants, given, expected) in [
+            (
+                f,
+                "F",
+                "the value of the constant F is no whole number made with + - * /",
+            ),
+            (
+                f,
+                "S",
+                "the value of the constant S is no whole number made with + - * /",
+            ),
+            ("", "Q", "the size \"Q\" is neither a number nor a constant"),
+            ("", "1 - 2", "an array has the size -1; expected 0 or more"),
+            (
+                "",
+                "1 / 0",
+                "a size divides by zero or needs more than 64 bits",
+            ),
+        ] {
+            assert_eq!(size(constants, given), Err(expected.to_owned()));
+        }
     }
 }

@@ -489,7 +489,7 @@ impl Compiler<'_, '_> {
                     self.number(*prim, count, field, Role::Plain);
                 }
                 if self.take && self.rows.column(&format!("{field}[0]")) != UNWANTED {
-                    self.rows.note_long(field);
+                    self.rows.note_long_type(field);
                 }
                 return Ok(());
             }

@@ -38,10 +38,19 @@ pub(super) struct Rows<'a> {
     pub long: Vec<(String, u64)>,
     /// What the decoder has to say about the schema.
     pub remark: Option<String>,
+    /// What the message in hand added to `absent` and `long`, to be taken back with it.
+    noted: Vec<Noted>,
     /// Messages with bytes left over.
     pub trailing: u64,
     /// Up to how many items of a sequence become signals.
     pub max_items: usize,
+}
+
+/// A count in `absent` or `long`, by its place there.
+#[derive(Clone, Copy)]
+enum Noted {
+    Absent(u32, u64),
+    Long(usize),
 }
 
 /// Which signals are wanted, by path.
@@ -60,6 +69,7 @@ impl<'a> Rows<'a> {
             absent: Vec::new(),
             long: Vec::new(),
             remark: None,
+            noted: Vec::new(),
             trailing: 0,
             max_items,
         }
@@ -153,6 +163,12 @@ impl<'a> Rows<'a> {
 
     /// Counts a sequence that is too long to become signals.
     pub fn note_long(&mut self, field: &str) {
+        let place = count(&mut self.long, field);
+        self.noted.push(Noted::Long(place));
+    }
+
+    /// Counts an array that its type makes too long, whatever becomes of the message in hand.
+    pub fn note_long_type(&mut self, field: &str) {
         count(&mut self.long, field);
     }
 
@@ -171,12 +187,14 @@ impl<'a> Rows<'a> {
     pub fn note_absent(&mut self, field: u32, messages: u64) {
         if let Some((_, count)) = self.absent.get_mut(field as usize) {
             *count += messages;
+            self.noted.push(Noted::Absent(field, messages));
         }
     }
 
     /// Begins the next message.
     pub fn begin(&mut self) {
         self.stamp_ns = None;
+        self.noted.clear();
     }
 
     /// Keeps the message that was decoded.
@@ -198,6 +216,13 @@ impl<'a> Rows<'a> {
                 column.values.truncate(row as usize);
             }
         }
+        for noted in self.noted.drain(..) {
+            match noted {
+                Noted::Absent(field, messages) => self.absent[field as usize].1 -= messages,
+                Noted::Long(place) => self.long[place].1 -= 1,
+            }
+        }
+        self.long.retain(|(_, count)| *count > 0);
     }
 
     /// Ends the batch: the number of rows; columns with fewer values than rows know which rows they have.
@@ -219,6 +244,7 @@ impl<'a> Rows<'a> {
         }
         self.stamps.clear();
         self.long.clear();
+        self.noted.clear();
         self.trailing = 0;
         for column in &mut self.columns {
             column.values.clear();
@@ -256,9 +282,16 @@ impl RowColumn {
     }
 }
 
-fn count(counts: &mut Vec<(String, u64)>, field: &str) {
-    match counts.iter_mut().find(|(known, _)| known == field) {
-        Some((_, count)) => *count += 1,
-        None => counts.push((field.to_owned(), 1)),
+/// Counts a field and returns its place.
+fn count(counts: &mut Vec<(String, u64)>, field: &str) -> usize {
+    match counts.iter().position(|(known, _)| known == field) {
+        Some(place) => {
+            counts[place].1 += 1;
+            place
+        }
+        None => {
+            counts.push((field.to_owned(), 1));
+            counts.len() - 1
+        }
     }
 }

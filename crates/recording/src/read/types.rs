@@ -52,6 +52,8 @@ pub(super) struct Struct {
 #[derive(Clone, Debug, Default)]
 pub(super) struct Types {
     pub structs: Vec<Struct>,
+    /// A struct within the message that XCDR2 puts a size before, if there is one.
+    pub appendable: Option<String>,
 }
 
 impl Types {
