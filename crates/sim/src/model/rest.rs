@@ -39,7 +39,11 @@ impl Springs<'_> {
         if self.exponent == 1.0 && self.bends.is_empty() {
             let springs = self.stiffness.iter().zip(&self.level_m);
             let level = springs.map(|(k, z)| k * z).sum::<f64>() / stiffness;
-            return (level - self.weight_n / stiffness, Vec::new());
+            let height_m = level - self.weight_n / stiffness;
+            // A shoulder that hangs clear bears nothing, where springs cannot pull.
+            if self.pull || self.level_m.iter().all(|level| *level >= height_m) {
+                return (height_m, Vec::new());
+            }
         }
         // What bears falls as the body rises: halve the interval where it meets the weight.
         let high = self
@@ -145,6 +149,23 @@ mod tests {
             (q[0] - a * sunk / 8000.0).abs() < 1e-14 && (q[1] - b * sunk / 2000.0).abs() < 1e-14,
             "{q:?}"
         );
+    }
+
+    #[test]
+    fn a_shoulder_that_hangs_clear_bears_nothing() {
+        let springs = |pull, exponent| Springs {
+            level_m: vec![0.9, 0.6, 0.9],
+            stiffness: &[3000.0; 3],
+            exponent,
+            pull,
+            weight_n: 588.6,
+            bends: &[],
+        };
+        let height_m = |pull, exponent| springs(pull, exponent).rest().0;
+        // The outer two bear alone; where the middle one pulls, it does so with its share; a hair beside p = 1 is a hair beside.
+        assert!((height_m(false, 1.0) - (0.9 - 588.6 / 6000.0)).abs() < 1e-14);
+        assert!((height_m(true, 1.0) - (0.8 - 588.6 / 9000.0)).abs() < 1e-14);
+        assert!((height_m(false, 1.0 + 1e-9) - height_m(false, 1.0)).abs() < 1e-9);
     }
 
     #[test]
