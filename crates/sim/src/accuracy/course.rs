@@ -113,10 +113,20 @@ impl Course {
         }
     }
 
+    /// How many samples there are.
+    pub fn samples(&self) -> usize {
+        self.t_s.len()
+    }
+
+    /// What people quote, over the scene's analysis; over all of a run that ends before it would begin, as `analyze` does.
     pub fn quoted(&self, scene: &Scene) -> Quoted {
-        let from = self
+        let from = match self
             .t_s
-            .partition_point(|&t| t < scene.analysis_start_s - 1e-9);
+            .partition_point(|&t| t < scene.analysis_start_s - 1e-9)
+        {
+            from if from == self.t_s.len() => 0,
+            from => from,
+        };
         let n = scene.carriers.count();
         let (t, roll, force) = (
             &self.t_s[from..],
@@ -171,6 +181,10 @@ mod tests {
         assert_eq!((q.contact_loss, q.t_float), (0.5, 0.5));
         // A window is two samples: the first with an RMS above 10° ends with the first large one.
         assert_eq!(q.onset_s, Some(0.5));
+        // Nothing lies after 3 s: all of it counts.
+        let late = "name = \"t\"\nlog_rate_hz = 1.0\nanalysis_start_s = 3.0\n";
+        let all = course().quoted(&parse("t", late, &[]).unwrap());
+        assert_eq!(all.rms_roll_rad, q.rms_roll_rad);
     }
 
     #[test]

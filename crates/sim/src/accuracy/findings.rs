@@ -92,7 +92,7 @@ impl Study {
             "they agree to {:.1e} rad in roll and {:.1e} m in height",
             self.estimated_error_rad, self.estimated_error_m
         );
-        if self.judged_s < self.duration_s - 1.0 {
+        if self.parted {
             format!(
                 "{agree} up to t = {:.2} s; then the motion is chaotic, they part by more than {AGREE:.0e}, and no error is judged",
                 self.judged_s
@@ -210,6 +210,7 @@ mod tests {
             estimated_error_m: 1e-8,
             duration_s: 1.0,
             judged_s: 1.0,
+            parted: false,
             judge: Judge::Roll,
             quoted: Quoted::default(),
             runs: vec![

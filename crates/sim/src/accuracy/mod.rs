@@ -102,6 +102,8 @@ pub struct Study {
     pub duration_s: f64,
     /// Up to when the references agree to [`AGREE`], and errors are judged, s.
     pub judged_s: f64,
+    /// Whether they part before the last sample.
+    pub parted: bool,
     /// What errors are ranked by.
     pub judge: Judge,
     /// What the reference says about the scene.
@@ -198,6 +200,7 @@ pub fn study(
         estimated_error_m: agreement.height_m,
         duration_s: scene.duration_s,
         judged_s: best.time(until),
+        parted: until < best.samples(),
         judge,
         quoted: best.quoted(scene),
         runs,
