@@ -213,7 +213,16 @@ impl<'m> Recorder<'m> {
                 work_in_j: e.work_in_j,
                 dissipated_j: e.dissipated_j,
                 unexplained_j: e.unexplained_j,
-                shares: Vec::new(),
+                shares: self
+                    .model
+                    .accounts()
+                    .zip(&s.shares_j)
+                    .map(|(effect, [work_j, dissipated_j])| rath::energy::Share {
+                        effect: effect.into(),
+                        work_j: *work_j,
+                        dissipated_j: *dissipated_j,
+                    })
+                    .collect(),
             };
             self.writer.message(channel, t_ns, &message)?;
         }

@@ -33,6 +33,8 @@ pub struct Sample {
     pub handle_m: Vec<[f64; 3]>,
     /// The energy account, where it is kept.
     pub energy: Option<Energy>,
+    /// Of every account of it ([`Model::accounts`]), work since the start and energy dissipated, J.
+    pub shares_j: Vec<[f64; 2]>,
 }
 
 impl Sample {
@@ -207,6 +209,7 @@ fn blank(model: &Model, forces: bool) -> Sample {
         shoulder_m: vec![[0.0; 3]; n],
         handle_m: vec![[0.0; 3]; n],
         energy: None,
+        shares_j: vec![[0.0; 2]; model.accounts().count()],
     }
 }
 
@@ -237,6 +240,10 @@ impl Observer for Bridge<'_> {
             }
         }
         s.energy = Energy::of(model, y, w, &mut self.at_start_j);
+        let pages = y[model.layout().ledger_range()].chunks_exact(2);
+        for (share, page) in s.shares_j.iter_mut().zip(pages) {
+            share.copy_from_slice(page);
+        }
         if let Some(energy) = &s.energy {
             self.betrayed = self.belief.betrayed(energy);
         }

@@ -30,3 +30,24 @@ fn the_rest_is_below_a_hundred_millionth_of_what_went_through() {
         );
     }
 }
+
+#[test]
+fn the_shares_of_the_effects_are_all_that_is_booked() {
+    let effects = "effects.hold={stiffness_n_per_m=800.0,damping_n_s_per_m=40.0}";
+    let scene = load("music", &[effects.to_owned(), "duration_s=20.0".into()]).unwrap();
+    let model = sim::model::Model::new(&scene);
+    let names: Vec<&str> = model.accounts().collect();
+    assert_eq!(names, ["contact", "hold"]);
+    let mut last = None;
+    run(&scene, &mut |s: &Sample| {
+        let e = s.energy.expect("the default keeps a ledger");
+        let sum = |k: usize| s.shares_j.iter().map(|share| share[k]).sum::<f64>();
+        assert_eq!((sum(0), sum(1)), (e.work_in_j, e.dissipated_j));
+        last = Some(s.shares_j.clone());
+        true
+    })
+    .unwrap();
+    let last = last.unwrap();
+    // Shoulders that move a body up and down dissipate in every damper.
+    assert!(last.iter().all(|[_, lost]| *lost > 0.1), "{last:?}");
+}

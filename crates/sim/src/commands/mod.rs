@@ -76,7 +76,10 @@ pub fn run(command: Command) -> ExitCode {
 
 /// Prints a result; a pipe that was closed early (`sim scenes | head -1`) is no error of ours.
 fn print(text: &str) -> anyhow::Result<()> {
-    match std::io::stdout().lock().write_all(text.as_bytes()) {
+    match std::io::stdout()
+        .lock()
+        .write_all(recording::text::plain(text).as_bytes())
+    {
         Err(e) if e.kind() != std::io::ErrorKind::BrokenPipe => Err(e.into()),
         _ => Ok(()),
     }
