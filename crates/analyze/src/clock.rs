@@ -437,41 +437,63 @@ const TAP_DEVIATIONS: f64 = 12.0;
 /// Within this time after a tap begins it still rings, s.
 const RING_S: f64 = 0.15;
 
-/// Taps at rest: moments at which the norm of the specific force jumps out of stillness, s.
+/// Half a second of specific force.
+struct Stretch {
+    number: u64,
+    /// Median of each axis, m/s².
+    usual: [f64; 3],
+    /// Median distance from it, m/s².
+    deviation: f64,
+    /// Median deviation of the norm, m/s², which a turning hand leaves alone.
+    of_norm: f64,
+}
+
+/// Taps at rest: moments at which the specific force jumps out of stillness, s.
 ///
 /// Only where the half second of a sample and both its neighbours are at rest: while somebody walks, a tap cannot be told from a step. Each tap
-/// is timed by its largest deviation, so to about half a sample. Samples that are not finite are passed over; times ascend.
-pub fn taps(t_s: &[f64], accel_norm_m_per_s2: &[f64]) -> Vec<f64> {
-    let samples: Vec<(f64, f64)> = t_s
+/// is timed by the largest distance of the vector from its median, so to about half a sample, however the sensor lies: the norm would show
+/// another half-swing of the ringing wherever gravity adds to it. Samples that are not finite are passed over; times ascend.
+pub fn taps(t_s: &[f64], accel_m_per_s2: &[[f64; 3]]) -> Vec<f64> {
+    let samples: Vec<(f64, [f64; 3])> = t_s
         .iter()
-        .zip(accel_norm_m_per_s2)
-        .filter(|(t, a)| t.is_finite() && a.is_finite())
+        .zip(accel_m_per_s2)
+        .filter(|(t, a)| t.is_finite() && a.iter().all(|a| a.is_finite()))
         .map(|(t, a)| (*t, *a))
         .collect();
-    // Number of the stretch, median, median deviation.
+    let norm = |a: [f64; 3]| a.iter().map(|x| x * x).sum::<f64>().sqrt();
+    let apart = |a: [f64; 3], b: [f64; 3]| norm(std::array::from_fn(|k| a[k] - b[k]));
     let number = |t: f64| ((t - samples[0].0) / STRETCH_S) as u64;
-    let stretches: Vec<(u64, f64, f64)> = samples
+    let stretches: Vec<Stretch> = samples
         .chunk_by(|a, b| number(a.0) == number(b.0))
         .filter_map(|stretch| {
-            let mut level: Vec<f64> = stretch.iter().map(|s| s.1).collect();
-            let usual = median(&mut level)?;
-            level.iter_mut().for_each(|a| *a = (*a - usual).abs());
-            Some((number(stretch[0].0), usual, median(&mut level)?))
+            let middle = |of: &dyn Fn([f64; 3]) -> f64| {
+                median(&mut stretch.iter().map(|s| of(s.1)).collect::<Vec<_>>())
+            };
+            let usual = [middle(&|a| a[0])?, middle(&|a| a[1])?, middle(&|a| a[2])?];
+            let level = middle(&norm)?;
+            Some(Stretch {
+                number: number(stretch[0].0),
+                usual,
+                deviation: middle(&|a| apart(a, usual))?,
+                of_norm: middle(&|a| (norm(a) - level).abs())?,
+            })
         })
         .collect();
     let at_rest = |number: u64| {
         stretches
-            .binary_search_by_key(&number, |s| s.0)
-            .is_ok_and(|k| stretches[k].2 < REST_M_PER_S2)
+            .binary_search_by_key(&number, |s| s.number)
+            .is_ok_and(|k| stretches[k].of_norm < REST_M_PER_S2)
     };
     let mut out: Vec<(f64, f64, f64)> = Vec::new();
     for &(t, a) in &samples {
         let n = number(t);
-        let Ok(k) = stretches.binary_search_by_key(&n, |s| s.0) else {
+        let Ok(k) = stretches.binary_search_by_key(&n, |s| s.number) else {
             continue;
         };
-        let (_, usual, deviation) = stretches[k];
-        let height = (a - usual).abs();
+        let Stretch {
+            usual, deviation, ..
+        } = stretches[k];
+        let height = apart(a, usual);
         let still = n > 0 && at_rest(n - 1) && at_rest(n) && at_rest(n + 1);
         if !still || !(height > TAP_M_PER_S2.max(TAP_DEVIATIONS * deviation)) {
             continue;
@@ -595,8 +617,38 @@ mod tests {
             a[k] += height;
         }
         a[100] = f64::NAN;
-        assert_eq!(taps(&t, &a), [t[302], t[450], t[3500]]);
+        let upright: Vec<[f64; 3]> = a.iter().map(|a| [0.0, 0.0, *a]).collect();
+        assert_eq!(taps(&t, &upright), [t[302], t[450], t[3500]]);
         assert!(taps(&[], &[]).is_empty());
+    }
+
+    #[test]
+    fn a_tap_that_rings_begins_when_it_begins_however_the_sensor_lies() {
+        // A knock of 14 m/s² that rings at 22 Hz and dies in 20 ms, at moments between the samples; gravity along and against it, across, askew.
+        let began = [2.003, 3.1, 4.456, 5.2];
+        let t: Vec<f64> = (0..1600).map(|k| f64::from(k) * 0.005).collect();
+        let ring = |t: f64| -> f64 {
+            let since = began.iter().map(|b| t - b).filter(|s| *s >= 0.0);
+            since
+                .map(|s| 14.0 * (-s / 0.02).exp() * (140.0 * s).cos())
+                .sum()
+        };
+        for knock in [
+            [0.0, 0.0, 1.0],
+            [0.0, 0.0, -1.0],
+            [1.0, 0.0, 0.0],
+            [0.6, 0.0, -0.8],
+        ] {
+            let a: Vec<[f64; 3]> = t
+                .iter()
+                .map(|t| std::array::from_fn(|k| [0.0, 0.0, 9.81][k] + ring(*t) * knock[k]))
+                .collect();
+            let found = taps(&t, &a);
+            assert_eq!(found.len(), 4, "{knock:?}: {found:?}");
+            for (f, b) in found.iter().zip(began) {
+                assert!((f - b).abs() <= 0.005, "{knock:?}: {f} for {b}");
+            }
+        }
     }
 
     #[test]

@@ -21,6 +21,8 @@ const TWO_S: (f64, f64) = (0.03, 0.02);
 const MANY_S: (f64, f64) = (0.04, 0.03);
 /// J below which the heaves are not taken for the rath's: on twins it is 0.98 and more.
 const MATCH: f64 = 0.8;
+/// Clocks are moved where that leaves at most this share of what is unexplained with the clocks as they are: of many carriers one tells little.
+const BETTER: f64 = 0.5;
 /// Rate at which heaves are compared, Hz.
 const ALIGN_HZ: f64 = 100.0;
 /// Each carrier's offset is looked for at most so often; two carriers need one round.
@@ -210,17 +212,21 @@ impl Carriers {
         let inner = margin..n.checked_sub(margin)?;
         let mut shift = vec![0i64; riders.len()];
         let mut found = vec![0.0; riders.len()];
+        let told = |shift: &[i64]| -> f64 {
+            felt.iter()
+                .map(|(x, signs)| -(1.0 - alike(x, &riders, signs, shift, &inner)).ln())
+                .sum()
+        };
+        let as_they_are = told(&shift);
         let mut best = 0.0;
         for _ in 0..ROUNDS {
             let before = shift.clone();
             // The first stays: what all have in common cannot be told.
             for j in 1..riders.len() {
-                let score = |s: i64| -> f64 {
+                let score = |s: i64| {
                     let mut shift = shift.clone();
                     shift[j] = s;
-                    felt.iter()
-                        .map(|(x, signs)| -(1.0 - alike(x, &riders, signs, &shift, &inner)).ln())
-                        .sum()
+                    told(&shift)
                 };
                 let reach = riders[j].reach;
                 let (s, top) = (-reach..=reach)
@@ -240,7 +246,7 @@ impl Carriers {
                 break;
             }
         }
-        if best < -(1.0 - MATCH).ln() {
+        if best < -(1.0 - MATCH).ln() || best - as_they_are < -BETTER.ln() {
             return None;
         }
         let mean = found.iter().sum::<f64>() / found.len() as f64;

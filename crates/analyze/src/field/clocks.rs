@@ -193,7 +193,7 @@ impl Clocks {
 
 /// Taps that a sensor felt, s.
 fn felt(track: &Track) -> Vec<f64> {
-    taps(&track.t_s, &norms(&track.accel_m_per_s2))
+    taps(&track.t_s, &track.accel_m_per_s2)
 }
 
 /// Lengths of vectors.

@@ -13,6 +13,8 @@ use crate::roles::Sensors;
 pub struct Place {
     /// From the centre of mass, in the body's axes, m; 0 where nobody says.
     pub lever_m: [f64; 3],
+    /// Whether anybody says.
+    pub is_known: bool,
     /// Body from sensor, where somebody says.
     pub body_from_sensor: Option<UnitQuaternion<f64>>,
 }
@@ -26,6 +28,7 @@ impl Place {
             .map(|[roll, pitch, yaw]| UnitQuaternion::from_euler_angles(roll, pitch, yaw));
         Settings {
             lever_m: said.place_m.unwrap_or(self.lever_m),
+            lever_is_known: self.is_known || said.place_m.is_some(),
             mounting: turned
                 .or(self.body_from_sensor)
                 .map_or(Mounting::Levelled, Mounting::Known),
@@ -82,6 +85,7 @@ fn from_scene(text: &str) -> HashMap<String, Place> {
             .map(f64::to_radians);
         let place = Place {
             lever_m: triple("place_m").unwrap_or_default(),
+            is_known: true,
             body_from_sensor: Some(UnitQuaternion::from_euler_angles(roll, pitch, yaw)),
         };
         out.entry(format!("/imu/{name}")).or_insert(place);
@@ -100,6 +104,9 @@ mod tests {
         );
         assert_eq!(found["/imu/rath"].lever_m, [0.5, 0.0, 0.3]);
         assert_eq!(found["/imu/carrier_1"].lever_m, [0.0; 3]);
+        let settings = |place: Place, said: &Sensors| place.or_as_said(said).lever_is_known;
+        let nothing = Sensors::default();
+        assert!(settings(found["/imu/rath"], &nothing) && !settings(Place::default(), &nothing));
         assert!(from_scene("no toml [").is_empty());
     }
 }

@@ -100,6 +100,9 @@ pub fn metrics(motion: &Motion, window: Window) -> Metrics {
             f64::INFINITY
         };
         value.ci95 = Some([(x - half).max(0.0), (x + half).min(most)]);
+        if OF_PLACE.contains(name) && !motion.settings.lever_is_known {
+            value.reason = Some("as if the sensor sat at the centre of mass, and the interval knows no better, for nobody says where it sits; give imu_place_m in a roles file".into());
+        }
     }
     let budget = &motion.settings.budget;
     let below = |name: &str, least: f64| out.number(name).is_some_and(|x| x < least);
@@ -124,6 +127,9 @@ pub fn metrics(motion: &Motion, window: Window) -> Metrics {
     }
     out
 }
+
+/// What a sensor off the centre of mass feels otherwise, by its lever.
+const OF_PLACE: &[&str] = &["dz_pp_m", "rms_z_m", "t_float"];
 
 /// Roots of mean squares, to which noise adds and from which it never takes.
 const MEAN_SQUARES: &[&str] = &["rms_roll_deg", "rms_pitch_deg"];

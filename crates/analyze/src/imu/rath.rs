@@ -45,6 +45,8 @@ pub struct Settings {
     pub level_over: Window,
     /// From the centre of mass to the sensor, in the body's axes, m.
     pub lever_m: [f64; 3],
+    /// Whether anybody said so.
+    pub lever_is_known: bool,
     /// Gravity, m/s².
     pub gravity_m_per_s2: f64,
     /// Corner f₀ of the height, Hz: what is slower is held at zero ([`vertical`]). Twice the corner that suits 0.3 Hz, because a rath swings
@@ -62,6 +64,7 @@ impl Default for Settings {
             mounting: Mounting::default(),
             level_over: Window::ALL,
             lever_m: [0.0; 3],
+            lever_is_known: false,
             gravity_m_per_s2: 9.80665,
             height_corner_hz: 2.0 * vertical::CORNER_HZ,
             budget: Budget::default(),
