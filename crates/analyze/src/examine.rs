@@ -115,6 +115,8 @@ pub struct Trace {
     pub series: Vec<(String, Vec<f64>, Vec<f64>)>,
 }
 
+/// So many times tell a rate.
+const FEW: u64 = 17;
 /// At most so many panels of traces are kept.
 const MOST_TRACES: usize = 24;
 
@@ -265,11 +267,8 @@ fn estimates(
 fn wanted(path: &str, request: &Request, roles: &Roles) -> bool {
     // The topic is not known apart from the path here; a topic filter without wildcards is a prefix of it.
     let listed = |path: &str| {
-        let topic = request.topics.is_empty()
-            || request
-                .topics
-                .iter()
-                .any(|t| matches(&format!("{t}.*"), path));
+        let of = |topic: &String| crate::roles::of_topic(topic, path);
+        let topic = request.topics.is_empty() || request.topics.iter().any(of);
         topic && (request.signals.is_empty() || request.signals.iter().any(|p| matches(p, path)))
     };
     let wants = |path: &str| listed(path) || roles.of_signal(path).is_some();
@@ -419,8 +418,18 @@ impl<'a> Pass<'a> {
             .strip_prefix(batch.topic)
             .unwrap_or(path)
             .trim_start_matches('.');
-        let hz = self.rough_hz[batch.channel];
-        let messages = self.recording.info().channels[batch.channel].messages;
+        // The batch's own rate, where it shows one: a topic need not last as long as the file.
+        let times = &self.times[batch.channel];
+        let hz = match times.count() >= FEW {
+            true => times.hz_between_gaps(),
+            false => None,
+        }
+        .unwrap_or(self.rough_hz[batch.channel]);
+        let mut messages = self.recording.info().channels[batch.channel].messages;
+        if let (from, Some(to)) = self.request.window {
+            let window = ((to - from.unwrap_or(0.0)).max(0.0) * hz).ceil();
+            messages = messages.min(window as u64);
+        }
         let listed = self.request.lists(batch.topic, path);
         // A stamp's seconds and nanoseconds are a clock, not a signal with lines.
         let clock = field.contains("stamp.") || field == "time_s";
@@ -459,12 +468,6 @@ impl<'a> Pass<'a> {
         finite: bool,
     ) {
         let entry = &mut self.entries[entry];
-        if entry.listed {
-            entry.stream.push(values, finite);
-        }
-        if rows.is_some() && entry.times.is_none() {
-            entry.times = Some(Times::default());
-        }
         let times = match rows {
             None => batch.times_ns,
             Some(rows) => {
@@ -474,8 +477,31 @@ impl<'a> Pass<'a> {
                 &self.scratch
             }
         };
-        if let Some(own) = &mut entry.times {
-            own.push(times);
+        if entry.listed {
+            let start_ns = i128::from(self.recording.info().start_ns);
+            match self.request.window {
+                (None, None) => {
+                    entry.stream.push(values, finite);
+                    if rows.is_some() && entry.times.is_none() {
+                        entry.times = Some(Times::default());
+                    }
+                    if let Some(own) = &mut entry.times {
+                        own.push(times);
+                    }
+                }
+                (from, to) => {
+                    let inside = |t: i64| {
+                        let t_s = (i128::from(t) - start_ns) as f64 / 1e9;
+                        from.is_none_or(|a| t_s >= a) && to.is_none_or(|b| t_s <= b)
+                    };
+                    let (kept, x): (Vec<i64>, Vec<f64>) = (times.iter().zip(values))
+                        .filter(|(t, _)| inside(**t))
+                        .map(|(t, x)| (*t, *x))
+                        .unzip();
+                    entry.stream.push(&x, finite);
+                    entry.times.get_or_insert_default().push(&kept);
+                }
+            }
         }
         if let Some(outline) = &mut entry.outline {
             let start_ns = i128::from(self.recording.info().start_ns);

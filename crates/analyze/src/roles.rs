@@ -436,6 +436,11 @@ fn natural_order(mut names: Vec<String>) -> Vec<String> {
     names
 }
 
+/// Whether `path` is of a topic that fits `pattern`: a field of its messages, or its messages themselves where they are bare numbers.
+pub fn of_topic(pattern: &str, path: &str) -> bool {
+    matches(&format!("{pattern}.*"), path) || matches(pattern, path)
+}
+
 /// Whether `path` fits `pattern`, in which `*` stands for any characters, none included.
 pub fn matches(pattern: &str, path: &str) -> bool {
     let (p, s) = (pattern.as_bytes(), path.as_bytes());
@@ -462,6 +467,12 @@ pub fn matches(pattern: &str, path: &str) -> bool {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn a_bare_number_is_of_its_topic() {
+        assert!(of_topic("/n", "/n") && of_topic("/n", "/n.x") && of_topic("/n*", "/nose.x"));
+        assert!(!of_topic("/n", "/nose.x") && !of_topic("/n", "/m"));
+    }
 
     #[test]
     fn wildcards() {

@@ -143,11 +143,27 @@ pub struct Times {
     /// Steps of ordinary length, and their sum (s).
     ordinary: u64,
     ordinary_s: f64,
+    /// The first steps, which are judged together: the number of messages that share the time after each, and its length (s).
+    first: Vec<(u64, f64)>,
+    /// Messages that share the time of the last.
+    shared: u64,
 }
 
-/// A step so many times the mean of those before it is a gap; the first few are taken as they come.
+/// A step so many times the mean of those before it is a gap; the first few are measured against their median.
 const GAP: f64 = 10.0;
-const FIRST: u64 = 16;
+const FIRST: usize = 16;
+
+/// Of some steps those that are no gaps beside the median: how many messages came with them, and their sum (s).
+fn ordinary(steps: &[(u64, f64)]) -> (u64, f64) {
+    let each = |(n, s): &(u64, f64)| s / *n as f64;
+    let mut sorted: Vec<f64> = steps.iter().map(each).collect();
+    sorted.sort_by(f64::total_cmp);
+    let most = sorted
+        .get((sorted.len().max(1) - 1) / 2)
+        .map_or(0.0, |m| GAP * m);
+    let kept = steps.iter().filter(|s| each(s) <= most);
+    kept.fold((0, 0.0), |(n, sum), s| (n + s.0, sum + s.1))
+}
 
 impl Times {
     /// The next log times.
@@ -168,9 +184,20 @@ impl Times {
             self.latest_ns = self.latest_ns.max(*t);
         }
         for step in &self.buffer {
-            // Against the mean of those before, without a division for every message.
-            if self.ordinary < FIRST || *step * self.ordinary as f64 <= GAP * self.ordinary_s {
-                self.ordinary += 1;
+            // Messages that came together share the step to them; a clock that steps back tells no rate.
+            if *step <= 0.0 {
+                self.shared = if *step < 0.0 { 0 } else { self.shared + 1 };
+                continue;
+            }
+            let messages = std::mem::take(&mut self.shared) + 1;
+            if self.ordinary == 0 {
+                self.first.push((messages, *step));
+                if self.first.len() == FIRST {
+                    (self.ordinary, self.ordinary_s) = ordinary(&self.first);
+                }
+            } else if *step * self.ordinary as f64 <= GAP * self.ordinary_s * messages as f64 {
+                // Against the mean of those before, without a division for every message.
+                self.ordinary += messages;
                 self.ordinary_s += step;
             }
         }
@@ -192,8 +219,12 @@ impl Times {
 
     /// Rate between gaps (Hz): that of the samples, which lost ones do not slow down.
     pub fn hz_between_gaps(&self) -> Option<f64> {
-        (self.ordinary > 0 && self.ordinary_s > 0.0)
-            .then(|| self.ordinary as f64 / self.ordinary_s)
+        let (count, sum_s) = match self.ordinary {
+            0 => ordinary(&self.first),
+            n => (n, self.ordinary_s),
+        };
+        (count > 0 && sum_s > 0.0)
+            .then(|| count as f64 / sum_s)
             .or(self.hz())
     }
 
@@ -346,6 +377,23 @@ mod tests {
         gap.push(&steps.collect::<Vec<_>>());
         assert!((gap.hz_between_gaps().unwrap() - 100.0).abs() < 1e-9);
         assert!(gap.hz().unwrap() < 70.0);
+        // Nor does a clock that steps back, a first time that is none, or packets of ten that come in one message's time.
+        let late = (0..4000).chain(4500..6000).chain(4000..4500);
+        let stray = std::iter::once(-100_000).chain(0..300);
+        let packets = (0..3000).map(|k| k / 10 * 10);
+        for (what, steps) in [
+            ("late", late.collect::<Vec<i64>>()),
+            ("stray", stray.collect()),
+            ("packets", packets.collect()),
+        ] {
+            for batch in [1, 7, 10_000] {
+                let mut times = Times::default();
+                let ns: Vec<i64> = steps.iter().map(|k| k * 10_000_000).collect();
+                ns.chunks(batch).for_each(|c| times.push(c));
+                let hz = times.hz_between_gaps().unwrap();
+                assert!((hz - 100.0).abs() < 0.5, "{what} {batch}: {hz}");
+            }
+        }
         let mut odd = Times::default();
         odd.push(&[i64::MIN, i64::MAX, 5]);
         assert!(odd.hz().unwrap() > 0.0);

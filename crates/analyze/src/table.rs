@@ -49,6 +49,8 @@ struct Table {
     time_ns: Vec<i64>,
     start_ns: i64,
     signals: Vec<Signal>,
+    /// Messages at whose time another of the same topic follows: the row holds the last.
+    overlaid: u64,
 }
 
 impl Table {
@@ -63,7 +65,8 @@ impl Table {
     }
 }
 
-/// Writes the signals that `request` names, all of them where it names none, in the window it names; one row in `downsample`.
+/// Writes the signals that `request` names, all of them where it names none, in the window it names; one row in `downsample`. Gives how many
+/// messages have no row, because one of the same topic and time came after them.
 ///
 /// # Errors
 /// [`TableError`]; nothing is left under the final name then.
@@ -72,7 +75,7 @@ pub fn write(
     request: &Request,
     downsample: u64,
     out: &Path,
-) -> Result<(), TableError> {
+) -> Result<u64, TableError> {
     let name = out.display().to_string();
     let kind = out
         .extension()
@@ -99,7 +102,8 @@ pub fn write(
     written.map_err(|trouble| match trouble {
         Trouble::Io(source) => io(source),
         Trouble::Table(error) => error,
-    })
+    })?;
+    Ok(table.overlaid)
 }
 
 /// What can go wrong while a table is written.
@@ -117,11 +121,8 @@ impl From<std::io::Error> for Trouble {
 /// Reads the wanted signals and joins them by time.
 fn collect(recording: &Recording, request: &Request, downsample: u64) -> Result<Table, ReadError> {
     let lists = |path: &str| {
-        let topic = request.topics.is_empty()
-            || request
-                .topics
-                .iter()
-                .any(|t| crate::roles::matches(&format!("{t}.*"), path));
+        let of = |topic: &String| crate::roles::of_topic(topic, path);
+        let topic = request.topics.is_empty() || request.topics.iter().any(of);
         topic
             && (request.signals.is_empty()
                 || request
@@ -150,12 +151,15 @@ fn collect(recording: &Recording, request: &Request, downsample: u64) -> Result<
     let step = usize::try_from(downsample).unwrap_or(usize::MAX).max(1);
     let mut time_ns: Vec<i64> = Vec::new();
     let mut axes: Vec<*const i64> = Vec::new();
+    let mut overlaid = 0;
     for s in &signals {
         // Signals of one topic share their axis: take it once, and thin it by itself so that every topic keeps rows.
         if !axes.contains(&s.times_ns.as_ptr()) {
             axes.push(s.times_ns.as_ptr());
-            let inside = s.times_ns.iter().filter(|t| inside(**t));
-            time_ns.extend(inside.step_by(step));
+            let kept = s.times_ns.iter().filter(|t| inside(**t));
+            time_ns.extend(kept.step_by(step));
+            let pairs = s.times_ns.windows(2);
+            overlaid += pairs.filter(|w| w[0] == w[1] && inside(w[0])).count() as u64;
         }
     }
     time_ns.sort_unstable();
@@ -164,6 +168,7 @@ fn collect(recording: &Recording, request: &Request, downsample: u64) -> Result<
         time_ns,
         start_ns,
         signals,
+        overlaid,
     })
 }
 

@@ -127,7 +127,13 @@ fn one(path: &Path, args: &AnalyzeArgs, request: &Request) -> anyhow::Result<Ana
         bail!("{}", nothing(&analysis, request));
     }
     if let Some(out) = &args.out {
-        analyze::table::write(&recording, request, args.downsample, out)?;
+        let overlaid = analyze::table::write(&recording, request, args.downsample, out)?;
+        if overlaid > 0 {
+            recording::note!(
+                "analyze: {}: {overlaid} messages have no row, because one of the same topic and time came after them",
+                out.display()
+            );
+        }
     }
     if let Some(out) = &args.report {
         let page = report::html(&analysis, &command_line());

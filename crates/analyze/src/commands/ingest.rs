@@ -14,9 +14,11 @@ const EXAMPLES: &str = "\
 Examples:
   analyze ingest logs.npz --out run.mcap                     a log of the paper's archive
   analyze ingest phone.zip --out walk.mcap                   phyphox or Sensor Logger
-  analyze ingest rath.zip left.csv right.csv --out walk.mcap several devices, one recording
-  analyze ingest rath.zip left.zip right.zip drum.wav --out walk.mcap  with sound
-  analyze ingest sensor.csv --layout columns.toml --out walk.mcap";
+  analyze ingest rath.zip carrier_1.csv carrier_2.csv --out walk.mcap  several devices, one recording
+  analyze ingest rath.zip carrier_1.zip carrier_2.zip drum.wav --out walk.mcap  with sound
+  analyze ingest sensor.csv --layout columns.toml --out walk.mcap
+
+A file's name says whose device it was: carrier, bearer, walker or person in it is somebody who carries. A roles file says otherwise.";
 
 #[derive(Args)]
 #[command(after_help = EXAMPLES)]

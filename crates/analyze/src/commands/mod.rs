@@ -11,6 +11,7 @@ use std::process::ExitCode;
 
 use clap::{Args, Parser, Subcommand, ValueEnum};
 use recording::read::ReadOptions;
+use recording::text::plain;
 
 const EXAMPLES: &str = "\
 Examples:
@@ -141,7 +142,7 @@ enum Done {
 pub fn run() -> ExitCode {
     // Nothing half-written stays behind when the user interrupts.
     let _ = ctrlc::set_handler(|| {
-        recording::write::remove_unfinished_files();
+        recording::whole::remove_unfinished_files();
         std::process::exit(130);
     });
     let cli = Cli::parse();
@@ -164,13 +165,13 @@ pub fn run() -> ExitCode {
 fn complain(error: &anyhow::Error) {
     let mut err = std::io::stderr().lock();
     let first = error.to_string();
-    let _ = writeln!(err, "analyze: {first}");
+    let _ = writeln!(err, "analyze: {}", plain(&first));
     let mut said = first;
     for cause in error.chain().skip(1) {
         let cause = cause.to_string();
         // Libraries often put the cause into their own sentence already.
         if !said.contains(&cause) {
-            let _ = writeln!(err, "  because: {cause}");
+            let _ = writeln!(err, "  because: {}", plain(&cause));
         }
         said = cause;
     }
@@ -179,7 +180,10 @@ fn complain(error: &anyhow::Error) {
 /// Writes the result to standard output; a reader that went away early is no error.
 fn print(text: &str) -> anyhow::Result<()> {
     let mut out = std::io::stdout().lock();
-    match out.write_all(text.as_bytes()).and_then(|()| out.flush()) {
+    match out
+        .write_all(plain(text).as_bytes())
+        .and_then(|()| out.flush())
+    {
         Err(e) if e.kind() != std::io::ErrorKind::BrokenPipe => {
             Err(anyhow::Error::new(e).context("standard output takes no more"))
         }

@@ -100,5 +100,8 @@ pub fn ensemble(analyses: &[Analysis]) -> String {
 
 fn eight(x: f64) -> String {
     let text = figures(x);
-    text.chars().take(7).collect()
+    match text.contains('e') {
+        true => format!("{x:.1e}"),
+        false => text.chars().take(7).collect(),
+    }
 }

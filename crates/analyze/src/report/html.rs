@@ -388,7 +388,7 @@ fn panel(p: &Panel) -> Value {
     let series: Vec<Value> = p
         .series
         .iter()
-        .map(|s| json!({ "name": s.name, "x": rounded(&s.x, 6), "y": rounded(&s.y, 5), "colour": s.colour }))
+        .map(|s| json!({ "name": s.name, "x": rounded(&s.x, 6), "y": rounded(&s.y, digits(&s.y)), "colour": s.colour }))
         .collect();
     json!({
         "id": p.id, "x_label": p.x_label, "y_label": p.y_label, "series": series, "levels": p.levels, "marks": p.marks,
@@ -405,6 +405,20 @@ fn image(i: &Image) -> Value {
         "log_y": false, "x_range": i.x_range, "full": i.x_range, "y_range": i.y_range, "points": false, "time": true, "image": values,
         "value_range": [high - 60.0, high], "value_label": i.value_label,
     })
+}
+
+/// Significant digits that show a ten-thousandth of what a curve spans, wherever it lies: a height above the sea, a pressure.
+fn digits(y: &[f64]) -> usize {
+    let finite = || y.iter().copied().filter(|y| y.is_finite());
+    let (low, high) = finite().fold((f64::INFINITY, f64::NEG_INFINITY), |(a, b), y| {
+        (a.min(y), b.max(y))
+    });
+    let beside = low.abs().max(high.abs()) / (high - low);
+    // OK because the logarithm of a double is below 400.
+    match beside.is_finite() {
+        true => 5 + beside.log10().ceil().clamp(0.0, 12.0) as usize,
+        false => 5,
+    }
 }
 
 /// Numbers with so many significant digits: what a screen can show, in a third of the bytes.

@@ -18,12 +18,13 @@
     parent.appendChild(e);
     return e;
   };
-  const short = x => {
+  // As many digits as tell values apart that are a step from one another.
+  const short = (x, step) => {
     if (isNaN(x)) return "–";
     if (x === 0) return "0";
-    const a = Math.abs(x);
-    if (a >= 1e5 || a < 1e-3) return x.toExponential(2).replace(/\.?0+e/, "e").replace("e+", "e");
-    return String(Number(x.toPrecision(4)));
+    const a = Math.abs(x), tell = step > 0 ? Math.ceil(Math.log10(a / step) - 1e-9) + 1 : 0;
+    if (a >= 1e7 || a < 1e-3 || (a >= 1e5 && tell <= 3)) return x.toExponential(Math.min(12, Math.max(2, tell - 1))).replace(/\.?0+e/, "e").replace("e+", "e");
+    return String(Number(x.toPrecision(Math.min(15, Math.max(4, tell)))));
   };
   const power = k => Math.abs(k) < 3 ? short(Math.pow(10, k)) : "10" + String(k).replace(/[-\d]/g, c => "⁻⁰¹²³⁴⁵⁶⁷⁸⁹"["-0123456789".indexOf(c)]);
   // Ticks at 1, 2 or 5 times a power of ten.
@@ -58,6 +59,8 @@
       this.legend = figure.querySelector(".legend");
       this.canvas = figure.querySelector("canvas");
       this.full = spec.x_range || extent(spec.series.map(s => s.x), v => v);
+      // A recording of one moment still has an axis.
+      if (!(this.full[0] < this.full[1])) { const c = isFinite(this.full[0]) ? this.full[0] : 0; this.full = [c - 0.5, c + 0.5]; }
       this.range = null;
       this.hidden = new Set();
       this.listen();
@@ -95,14 +98,16 @@
       const inside = el(svg, "g", { "clip-path": `url(#${clip})` });
       if (spec.window) el(inside, "rect", { class: "window", x: sx(spec.window[0]), y: top, width: Math.max(0, sx(spec.window[1]) - sx(spec.window[0])), height: bottom - top });
       if (spec.band) el(inside, "rect", { class: "band", x: left, y: sy(spec.band[1]), width: right - left, height: Math.max(0, sy(spec.band[0]) - sy(spec.band[1])) });
-      for (const t of ticks(x0, x1, Math.max(3, w / 110))) {
+      const across = ticks(x0, x1, Math.max(3, w / 110)), up = log ? decades(y0, y1) : ticks(y0, y1, 5);
+      for (const t of across) {
         el(svg, "line", { class: "grid", x1: sx(t), x2: sx(t), y1: top, y2: bottom });
-        el(svg, "text", { x: sx(t), y: bottom + 15, "text-anchor": "middle" }, short(t));
+        el(svg, "text", { x: sx(t), y: bottom + 15, "text-anchor": "middle" }, short(t, across[1] - across[0]));
       }
-      for (const t of log ? decades(y0, y1) : ticks(y0, y1, 5)) {
+      this.fine = (y1 - y0) / 1000; // what a hovered value is told to
+      for (const t of up) {
         const y = log ? sy(Math.pow(10, t)) : sy(t);
         el(svg, "line", { class: "grid", x1: left, x2: right, y1: y, y2: y });
-        el(svg, "text", { x: left - 6, y: y + 4, "text-anchor": "end" }, log ? power(t) : short(t));
+        el(svg, "text", { x: left - 6, y: y + 4, "text-anchor": "end" }, log ? power(t) : short(t, up[1] - up[0]));
       }
       if (spec.image) this.paint(); else svg.appendChild(inside);
       el(svg, "text", { x: (left + right) / 2, y: h - 5, "text-anchor": "middle" }, spec.x_label);
@@ -144,6 +149,8 @@
         const y = this.sy(s.y[i]);
         if (!isFinite(y)) { pen = "M"; continue; }
         d += `${pen}${this.sx(s.x[i]).toFixed(1)} ${y.toFixed(1)}`;
+        // A sample between two gaps is a dot.
+        if (pen === "M" && !isFinite(this.sy(s.y[i + 1]))) d += "h0";
         pen = "L";
       }
       el(parent, "path", { class: "curve", d, stroke: colour, "data-points": to - from, "data-name": s.name });
@@ -185,7 +192,7 @@
           const i = Math.max(0, below(s.x, at)), near = i + 1 < s.x.length && s.x[i + 1] - at < at - s.x[i] ? i + 1 : i;
           const v = document.createElement("span");
           v.className = "value";
-          v.textContent = ` ${short(s.y[near])}`;
+          v.textContent = ` ${short(s.y[near], this.spec.log_y ? 0 : this.fine)}`;
           item.append(v);
         }
         if (this.spec.series.length > 1) {
@@ -198,7 +205,7 @@
       if (at !== null) {
         const where = document.createElement("span");
         where.className = "value";
-        where.textContent = `at ${short(at)} ${this.spec.x_label.split(", ")[1] || ""}`;
+        where.textContent = `at ${short(at, (this.x[1] - this.x[0]) / 1000)} ${this.spec.x_label.split(", ")[1] || ""}`;
         this.legend.append(where);
       }
     }

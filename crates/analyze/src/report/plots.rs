@@ -188,7 +188,7 @@ pub fn plots(a: &Analysis) -> Vec<Plot> {
     };
     let title = format!("Roll and tilt{}", imu(&i.sources.attitude));
     let mut roll = Panel::over_time("roll", &title, "angle, deg", a);
-    roll.note = "Roll turns about the pole, tilt lifts its nose. The shaded stretch is the analysis window.".into();
+    roll.note = "Roll turns about the pole; tilt, where it is positive, lowers its front (REP-103). The shaded stretch is the analysis window.".into();
     roll.line("roll", &i.t_s, &degrees(&i.roll_rad));
     roll.line("tilt", &i.t_s, &degrees(&i.pitch_rad));
     roll.marks = marks(a);
@@ -230,21 +230,31 @@ pub fn plots(a: &Analysis) -> Vec<Plot> {
 
     if i.phase_rad.len() > 1 {
         let phases: Vec<&[f64]> = i.phase_rad.iter().map(|p| &p[..]).collect();
-        let chance = phase::chance_level(phases.len());
         let mut sync = Panel::over_time(
             "synchrony",
             "Synchrony of the carriers",
             "order parameter r",
             a,
         );
-        sync.note = format!(
-            "The band holds 95 % of what {} independent carriers show at a moment; their mean is {:.3}.",
-            phases.len(),
-            chance.mean
-        );
         sync.line("r", i.phase_times(), &phase::order_parameter(&phases));
-        sync.band = Some((chance.band[0], chance.band[1], "chance, 95 %".into()));
-        sync.levels = vec![(chance.mean, "chance, mean".into())];
+        if i.phases_are_measured {
+            // Steps of the same people are not independent at a moment; what chance gives is the metric's, from surrogates.
+            sync.note = "Dashed: the mean r of the same steps shifted against one another in time, which is chance for measured phases.".into();
+            let chance = a.metrics.number("synchrony_chance");
+            sync.levels = chance
+                .map(|r| (r, "chance, mean".into()))
+                .into_iter()
+                .collect();
+        } else {
+            let chance = phase::chance_level(phases.len());
+            sync.note = format!(
+                "The band holds 95 % of what {} independent carriers show at a moment; their mean is {:.3}.",
+                phases.len(),
+                chance.mean
+            );
+            sync.band = Some((chance.band[0], chance.band[1], "chance, 95 %".into()));
+            sync.levels = vec![(chance.mean, "chance, mean".into())];
+        }
         sync.marks = marks(a);
         panel(sync);
     }
