@@ -208,6 +208,25 @@ fn slips_get_one_sentence() {
             "Did you mean `sobol`",
         ),
         (format!("{base}seeds = 4000000000\n"), "more than"),
+        (format!("{base}set.seed = 7\n"), "lines of their own"),
+        (
+            format!(
+                "{base}[[axes]]\nkey = \"body.mass_kg\"\nvalues = [50.0]\nwith = {{\"effects.contact.stiffness_n_per_m\" = 50.0}}\n\
+                 [[axes]]\nkey = \"effects.contact\"\nname = \"c\"\nvalues = [true]\n"
+            ),
+            "would not count",
+        ),
+        (
+            format!(
+                "{base}[[axes]]\nkey = \"body.mass_kg\"\nvalues = [50.0]\nwith = {{\"effects.contact.stifness_n_per_m\" = 50.0}}\n"
+            ),
+            "stiffness_n_per_m",
+        ),
+        (
+            format!("{base}[[axes]]\nkey = \"carriers.along_poles.count\"\nvalues = [2.4, 4]\n")
+                .replace("\"music\"", "\"eight-carriers\""),
+            "whole numbers",
+        ),
     ] {
         std::fs::write(folder.path().join("mine.toml"), &text).expect("written");
         let out = run_in(folder.path(), "study", &["mine.toml"]);
@@ -267,6 +286,28 @@ fn parts_of_another_study_are_not_mixed_in() {
     let kept = std::fs::read(at.join("x/runs.parquet")).expect("a table");
     assert!(kept == table);
     study(at, &["a.toml", "--out", "x", "--resume"]);
+    // A part that is damaged inside is named.
+    let part = at.join("x/parts/000000000-000000002.parquet");
+    let mut bytes = std::fs::read(&part).expect("a part");
+    bytes[60..120].fill(0xff);
+    std::fs::write(&part, bytes).expect("written");
+    let out = run_in(at, "study", &["merge", "x"]);
+    let said = String::from_utf8_lossy(&out.stderr);
+    assert!(
+        out.status.code() == Some(1)
+            && said.contains("000000002.parquet: is damaged")
+            && !said.contains("summary"),
+        "{said}"
+    );
+    // What is somebody's own stays.
+    std::fs::write(at.join("scene.toml"), "# hours of work\n").expect("written");
+    let out = run_in(at, "study", &["a.toml", "--out", "."]);
+    let said = String::from_utf8_lossy(&out.stderr);
+    assert!(
+        out.status.code() == Some(1) && said.contains("is there already"),
+        "{said}"
+    );
+    assert_eq!(read(at, "scene.toml"), b"# hours of work\n");
 }
 
 #[test]

@@ -10,6 +10,7 @@ use kuva::render::plots::Plot;
 use kuva::render::render::render_multiple;
 use std::io::Write;
 use std::path::Path;
+use std::sync::Arc;
 
 /// A figure.
 #[derive(Clone, Debug, Default)]
@@ -141,7 +142,16 @@ impl Figure {
                 ((x.0.min(c.0), x.1.max(c.0)), (y.0.min(c.1), y.1.max(c.1)))
             });
         let wide = |(a, b): (f64, f64)| if b > a { (a, b) } else { (a - 1.0, a + 1.0) };
-        let (x, mut y) = (wide(x), wide(y));
+        let (mut x, mut y) = (wide(x), wide(y));
+        if self
+            .layers
+            .iter()
+            .any(|l| matches!(l, Layer::Points { .. }))
+        {
+            // A point on the frame would be cut in half.
+            let room = 0.02 * (x.1 - x.0);
+            x = (x.0 - room, x.1 + room);
+        }
         if !self.layers.iter().any(|l| matches!(l, Layer::Map { .. })) {
             let room = 0.05 * (y.1 - y.0);
             y = (y.0 - room, y.1 + room);
@@ -149,9 +159,25 @@ impl Figure {
         (self.x_range.unwrap_or(x), self.y_range.unwrap_or(y))
     }
 
+    /// The title, and what the colours of a map mean.
+    fn whole_title(&self) -> String {
+        let mut title = self.title.clone();
+        for layer in &self.layers {
+            if let Layer::Map { label, values, .. } = layer {
+                if *label != self.title {
+                    title += &format!("; colour: {label}");
+                }
+                if values.iter().flatten().any(|v| v.is_nan()) {
+                    title += "; white: none";
+                }
+            }
+        }
+        title
+    }
+
     fn scene(&self) -> kuva::render::render::Scene {
         let (x, y) = self.range();
-        let marks: Vec<Plot> = self.layers.iter().map(|l| mark(l, x, y)).collect();
+        let marks: Vec<Plot> = self.layers.iter().flat_map(|l| marks(l, x, y)).collect();
         let named = self.layers.iter().filter(|l| !l.name().is_empty()).count();
         let is_map = self.layers.iter().any(|l| matches!(l, Layer::Map { .. }));
         let layout = match is_map {
@@ -159,7 +185,7 @@ impl Figure {
             false => Layout::new(x, y),
         };
         let mut layout = layout
-            .with_title(self.title.clone())
+            .with_title(self.whole_title())
             .with_x_label(self.x_label.clone())
             .with_y_label(self.y_label.clone())
             .with_width(900.0)
@@ -194,26 +220,63 @@ impl Figure {
     }
 }
 
-/// The part of a curve inside the frame: what leaves it is cut off there.
-fn clipped(points: &[(f64, f64)], x: (f64, f64), y: (f64, f64)) -> Vec<(f64, f64)> {
+/// The points inside the frame.
+fn inside(points: &[(f64, f64)], x: (f64, f64), y: (f64, f64)) -> Vec<(f64, f64)> {
     let inside = |p: &&(f64, f64)| (x.0..=x.1).contains(&p.0) && (y.0..=y.1).contains(&p.1);
     points.iter().filter(inside).copied().collect()
 }
 
-fn mark(layer: &Layer, x: (f64, f64), y: (f64, f64)) -> Plot {
-    match layer {
-        Layer::Map {
-            label,
-            values,
-            x,
-            y,
-        } => Heatmap::new()
+/// The pieces of a curve inside the frame: what leaves it is cut off there (Liang and Barsky 1984, ACM Trans. Graph. 3: 1).
+fn clipped(points: &[(f64, f64)], x: (f64, f64), y: (f64, f64)) -> Vec<Vec<(f64, f64)>> {
+    let mut pieces: Vec<Vec<(f64, f64)>> = Vec::new();
+    for pair in points.windows(2) {
+        let (a, b) = (pair[0], pair[1]);
+        let (dx, dy) = (b.0 - a.0, b.1 - a.1);
+        // The share of the segment from a on at which it is inside each edge.
+        let (mut from, mut to) = (0.0_f64, 1.0_f64);
+        for (toward, room) in [
+            (-dx, a.0 - x.0),
+            (dx, x.1 - a.0),
+            (-dy, a.1 - y.0),
+            (dy, y.1 - a.1),
+        ] {
+            let meets = room / toward;
+            match toward {
+                d if d < 0.0 => from = from.max(meets),
+                d if d > 0.0 => to = to.min(meets),
+                _ if room < 0.0 => to = -1.0,
+                _ => {}
+            }
+        }
+        if from > to || !(dx + dy).is_finite() {
+            continue;
+        }
+        let at = |share: f64| (a.0 + share * dx, a.1 + share * dy);
+        let (begin, end) = (at(from), if to == 1.0 { b } else { at(to) });
+        match pieces.last_mut() {
+            Some(piece) if piece.last() == Some(&begin) => piece.push(end),
+            _ => pieces.push(vec![begin, end]),
+        }
+    }
+    pieces
+}
+
+/// The colours of a map; a cell without a value stays white.
+fn map_colours() -> ColorMap {
+    ColorMap::Custom(Arc::new(|share: f64| match share.is_nan() {
+        true => colour(WHITE).into(),
+        false => ColorMap::Cividis.map(share),
+    }))
+}
+
+fn marks(layer: &Layer, x: (f64, f64), y: (f64, f64)) -> Vec<Plot> {
+    let mark = match layer {
+        Layer::Map { values, x, y, .. } => Heatmap::new()
             .with_data(values.clone())
-            .with_color_map(ColorMap::Cividis)
+            .with_color_map(map_colours())
             .with_x_range(x.0, x.1)
             .with_y_range(y.0, y.1)
             .with_cell_size(1.0)
-            .with_legend(label.clone())
             .into(),
         Layer::Line {
             name,
@@ -221,17 +284,21 @@ fn mark(layer: &Layer, x: (f64, f64), y: (f64, f64)) -> Plot {
             colour: c,
             dashed,
         } => {
-            let mut line = LinePlot::new()
-                .with_data(clipped(points, x, y))
-                .with_color(colour(*c))
-                .with_stroke_width(if *c == WHITE { 2.0 } else { 1.5 });
-            if *dashed {
-                line = line.with_dashed();
-            }
-            if !name.is_empty() {
-                line = line.with_legend(name.clone());
-            }
-            line.into()
+            let pieces = clipped(points, x, y).into_iter().enumerate();
+            let line = |(k, piece): (usize, Vec<(f64, f64)>)| {
+                let mut line = LinePlot::new()
+                    .with_data(piece)
+                    .with_color(colour(*c))
+                    .with_stroke_width(if *c == WHITE { 2.0 } else { 1.5 });
+                if *dashed {
+                    line = line.with_dashed();
+                }
+                if k == 0 && !name.is_empty() {
+                    line = line.with_legend(name.clone());
+                }
+                line.into()
+            };
+            return pieces.map(line).collect();
         }
         Layer::Points {
             name,
@@ -239,7 +306,7 @@ fn mark(layer: &Layer, x: (f64, f64), y: (f64, f64)) -> Plot {
             colour: c,
         } => {
             let mut cloud = ScatterPlot::new()
-                .with_data(clipped(points, x, y))
+                .with_data(inside(points, x, y))
                 .with_color(colour(*c))
                 .with_size(3.0);
             if !name.is_empty() {
@@ -255,5 +322,39 @@ fn mark(layer: &Layer, x: (f64, f64), y: (f64, f64)) -> Plot {
         .with_color(colour(*c))
         .with_opacity(0.2)
         .into(),
+    };
+    vec![mark]
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_curve_is_cut_off_where_it_leaves_the_frame() {
+        let frame = |points: &[(f64, f64)]| clipped(points, (0.0, 4.0), (-1.0, 1.0));
+        // A mark from below to above, a tooth that leaves twice, a curve outside, a whole one.
+        assert_eq!(
+            frame(&[(2.0, -6.0), (2.0, 4.0)]),
+            [[(2.0, -1.0), (2.0, 1.0)]]
+        );
+        assert_eq!(
+            frame(&[(0.0, 0.0), (2.0, 2.0), (4.0, 0.0)]),
+            [[(0.0, 0.0), (1.0, 1.0)], [(3.0, 1.0), (4.0, 0.0)]]
+        );
+        assert!(frame(&[(0.0, 2.0), (4.0, 2.0)]).is_empty());
+        assert!(frame(&[(-2.0, 0.0), (0.0, 3.0)]).is_empty());
+        let whole = [(0.0, 0.0), (1.0, 0.5), (4.0, 0.3)];
+        assert_eq!(frame(&whole), [whole]);
+        assert!(frame(&[(0.0, f64::NAN), (1.0, 0.0)]).is_empty());
+    }
+
+    #[test]
+    fn a_cell_without_a_value_has_none_of_the_colours() {
+        let ColorMap::Custom(map) = map_colours() else {
+            panic!("a map of our own")
+        };
+        assert_eq!(map(f64::NAN), "#FFFFFF");
+        assert!((0..=100).all(|k| map(f64::from(k) / 100.0) != "#FFFFFF"));
     }
 }

@@ -1,5 +1,6 @@
 //! The paper's ensemble: both conditions, thirty seeds each, beside the paper's table and the archive's logs.
 
+use crate::draw::{Figure, Layer};
 use crate::ensemble::Run;
 use crate::statistics::{Summary, summarise};
 use serde_json::{Value, json};
@@ -203,6 +204,38 @@ pub fn table(conditions: &[Condition]) -> String {
     }
     out += "diff: (here − theirs) in units of their ±. Window: t ≥ 15 s. Definitions: docs/metrics.md.\n";
     out
+}
+
+/// The table as pictures, by their names: every run, and the paper's mean and ± of each condition as a cross.
+pub fn figures(conditions: &[Condition]) -> Vec<(&'static str, Figure)> {
+    let roll = &ROWS[0];
+    let pictures = [("table1-contact", &ROWS[1]), ("table1-synchrony", &ROWS[3])];
+    pictures
+        .map(|(stem, across)| (stem, figure(conditions, across, roll)))
+        .into()
+}
+
+fn figure(conditions: &[Condition], across: &Row, up: &Row) -> Figure {
+    let mut layers = Vec::new();
+    for (c, condition) in conditions.iter().enumerate() {
+        let of = |run: &Run| Some((run.get(across.name)?, run.get(up.name)?));
+        let points = condition.runs.iter().filter_map(of).collect();
+        layers.push(Layer::points(condition.name, points, c));
+        if let (Some(x), Some(y)) = (across.paper[c], up.paper[c]) {
+            let name = if c == 0 { "paper" } else { "" };
+            let bar =
+                |dx: f64, dy: f64| vec![(x.mean - dx, y.mean - dy), (x.mean + dx, y.mean + dy)];
+            layers.push(Layer::line(name, bar(x.spread, 0.0), 6));
+            layers.push(Layer::line("", bar(0.0, y.spread), 6));
+        }
+    }
+    Figure {
+        title: "Table 1 of the paper: every run, and the paper's mean ± spread".into(),
+        x_label: across.label.into(),
+        y_label: up.label.into(),
+        layers,
+        ..Figure::default()
+    }
 }
 
 /// The result as JSON. `wall_s` is the only number in it that differs from run to run.

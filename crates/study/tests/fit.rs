@@ -103,9 +103,12 @@ fn noise_does_not_bias_the_pull() {
     assert!(held >= 36, "{held}");
 }
 
-/// A scene's columns, its beat hidden or not, and what is found in them.
+/// The columns of a scene, whose settings stand behind its name, its beat hidden or not, and what is found in them.
 fn found_in(scene: &str, hide_the_beat: bool) -> Vec<study::fit::Outcome> {
-    let scene = sim::scene::load(scene, &["solver.energy=false".to_owned()]).unwrap();
+    let mut words = scene.split(' ').map(str::to_owned);
+    let name = words.next().unwrap();
+    let settings: Vec<String> = words.chain(["solver.energy=false".to_owned()]).collect();
+    let scene = sim::scene::load(&name, &settings).unwrap();
     let mut compression_m = vec![Vec::new(); scene.carriers.count()];
     let mut keep = |s: &sim::run::Sample| {
         let each = compression_m.iter_mut().zip(&s.compression_m);
@@ -166,6 +169,24 @@ fn where_the_model_does_not_hold_the_reason_stands() {
         ),
         ("stand-still", false, "stiffness", "stands still"),
         ("stand-still", false, "roll damping", "does not move"),
+        (
+            "music effects.contact.law=\"hunt-crossley\"",
+            false,
+            "stiffness",
+            "another law",
+        ),
+        (
+            "music effects.contact.stiffness_n_per_m=[2000.0,4000.0]",
+            false,
+            "damping",
+            "another law",
+        ),
+        (
+            "music effects.gait.amplitude_m=0.03 effects.contact.stiffness_n_per_m=2500.0 effects.contact.damping_n_s_per_m=300.0",
+            false,
+            "pendulum",
+            "swings with the load",
+        ),
     ] {
         let found = found_in(scene, hide);
         let why = found

@@ -7,7 +7,7 @@ use serde_json::json;
 use sim::scene::load;
 use std::path::PathBuf;
 use study::fit::{Estimate, Field, Outcome, fit};
-use study::statistics::summarise;
+use study::statistics::{student_975, summarise};
 
 /// Arguments of `study fit`.
 #[derive(clap::Args)]
@@ -117,7 +117,7 @@ pub fn run(args: &Args) -> Result<Input> {
                     };
                 }
             }
-            if all.len() > 1 {
+            if all.len() > 1 && !together.is_empty() {
                 text += &format!("mean of {} files\n", all.len());
                 for (e, n) in &together {
                     text += &line(e, &format!("  ({n} files)"));
@@ -137,7 +137,7 @@ fn line(e: &Estimate, after: &str) -> String {
     )
 }
 
-/// Means over the files, with the 95 % interval of the mean from their spread.
+/// Means over the files, with the 95 % interval of the mean by Student's t from their spread; of one file that file's own.
 fn common(all: &[(String, Vec<Outcome>)]) -> Vec<(Estimate, usize)> {
     let mut names: Vec<(&str, &'static str)> = Vec::new();
     for e in all.iter().flat_map(|(_, found)| found.iter().flatten()) {
@@ -148,13 +148,20 @@ fn common(all: &[(String, Vec<Outcome>)]) -> Vec<(Estimate, usize)> {
     names
         .into_iter()
         .filter_map(|(name, unit)| {
-            let of = all.iter().flat_map(|(_, found)| found.iter().flatten());
-            let s = summarise(of.filter(|e| e.name == name).map(|e| e.value))?;
+            let of = || {
+                let all = all.iter().flat_map(|(_, found)| found.iter().flatten());
+                all.filter(|e| e.name == name)
+            };
+            let s = summarise(of().map(|e| e.value))?;
+            if s.runs == 1 {
+                return Some((of().next()?.clone(), 1));
+            }
+            let half = student_975(s.runs - 1) * s.sd / (s.runs as f64).sqrt();
             let estimate = Estimate {
                 name: name.into(),
                 unit,
                 value: s.mean,
-                interval: [s.mean - s.ci95, s.mean + s.ci95],
+                interval: [s.mean - half, s.mean + half],
             };
             Some((estimate, s.runs))
         })

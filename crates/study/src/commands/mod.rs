@@ -156,7 +156,10 @@ fn progress(runs: u64) -> Result<ProgressBar> {
 
 /// Prints a result; a closed pipe is no error of ours.
 fn print(text: &str) -> Result<()> {
-    match std::io::stdout().lock().write_all(text.as_bytes()) {
+    match std::io::stdout()
+        .lock()
+        .write_all(recording::text::plain(text).as_bytes())
+    {
         Err(e) if e.kind() != std::io::ErrorKind::BrokenPipe => Err(e.into()),
         _ => Ok(()),
     }

@@ -6,7 +6,7 @@ use sim::scene::{Scene, load};
 use std::path::PathBuf;
 use std::time::Instant;
 use study::ensemble::{KEPT, Run, run_all};
-use study::paper::{CONDITIONS, Condition, FIRST_SEED, RUNS, table, to_json};
+use study::paper::{CONDITIONS, Condition, FIRST_SEED, RUNS, figures, table, to_json};
 
 /// Arguments of `study paper`.
 #[derive(clap::Args)]
@@ -18,7 +18,7 @@ pub struct Args {
     /// Threads; 0 is one per core. The result does not depend on it.
     #[arg(long, value_name = "N", default_value_t = 0)]
     jobs: usize,
-    /// A folder for the result's files (paper.json, paper.txt, runs.csv).
+    /// A folder for the result's files (paper.json, paper.txt, runs.csv, pictures).
     #[arg(long, value_name = "DIR")]
     out: Option<PathBuf>,
     /// What to print.
@@ -83,6 +83,9 @@ pub fn run(args: &Args) -> Result<()> {
         write_whole(&folder.join("paper.txt"), text.as_bytes())?;
         write_whole(&folder.join("paper.json"), format!("{json:#}\n").as_bytes())?;
         write_whole(&folder.join("runs.csv"), csv(&conditions).as_bytes())?;
+        for (stem, figure) in figures(&conditions) {
+            figure.write(folder, stem).map_err(anyhow::Error::msg)?;
+        }
     }
     let wall_s = began.elapsed().as_secs_f64();
     let result = match args.format {

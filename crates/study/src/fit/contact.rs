@@ -5,12 +5,21 @@ use super::{BLOCK_S, CARRIES, EDGE, Field, KEPT_S, Outcome, budgeted, pair};
 use analyze::imu::budget::Budget;
 use analyze::inputs::{Window, mean_step_s};
 use analyze::mechanism::spline_derivatives;
+use analyze::spectrum::{Options, welch};
+use std::f64::consts::TAU;
 use std::ops::Range;
 
 /// Compression that changes by less is none, m.
 const STILL_M: f64 = 1e-6;
+/// Share of the squared forces that a spring and a damper may leave: to noise of a tenth, and where another law would explain most of it.
+const NOISE: f64 = 0.01;
+const RIGHT: f64 = 1e-4;
 /// Share of the roll's acceleration that may have another cause than a pendulum's.
 const OTHER: f64 = 0.5;
+/// A pendulum whose frequency is that of the load to this part is not told from a roll that is pushed.
+const NEAR: f64 = 0.3;
+/// Length of a segment in which the load's strongest line is looked for, s.
+const LINE_S: f64 = 10.0;
 
 /// Stiffness and damping where contact is kept for a second and longer.
 pub(super) fn contact(field: &Field) -> Result<Vec<Outcome>, String> {
@@ -24,6 +33,8 @@ pub(super) fn contact(field: &Field) -> Result<Vec<Outcome>, String> {
         let step_s = step_s * skip as f64;
         let least = (KEPT_S / step_s).ceil() as usize;
         let mut blocks: Vec<Block<2>> = Vec::new();
+        // The same with a damper that grows with the compression.
+        let mut bent: Vec<Block<3>> = Vec::new();
         for (normal, gap) in i.normal_n.iter().zip(&field.compression_m) {
             let n: Vec<f64> = normal.iter().step_by(skip).copied().collect();
             let d: Vec<f64> = gap.iter().step_by(skip).copied().collect();
@@ -32,17 +43,20 @@ pub(super) fn contact(field: &Field) -> Result<Vec<Outcome>, String> {
                 let length = n[from..].iter().take_while(|x| **x > 0.0).count();
                 if length >= least.max(2 * EDGE + 2) {
                     if let Some((rate, _)) = spline_derivatives(&d[from..from + length], step_s) {
-                        let mut block = Block::empty();
+                        let (mut block, mut other) = (Block::empty(), Block::empty());
                         for k in EDGE..length - EDGE {
-                            block.add([d[from + k], rate[k]], n[from + k]);
+                            let (x, v) = (d[from + k], rate[k]);
+                            block.add([x, v], n[from + k]);
+                            other.add([x, v, x * v], n[from + k]);
                         }
                         blocks.push(block);
+                        bent.push(other);
                     }
                 }
                 from += length.max(1);
             }
         }
-        blocks
+        (blocks, bent)
     };
     let moved = field.compression_m.iter().flatten();
     let (least, most) = moved.fold((f64::INFINITY, f64::NEG_INFINITY), |(a, b), x| {
@@ -51,10 +65,18 @@ pub(super) fn contact(field: &Field) -> Result<Vec<Outcome>, String> {
     if !(most - least > STILL_M) {
         return Err("the load stands still".into());
     }
-    let blocks = sums(1);
+    let (blocks, bent) = sums(1);
     let why = || "contact is never kept for a second".to_owned();
     let (value, interval) = bootstrapped(&blocks, |p| [p[0], p[1]]).ok_or_else(why)?;
-    let coarse = solve(&sums(2), |k| k).map_or(value, |p| [p[0], p[1]]);
+    let left = unexplained(&blocks).unwrap_or(1.0);
+    let is_bent = unexplained(&bent).is_some_and(|l| l < 0.25 * left);
+    if left > NOISE || (left > RIGHT && is_bent) {
+        return Err(format!(
+            "the handles do not push as one spring with one damper: {:.2} % of their force has another law",
+            100.0 * left
+        ));
+    }
+    let coarse = solve(&sums(2).0, |k| k).map_or(value, |p| [p[0], p[1]]);
     let interval = std::array::from_fn(|p| {
         let sampling = (coarse[p] - value[p]).abs();
         [interval[p][0] - sampling, interval[p][1] + sampling]
@@ -215,6 +237,23 @@ pub(super) fn pendulum(field: &Field, window: Window) -> Result<Vec<Outcome>, St
         return Err(format!(
             "the roll does not swing as a pendulum: {:.0} % of its acceleration has another cause",
             100.0 * other
+        ));
+    }
+    // Any roll that is pushed at one frequency is θ̈ ∝ −θ, and would pass for a pendulum of that frequency.
+    let mean_n = total.iter().sum::<f64>() / total.len() as f64;
+    let own_hz = (value[0] * mean_n).max(0.0).sqrt() / TAU;
+    let load_hz = welch(total, 1.0 / step_s, &Options::seconds(LINE_S, 1.0 / step_s))
+        .ok()
+        .and_then(|s| s.peak_hz());
+    if let Some(load_hz) = load_hz.filter(|f| (own_hz / f - 1.0).abs() < NEAR) {
+        return Err(format!(
+            "the roll swings with the load ({load_hz:.2} Hz), and what is pushed at one frequency does not tell its own"
+        ));
+    }
+    if interval[1][1] < 0.0 {
+        return Err(format!(
+            "the roll does not swing as a pendulum: it gains energy from another cause (damping {:.2} 1/s)",
+            value[1]
         ));
     }
     let names = [("pendulum", "1/(kg·m)"), ("roll damping", "1/s")];

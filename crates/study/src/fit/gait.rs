@@ -34,20 +34,30 @@ pub(super) fn gait(field: &Field) -> Result<Vec<Outcome>, String> {
         tau => 1.0 - (-(t - field.onset_s) / tau).exp(),
     });
     let problem = Increments {
-        t_s,
+        t_s: t_s.to_vec(),
         phases,
         grown: grown.collect(),
     };
-    if heard.iter().filter(|psi| psi.is_finite()).count() >= 100 {
-        problem.under_a_beat(&heard)
-    } else {
-        problem.under_a_hidden_beat()
-    }
+    let solved = |problem: &Increments, heard: &[f64]| match known(heard) {
+        true => problem.under_a_beat(heard),
+        false => problem.under_a_hidden_beat(),
+    };
+    let found = solved(&problem, &heard)?;
+    let every_other: Vec<f64> = heard.iter().step_by(2).copied().collect();
+    let coarse = (known(&every_other) == known(&heard))
+        .then(|| solved(&problem.every_other(), &every_other).ok())
+        .flatten();
+    problem.told(found, coarse.map(|c| c.answer))
+}
+
+/// Whether the beat was recorded for long enough.
+fn known(heard: &[f64]) -> bool {
+    heard.iter().filter(|psi| psi.is_finite()).count() >= 100
 }
 
 /// Phases of the carriers after the onset of the music, and how far its pull has grown.
-struct Increments<'a> {
-    t_s: &'a [f64],
+struct Increments {
+    t_s: Vec<f64>,
     phases: Vec<Vec<f64>>,
     grown: Vec<f64>,
 }
@@ -67,6 +77,13 @@ struct Answer {
     rate: f64,
     pull: (f64, f64),
     own: Vec<(f64, f64)>,
+}
+
+/// An answer, the problem about it, and how many unknowns it had.
+struct Solved {
+    answer: Answer,
+    normal: Normal,
+    unknowns: usize,
 }
 
 /// A linear problem about a drive. Unknowns: A, B, Ω, ω_1 …
@@ -101,7 +118,17 @@ const ALIKE: f64 = 0.2;
 /// A pull that is not so many standard errors is none: the best of many frequencies has some by chance.
 const SURE: f64 = 6.0;
 
-impl Increments<'_> {
+impl Increments {
+    /// The same at half the rate: what comes out differently is what the sampling does.
+    fn every_other(&self) -> Self {
+        let thin = |x: &Vec<f64>| x.iter().step_by(2).copied().collect();
+        Self {
+            t_s: thin(&self.t_s),
+            phases: self.phases.iter().map(thin).collect(),
+            grown: thin(&self.grown),
+        }
+    }
+
     fn unknowns(&self) -> usize {
         3 + self.phases.len()
     }
@@ -166,8 +193,8 @@ impl Increments<'_> {
     }
 
     /// Where the beat was recorded: everything but its tempo is linear.
-    fn under_a_beat(&self, heard: &[f64]) -> Result<Vec<Outcome>, String> {
-        let (t_s, psi) = longest_heard(self.t_s, heard).ok_or("no beat")?;
+    fn under_a_beat(&self, heard: &[f64]) -> Result<Solved, String> {
+        let (t_s, psi) = longest_heard(&self.t_s, heard).ok_or("no beat")?;
         let (omega, omega_half) = tempo(&t_s, &unwrap(&psi));
         let carriers = self.phases.len();
         // Of the unknowns A and the own frequencies.
@@ -207,12 +234,16 @@ impl Increments<'_> {
             pull: (drive.a, cover[(0, 0)]),
             own: own.map(|(c, w)| (w, cover[(1 + c, 1 + c)])).collect(),
         };
-        self.told(answer, &found, keep.len())
+        Ok(Solved {
+            answer,
+            normal: found,
+            unknowns: keep.len(),
+        })
     }
 
     /// Where nobody recorded the beat: its tempo and phase are looked for.
-    fn under_a_hidden_beat(&self) -> Result<Vec<Outcome>, String> {
-        let (t_s, phases) = (self.t_s, &self.phases);
+    fn under_a_hidden_beat(&self) -> Result<Solved, String> {
+        let (t_s, phases) = (&self.t_s, &self.phases);
         let (n, carriers, size) = (t_s.len(), phases.len(), self.unknowns());
         let middle = 0.5 * (t_s[0] + t_s[n - 1]);
         let from_middle = |k: usize| t_s[k] - middle;
@@ -290,29 +321,45 @@ impl Increments<'_> {
             pull: (pull, pull_variance),
             own: own.map(|(c, w)| (w, cover[(3 + c, 3 + c)])).collect(),
         };
-        self.told(answer, &found, size)
+        Ok(Solved {
+            answer,
+            normal: found,
+            unknowns: size,
+        })
     }
 
-    /// Everything that was found, or why it is nothing.
-    fn told(
-        &self,
-        answer: Answer,
-        found: &Normal,
-        unknowns: usize,
-    ) -> Result<Vec<Outcome>, String> {
+    /// Everything that was found, or why it is nothing. `coarse` came of every other sample.
+    fn told(&self, found: Solved, coarse: Option<Answer>) -> Result<Vec<Outcome>, String> {
+        let Solved {
+            answer,
+            normal: found,
+            unknowns,
+        } = found;
         let step_s = (self.t_s[self.t_s.len() - 1] - self.t_s[0]) / (self.t_s.len() - 1) as f64;
         let (pull, pull_variance) = answer.pull;
         // What the mean of both ends of an increment is off, where a carrier runs at another rate than the beat.
         let off = |w: f64| pull * ((w - answer.rate) * step_s).powi(2) / 12.0;
         let rough = answer.own.iter().map(|(w, _)| off(*w)).fold(0.0, f64::max);
-        let pull_half = half(pull_variance).hypot(rough);
+        // A mean of both ends errs with the square of the step: every other sample by four times as much, so half of what that changes
+        // is one and a half times the error.
+        let sampling = |of: &dyn Fn(&Answer) -> f64| {
+            coarse
+                .as_ref()
+                .map_or(0.0, |c| 0.5 * (of(c) - of(&answer)).abs())
+        };
+        let pull_sampling = sampling(&|a| a.pull.0);
+        let own_sampling: Vec<f64> = (0..answer.own.len())
+            .map(|c| sampling(&|a| a.own[c].0))
+            .collect();
+        let by_chance = half(pull_variance).hypot(rough);
+        let pull_half = by_chance + pull_sampling;
         if !found.is_white(pull.abs(), step_s) {
             return Err(format!(
                 "the phases do not follow one beat: what it leaves of one increment is like the next (by {:.2})",
                 found.with_next / found.squares
             ));
         }
-        if !(pull > SURE / 1.96 * pull_half) {
+        if !(pull > SURE / 1.96 * by_chance) {
             return Err(format!(
                 "no pull shows in the phases (at most {:.2} rad/s)",
                 pull.max(0.0) + pull_half
@@ -321,7 +368,8 @@ impl Increments<'_> {
         let mut out = vec![answer.beat, estimate("pull", "rad/s", pull, pull_half)];
         for (c, (w, variance)) in answer.own.into_iter().enumerate() {
             let name = format!("gait {}", c + 1);
-            out.push(estimate(name, "Hz", w / TAU, half(variance) / TAU));
+            let half = half(variance) + own_sampling[c];
+            out.push(estimate(name, "Hz", w / TAU, half / TAU));
         }
         // The noise: its variance has itself a known spread.
         let rows = found.rows as f64;

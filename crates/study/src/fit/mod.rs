@@ -10,7 +10,8 @@
 //! φ_i gait phases (rad), Ω = 2π·beat, ω_i own frequencies [rad/s], K pull of the music [rad/s]; t₀, τ its onset and build-up (s),
 //! taken from a scene. Where the beat's phase was recorded it takes the place of Ωt + ψ₀. Increments of φ carry white noise, so least squares (Gauss and Newton) gives the interval of Ω, K, ω_i
 //! by itself; sines are the mean of both ends of an increment, the end as expected from its beginning (a predictor: the observed one would
-//! hold the increment's own noise), an error of (ω_i − Ω)²Δt²/12 of K, which the interval holds.
+//! hold the increment's own noise), an error of (ω_i − Ω)²Δt²/12 of K, which the interval holds, with half of what K and ω_i change by when
+//! every other sample is left out.
 //! k, c, a, b: linear least squares on derivatives of the not-a-knot spline, their intervals from a moving-block bootstrap (500
 //! draws, blocks of two roll periods), because neighbours are alike. Where steps tell the phases, pull and gait are those of Adler's test
 //! ([`analyze::beat::adler`]), which knows that a step detector smooths them and finds τ by itself. Contact adds what k and c change by when every other

@@ -119,7 +119,7 @@ pub fn run(lab: &Lab) -> Result<Finding, String> {
         _ => Verdict::Depends,
     };
     let line = |k: usize| curves[k].iter().map(|p| (p.0, p.1)).collect::<Vec<_>>();
-    let mark = |x: f64, colour| Layer::dashed("", vec![(x, 0.0), (x, 70.0)], colour);
+    let mark = |x: f64, colour| Layer::dashed("", vec![(x, 0.0), (x, 100.0)], colour);
     Ok(Finding {
         title: "2. Coherence and amplitude",
         claim: "Increased phase coherence among carriers should correlate with increased roll amplitude only when unilateral contact loss occurs; otherwise coherence may not produce rocking.",
@@ -171,7 +171,7 @@ pub fn run(lab: &Lab) -> Result<Finding, String> {
             ),
             (
                 "coherence-depth",
-                "Roll of coherent carriers against the depth of their common lift; broken: the linear thresholds (orange at the paper's beat, blue at the tuned beat) and, grey, where contact begins to be lost.".into(),
+                "Roll of coherent carriers against the depth of their common lift; broken: the linear thresholds (orange at the paper's beat, blue at the tuned beat) and, grey, where contact begins to be lost. At 90° the rath has tipped over.".into(),
                 Figure {
                     title: "Depth of the common lift and roll".into(),
                     x_label: "depth of load modulation m".into(),
@@ -186,7 +186,7 @@ pub fn run(lab: &Lab) -> Result<Finding, String> {
                         mark(thresholds[1], 0),
                     ],
                     x_range: Some((0.1, 1.7)),
-                    y_range: Some((0.0, 70.0)),
+                    y_range: Some((0.0, 100.0)),
                 },
             ),
         ],

@@ -118,6 +118,7 @@ pub fn run(lab: &Lab) -> Result<Finding, String> {
         .filter(|(_, t)| t[0].is_finite())
         .map(|(a, t)| (1e3 * a, t[0]))
         .collect();
+    let latest_s = band.iter().map(|b| b.2).fold(0.0, f64::max);
     Ok(Finding {
         title: "5. Onset statistics",
         claim: "The distribution of onset times should broaden near critical parameter values, consistent with noise-induced switching in a nonlinear system.",
@@ -195,8 +196,8 @@ pub fn run(lab: &Lab) -> Result<Finding, String> {
                         Layer::line("not random", calm_curve, 1),
                         Layer::dashed("", vec![(critical, 0.0), (critical, DURATION_S)], 6),
                     ],
-                    y_range: Some((0.0, DURATION_S)),
-                    ..Figure::default()
+                    x_range: Some((1e3 * amplitudes[0], 1e3 * amplitudes[amplitudes.len() - 1])),
+                    y_range: Some((0.0, 1.05 * latest_s)),
                 },
             ),
             (

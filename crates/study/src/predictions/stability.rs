@@ -176,7 +176,7 @@ pub fn run(lab: &Lab) -> Result<Finding, String> {
         y_label: "load modulation depth m".into(),
         layers: vec![
             Layer::Map {
-                label: "growth, 1/s (at most 1)".into(),
+                label: "growth in 1/s, shown within ±1".into(),
                 values,
                 x: x_range,
                 y: y_range,

@@ -126,18 +126,26 @@ fn map(plan: &Plan, label: &str, points: &[(Vec<Cell>, Vec<f64>)]) -> Option<Fig
     let ends = |axis: &super::spec::Axis| {
         let (a, b) = (axis.at(0.0), axis.at(1.0));
         let half = 0.5 * (b - a) / (axis.len() - 1) as f64;
-        (a - half, b + half)
+        (f64::min(a - half, b + half), f64::max(a - half, b + half))
     };
+    let falls = |axis: &super::spec::Axis| axis.at(1.0) < axis.at(0.0);
+    let mut values: Vec<Vec<f64>> = means
+        .chunks(x.len() as usize)
+        .map(<[f64]>::to_vec)
+        .collect();
+    if falls(y) {
+        values.reverse();
+    }
+    if falls(x) {
+        values.iter_mut().for_each(|row| row.reverse());
+    }
     Some(Figure {
         title: label.into(),
         x_label: x.name.clone(),
         y_label: y.name.clone(),
         layers: vec![Layer::Map {
             label: label.into(),
-            values: means
-                .chunks(x.len() as usize)
-                .map(<[f64]>::to_vec)
-                .collect(),
+            values,
             x: ends(x),
             y: ends(y),
         }],

@@ -484,13 +484,29 @@ fn try_axis(axis: &spec::Axis, template: &Template) -> Result<(), String> {
     let whole = template
         .value(&axis.key)
         .is_some_and(toml::Value::is_integer);
+    if let (true, Some(broken)) = (
+        whole,
+        axis.values
+            .iter()
+            .find(|v| number(v).is_some_and(|x| x.fract() != 0.0)),
+    ) {
+        return Err(format!(
+            "axis `{}`: found {broken}, expected whole numbers",
+            axis.key
+        ));
+    }
     let mut why = Ok(());
     for value in ends {
         let value = match value {
             toml::Value::Float(x) if whole => toml::Value::Integer(x.round() as i64),
             other => other,
         };
-        match template.with([(axis.key.as_str(), value)]) {
+        let along = flatten(&axis.along);
+        let along = along.iter().filter_map(|(key, factor)| {
+            Some((key.as_str(), (number(&value)? * number(factor)?).into()))
+        });
+        let own = [(axis.key.as_str(), value.clone())];
+        match template.with(own.into_iter().chain(along)) {
             Ok(_) => return Ok(()),
             Err(error) => why = why.and(Err(format!("axis `{}`: {error}", axis.key))),
         }

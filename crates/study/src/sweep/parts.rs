@@ -13,6 +13,7 @@ use super::summary::{Found, Summary};
 use super::table::{Cell, Notes, Reader, Writer};
 use crate::pool::{in_order, threads};
 use parquet::errors::ParquetError;
+use recording::whole::Sink;
 use sim::record::VERSION;
 use std::io::{BufWriter, Write};
 use std::ops::Range;
@@ -83,23 +84,34 @@ impl<'p> Store<'p> {
     /// Makes the folder and writes the study into it.
     ///
     /// # Errors
-    /// What the system says; that the folder holds parts of another study.
+    /// What the system says; that the folder holds parts of another study, or files of these names that are no study's.
     pub fn create(&self) -> Outcome<()> {
         let parts = self.folder.join("parts");
+        let ours = parts.is_dir();
         let held = std::fs::read_dir(&parts).is_ok_and(|mut entries| entries.next().is_some());
-        std::fs::create_dir_all(&parts)
-            .map_err(|e| format!("{}: cannot be made: {e}", parts.display()))?;
-        for (name, text) in [
+        let files = [
             ("study.toml", self.plan.text()),
             ("scene.toml", self.plan.scene_text().to_owned()),
-        ] {
+        ];
+        for (name, text) in &files {
             let path = self.folder.join(name);
-            if held && std::fs::read(&path).is_ok_and(|found| found != text.as_bytes()) {
-                return Err(format!(
-                    "{}: is of another study, whose parts are there; choose another --out, or delete the folder",
-                    path.display()
-                ));
+            let other = std::fs::read(&path).is_ok_and(|found| found != text.as_bytes());
+            if other && (held || !ours) {
+                let what = match held {
+                    true => {
+                        "is of another study, whose parts are there; choose another --out, or delete the folder"
+                    }
+                    false => {
+                        "is there already, and this study would write its own there; choose another --out"
+                    }
+                };
+                return Err(format!("{}: {what}", path.display()));
             }
+        }
+        std::fs::create_dir_all(&parts)
+            .map_err(|e| format!("{}: cannot be made: {e}", parts.display()))?;
+        for (name, text) in &files {
+            let path = self.folder.join(name);
             write_whole(&path, |file| Ok(file.write_all(text.as_bytes())?))?;
         }
         if self.plan.spec.recordings {
@@ -256,27 +268,43 @@ impl<'p> Store<'p> {
             ));
         }
         let mut found = Err("nothing was merged".to_owned());
-        write_whole(&self.folder.join("summary.csv"), |csv| {
+        let mut damaged = None;
+        let written = write_whole(&self.folder.join("summary.csv"), |csv| {
             let mut summary = Summary::new(self.plan, BufWriter::new(csv))?;
-            write_whole(&self.table(), |file| self.merge_into(file, &mut summary))
-                .map_err(ParquetError::General)?;
+            write_whole(&self.table(), |file| {
+                self.merge_into(file, &mut summary, &mut damaged)
+            })
+            .map_err(ParquetError::General)?;
             found = Ok(summary.finish()?);
             Ok(())
-        })?;
-        found
+        });
+        match damaged {
+            Some(part) => Err(part),
+            None => written.and(found),
+        }
     }
 
     fn merge_into<W: Write>(
         &self,
-        file: &mut std::fs::File,
+        file: &mut Sink,
         summary: &mut Summary<W>,
+        damaged: &mut Option<String>,
     ) -> Result<(), ParquetError> {
         let mut writer = Writer::new(file, self.plan.columns(), &self.notes())?;
         let mut rows: Vec<Vec<Cell>> = Vec::new();
         for block in 0..self.plan.blocks() {
-            let part = Reader::open(&self.part(block))?;
+            let path = self.part(block);
+            let mut named = |e: ParquetError| {
+                *damaged = Some(format!(
+                    "{}: is damaged ({e}); delete it, and `study {} --resume` computes it again",
+                    path.display(),
+                    self.folder.join("study.toml").display()
+                ));
+                e
+            };
+            let part = Reader::open(&path).map_err(&mut named)?;
             for group in 0..part.groups() {
-                for row in part.group(group)? {
+                for row in part.group(group).map_err(&mut named)? {
                     summary.row(&row)?;
                     rows.push(row);
                     if rows.len() == GROUP_ROWS {
@@ -299,7 +327,7 @@ impl<'p> Store<'p> {
 /// What the system or the table's library says.
 pub fn write_whole(
     path: &Path,
-    fill: impl FnOnce(&mut std::fs::File) -> Result<(), ParquetError>,
+    fill: impl FnOnce(&mut Sink) -> Result<(), ParquetError>,
 ) -> Outcome<()> {
     enum Trouble {
         Io(std::io::Error),

@@ -142,6 +142,9 @@ fn check(spec: &mut Spec) -> Result<(), String> {
             return Err(format!("metrics: `{name}` stands twice"));
         }
     }
+    if spec.set.contains_key("seed") {
+        return Err("set.seed: seeds have lines of their own, `seeds` and `first_seed`".into());
+    }
     for k in 0..spec.axes.len() {
         let axis = &mut spec.axes[k];
         if axis.name.is_empty() {
@@ -152,11 +155,9 @@ fn check(spec: &mut Spec) -> Result<(), String> {
         let taken = super::FIXED_COLUMNS.contains(&name.as_str())
             || spec.metrics.contains(name)
             || spec.axes[..k].iter().any(|a| a.name == *name);
-        let key = &spec.axes[k].key;
-        if let Some(before) = spec.axes[..k].iter().find(|a| a.key == *key) {
+        if let Some((key, other, before)) = said_twice(&spec.axes[..=k]) {
             return Err(format!(
-                "axes.{k}: `{key}` is the key of axis `{}` already; one of the two would not count",
-                before.name
+                "axes.{k}: `{key}` stands beside `{other}` of axis `{before}`; one of the two would not count"
             ));
         }
         if taken {
@@ -196,6 +197,34 @@ fn check(spec: &mut Spec) -> Result<(), String> {
         }
         _ => Ok(()),
     }
+}
+
+/// A key of the last axis, with what goes along, that sets what another key sets as well: both, and the other's axis.
+fn said_twice(axes: &[Axis]) -> Option<(String, String, &str)> {
+    let keys = |axis: &Axis| {
+        let along = flatten(&axis.along).into_iter().map(|(key, _)| key);
+        [axis.key.clone()]
+            .into_iter()
+            .chain(along)
+            .collect::<Vec<_>>()
+    };
+    let within = |inner: &str, outer: &str| {
+        inner
+            .strip_prefix(outer)
+            .is_some_and(|rest| rest.is_empty() || rest.starts_with('.'))
+    };
+    let (last, before) = axes.split_last()?;
+    let own = keys(last);
+    for (k, key) in own.iter().enumerate() {
+        let earlier = before
+            .iter()
+            .flat_map(|a| keys(a).into_iter().map(|o| (o, &*a.name)));
+        let mut others = earlier.chain(own[..k].iter().map(|o| (o.clone(), &*last.name)));
+        if let Some((other, name)) = others.find(|(o, _)| within(key, o) || within(o, key)) {
+            return Some((key.clone(), other, name));
+        }
+    }
+    None
 }
 
 /// The most axes that a design samples: Sobol's sequence needs two dimensions for each in a sensitivity study.

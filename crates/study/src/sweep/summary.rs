@@ -85,7 +85,7 @@ pub struct Found {
     pub metrics: Vec<String>,
     /// One for each of them.
     pub ranges: Vec<Range>,
-    /// Means of every point, for a study of sensitivity.
+    /// Means of every point whose runs all have the metric, for a study of sensitivity.
     pub means: Vec<Vec<Option<f64>>>,
     /// Points.
     pub points: u64,
@@ -193,7 +193,9 @@ impl<W: Write> Summary<W> {
                 None => write!(out, ",,,,,,0")?,
             }
             if self.keeps_means {
-                means.push(spread.map(|s| s.mean));
+                // A mean over some of a point's runs is another quantity than one over all.
+                let all = spread.filter(|s| s.runs as u64 == self.seeds);
+                means.push(all.map(|s| s.mean));
             }
             values.clear();
         }
