@@ -37,7 +37,7 @@ fn the_shares_of_the_effects_are_all_that_is_booked() {
     let scene = load("music", &[effects.to_owned(), "duration_s=20.0".into()]).unwrap();
     let model = sim::model::Model::new(&scene);
     let names: Vec<&str> = model.accounts().collect();
-    assert_eq!(names, ["contact", "hold"]);
+    assert_eq!(names, ["contact", "hold", "pole_friction"]);
     let mut last = None;
     run(&scene, &mut |s: &Sample| {
         let e = s.energy.expect("the default keeps a ledger");

@@ -341,14 +341,13 @@ fn synchrony(take: &Take) -> Option<(String, Vec<Line<'_>>)> {
         } else {
             &[]
         };
+        // Of r at a moment for phases of a model, of the mean of r for phases that steps tell.
+        let what = match take.inputs.phases_are_measured {
+            true => "95 % of the mean by chance",
+            false => "95 % of chance",
+        };
         for (entity, value) in ["band_low", "band_high"].into_iter().zip(band) {
-            lines.extend(Line::level(
-                entity,
-                "95 % of chance",
-                palette::GRID,
-                times,
-                *value,
-            ));
+            lines.extend(Line::level(entity, what, palette::GRID, times, *value));
         }
         lines.extend(Line::level(
             "chance",
