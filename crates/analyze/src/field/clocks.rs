@@ -4,6 +4,7 @@
 
 use crate::clock::{Clock, ClockError, from_events, from_signals, taps};
 use crate::imu::Track;
+use crate::imu::track::period_s;
 use crate::quality::Quality;
 
 /// Fewer taps than this set no clock: two may be chance.
@@ -58,7 +59,12 @@ impl Clocks {
         }
         let tap_s = felt(track);
         let fit = from_events(&tap_s, &self.tap_s, SEARCH_S, TOLERANCE_S);
-        if let Some(clock) = self.found(topic, fit, tap_s.len().min(self.tap_s.len())) {
+        if let Some(mut clock) = self.found(topic, fit, tap_s.len().min(self.tap_s.len())) {
+            // A tap falls anywhere between two samples, of either sensor; the scatter does not show it where both samplings keep step.
+            let spread_s = |t_s: &[f64]| period_s(t_s).unwrap_or_default() / 12f64.sqrt();
+            let sampled_s = spread_s(&track.t_s).hypot(spread_s(&self.turning.0));
+            let floor_s = sampled_s / (clock.points as f64).sqrt();
+            clock.offset_sd_s = clock.offset_sd_s.max(floor_s);
             self.say(topic, &clock, clock.ahead());
             for t in &mut track.t_s {
                 *t = clock.reference_s(*t);
