@@ -485,6 +485,10 @@ impl<'a> Pass<'a> {
                     if rows.is_some() && entry.times.is_none() {
                         entry.times = Some(Times::default());
                     }
+                    // A topic may come on several channels.
+                    if batch.channel != entry.channel && entry.times.is_none() {
+                        entry.times = Some(self.times[entry.channel].clone());
+                    }
                     if let Some(own) = &mut entry.times {
                         own.push(times);
                     }

@@ -229,6 +229,13 @@ fn window_signal_and_topic_narrow_what_is_told() {
         "*.orientation.yaw",
     ]);
     assert_eq!(v["window_s"], serde_json::json!([15.0, 30.0]));
+    // The window is the signals' too: 30 s at 30 Hz, both ends.
+    let roll = &v["signals"]["/rath/state.roll_rad"];
+    assert_eq!(roll["count"], 901);
+    assert!(
+        (roll["peak_hz"].as_f64().unwrap() - 1.0).abs() < 0.05,
+        "{roll}"
+    );
     let names: Vec<&String> = v["signals"].as_object().unwrap().keys().collect();
     assert_eq!(
         names,
@@ -492,6 +499,57 @@ fn nobody_has_to_listen() {
             .unwrap();
         assert_eq!(status.code(), Some(code), "{}", file.display());
     }
+}
+
+/// A topic on two channels, whose messages are bare numbers, two of them at each time.
+#[test]
+fn a_topic_is_told_of_as_a_whole() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("bare.mcap");
+    let mut w = RecordingWriter::create(&path, &WriterOptions::default()).unwrap();
+    let mut channel = |sequence: &str| {
+        w.raw_channel(&recording::write::RawChannel {
+            topic: "/n",
+            message_encoding: "json",
+            schema_name: "",
+            schema_encoding: "",
+            schema_data: &[],
+            metadata: &[("part".to_owned(), sequence.to_owned())].into(),
+        })
+        .unwrap()
+    };
+    let channels = ["a", "b"].map(&mut channel);
+    for k in 0..1000i64 {
+        for channel in channels {
+            w.message(channel, k * 10_000_000, k.to_string().as_bytes())
+                .unwrap();
+        }
+    }
+    w.finish().unwrap();
+    let file = path.to_str().unwrap();
+    let found = json(&[file, "--format", "json", "--topic", "/n"]);
+    let n = &found["signals"]["/n"];
+    assert_eq!(n["count"], 2000);
+    assert!((n["hz"].as_f64().unwrap() - 200.0).abs() < 0.2, "{n}");
+    // A table has one row a time, and says what has none; a pattern that nothing fits is said beside one that fits.
+    let table = folder.path().join("n.csv");
+    let out = analyze(&[
+        file,
+        "--signal",
+        "/n",
+        "--signal",
+        "/m",
+        "--out",
+        table.to_str().unwrap(),
+    ]);
+    let said = text(&out.stderr);
+    assert!(out.status.success(), "{said}");
+    assert!(
+        said.contains("1000 messages have no row") && said.contains("fits /m"),
+        "{said}"
+    );
+    let rows = std::fs::read_to_string(&table).unwrap().lines().count();
+    assert_eq!(rows, 1001);
 }
 
 /// A quaternion that a topic's first messages lack.

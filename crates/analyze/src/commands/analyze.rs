@@ -126,6 +126,11 @@ fn one(path: &Path, args: &AnalyzeArgs, request: &Request) -> anyhow::Result<Ana
     if analysis.is_empty() {
         bail!("{}", nothing(&analysis, request));
     }
+    for pattern in &request.signals {
+        if !(analysis.signals.iter()).any(|(path, _)| analyze::roles::matches(pattern, path)) {
+            recording::note!("analyze: {name}: no numeric signal fits {pattern}");
+        }
+    }
     if let Some(out) = &args.out {
         let overlaid = analyze::table::write(&recording, request, args.downsample, out)?;
         if overlaid > 0 {

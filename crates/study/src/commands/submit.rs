@@ -93,9 +93,9 @@ pub fn run(args: &Args) -> Result<()> {
     command.arg("--parsable").args(&args.options).arg(&job);
     if args.dry_run {
         recording::note!("{} is written; nothing was submitted", job.display());
-        return print(
-            &format!("sbatch {} {}\n", args.options.join(" "), job.display()).replace("  ", " "),
-        );
+        let options = args.options.iter().map(|o| word(Path::new(o)));
+        let line: Vec<String> = options.chain([word(&job)]).collect();
+        return print(&format!("sbatch {}\n", line.join(" ")));
     }
     match command.output() {
         Ok(done) if done.status.success() => {
@@ -125,6 +125,16 @@ pub fn run(args: &Args) -> Result<()> {
 /// A path for the shell, quoted.
 fn shell(path: &Path) -> String {
     format!("'{}'", path.display().to_string().replace('\'', "'\\''"))
+}
+
+/// The same, quoted only where it has to be.
+fn word(path: &Path) -> String {
+    let text = path.display().to_string();
+    let plain = |c: char| c.is_ascii_alphanumeric() || "_./-=:,%+".contains(c);
+    match !text.is_empty() && text.chars().all(plain) {
+        true => text,
+        false => shell(path),
+    }
 }
 
 /// A path in an `#SBATCH` line, which knows double quotes only.

@@ -32,6 +32,7 @@ pub(super) fn contact(field: &Field) -> Result<Vec<Outcome>, String> {
     let sums = |skip: usize| {
         let step_s = step_s * skip as f64;
         let least = (KEPT_S / step_s).ceil() as usize;
+        let per_block = (BLOCK_S / step_s).round().max(1.0) as usize;
         let mut blocks: Vec<Block<2>> = Vec::new();
         // The same with a damper that grows with the compression.
         let mut bent: Vec<Block<3>> = Vec::new();
@@ -43,14 +44,18 @@ pub(super) fn contact(field: &Field) -> Result<Vec<Outcome>, String> {
                 let length = n[from..].iter().take_while(|x| **x > 0.0).count();
                 if length >= least.max(2 * EDGE + 2) {
                     if let Some((rate, _)) = spline_derivatives(&d[from..from + length], step_s) {
-                        let (mut block, mut other) = (Block::empty(), Block::empty());
                         for k in EDGE..length - EDGE {
+                            if (k - EDGE).is_multiple_of(per_block) {
+                                blocks.push(Block::empty());
+                                bent.push(Block::empty());
+                            }
                             let (x, v) = (d[from + k], rate[k]);
-                            block.add([x, v], n[from + k]);
-                            other.add([x, v, x * v], n[from + k]);
+                            if let (Some(block), Some(other)) = (blocks.last_mut(), bent.last_mut())
+                            {
+                                block.add([x, v], n[from + k]);
+                                other.add([x, v, x * v], n[from + k]);
+                            }
                         }
-                        blocks.push(block);
-                        bent.push(other);
                     }
                 }
                 from += length.max(1);
