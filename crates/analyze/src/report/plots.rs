@@ -277,7 +277,8 @@ pub fn plots(a: &Analysis) -> Vec<Plot> {
         .into_iter()
         .chain(force_plane(a))
         .for_each(&mut panel);
-    for trace in a.traces.iter().filter(|t| t.topic != topics::ENERGY) {
+    // The account has panels of its own; what each effect did is a sum since the start, which the table of signals tells.
+    for trace in (a.traces.iter()).filter(|t| !t.topic.starts_with(topics::ENERGY)) {
         let mut p = Panel::over_time("signals", &trace.topic, &unit(&trace.label), a);
         // That beats are counted is no curve.
         let counts = |name: &str| trace.topic == topics::BEAT && name == "number";
