@@ -14,7 +14,7 @@ use crate::peaks::SpectrumSummary;
 use crate::phase::{unwrap, wrap};
 use crate::quality::Quality;
 use crate::quaternion::Quaternions;
-use crate::roles::{Role, Roles, RolesFile, matches};
+use crate::roles::{Role, Roles, RolesFile, matches, of_topic};
 use crate::summary::{Stream, Summary, Times, segment};
 
 /// What is asked of a recording.
@@ -41,6 +41,17 @@ impl Request {
     pub fn lists(&self, topic: &str, path: &str) -> bool {
         (self.topics.is_empty() || self.topics.iter().any(|p| matches(p, topic)))
             && (self.signals.is_empty() || self.signals.iter().any(|p| matches(p, path)))
+    }
+
+    /// The same where the topic is not known apart from the path.
+    pub(crate) fn lists_path(&self, path: &str) -> bool {
+        (self.topics.is_empty() || self.topics.iter().any(|t| of_topic(t, path)))
+            && (self.signals.is_empty() || self.signals.iter().any(|p| matches(p, path)))
+    }
+
+    /// Whether a moment is in the window that was asked for, s.
+    pub(crate) fn holds(&self, t_s: f64) -> bool {
+        self.window.0.is_none_or(|a| t_s >= a) && self.window.1.is_none_or(|b| t_s <= b)
     }
 }
 
@@ -265,13 +276,7 @@ fn estimates(
 
 /// Whether a field has to be decoded: it is listed, plays a role, or is part of a quaternion whose angles are or do.
 fn wanted(path: &str, request: &Request, roles: &Roles) -> bool {
-    // The topic is not known apart from the path here; a topic filter without wildcards is a prefix of it.
-    let listed = |path: &str| {
-        let of = |topic: &String| crate::roles::of_topic(topic, path);
-        let topic = request.topics.is_empty() || request.topics.iter().any(of);
-        topic && (request.signals.is_empty() || request.signals.iter().any(|p| matches(p, path)))
-    };
-    let wants = |path: &str| listed(path) || roles.of_signal(path).is_some();
+    let wants = |path: &str| request.lists_path(path) || roles.of_signal(path).is_some();
     if wants(path) {
         return true;
     }
@@ -493,11 +498,9 @@ impl<'a> Pass<'a> {
                         own.push(times);
                     }
                 }
-                (from, to) => {
-                    let inside = |t: i64| {
-                        let t_s = (i128::from(t) - start_ns) as f64 / 1e9;
-                        from.is_none_or(|a| t_s >= a) && to.is_none_or(|b| t_s <= b)
-                    };
+                _ => {
+                    let inside =
+                        |t: i64| (self.request).holds((i128::from(t) - start_ns) as f64 / 1e9);
                     let (kept, x): (Vec<i64>, Vec<f64>) = (times.iter().zip(values))
                         .filter(|(t, _)| inside(**t))
                         .map(|(t, x)| (*t, *x))

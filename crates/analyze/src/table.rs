@@ -120,16 +120,7 @@ impl From<std::io::Error> for Trouble {
 
 /// Reads the wanted signals and joins them by time.
 fn collect(recording: &Recording, request: &Request, downsample: u64) -> Result<Table, ReadError> {
-    let lists = |path: &str| {
-        let of = |topic: &String| crate::roles::of_topic(topic, path);
-        let topic = request.topics.is_empty() || request.topics.iter().any(of);
-        topic
-            && (request.signals.is_empty()
-                || request
-                    .signals
-                    .iter()
-                    .any(|p| crate::roles::matches(p, path)))
-    };
+    let lists = |path: &str| request.lists_path(path);
     let select = |path: &str| {
         lists(path)
             || path
@@ -144,10 +135,7 @@ fn collect(recording: &Recording, request: &Request, downsample: u64) -> Result<
     signals.sort_by(|a, b| a.path.cmp(&b.path));
     let start_ns = recording.info().start_ns;
     let seconds = |t: i64| (i128::from(t) - i128::from(start_ns)) as f64 / 1e9;
-    let inside = |t: i64| {
-        request.window.0.is_none_or(|a| seconds(t) >= a)
-            && request.window.1.is_none_or(|b| seconds(t) <= b)
-    };
+    let inside = |t: i64| request.holds(seconds(t));
     let step = usize::try_from(downsample).unwrap_or(usize::MAX).max(1);
     let mut time_ns: Vec<i64> = Vec::new();
     let mut axes: Vec<*const i64> = Vec::new();
