@@ -9,7 +9,7 @@ pub use reduced::{Pinned, choose};
 use crate::body::Body;
 #[cfg(target_arch = "x86_64")]
 use crate::lanes::{Avx2, Avx512, FusedEach};
-use crate::lanes::{Eight, Moments, Number, Plain8, f64x2, pack, sum};
+use crate::lanes::{Eight, Moments, Number, Plain8, Slope, Slopes, f64x2, pack, sum};
 use crate::model::{All, Block, Pair, Part, Workspace};
 use crate::scene::Start;
 use nalgebra::{Matrix3, Quaternion, UnitQuaternion, Vector3};
@@ -116,12 +116,14 @@ pub trait Freedoms: FreedomsOnEight + Send + Sync {
 pub(crate) trait Coordinates: Send + Sync {
     /// As [`Freedoms::gaps`], of some of the handles.
     fn gaps_at<N: Moments>(&self, y: &[N::Each], w: &mut Workspace<N>, part: impl Part);
+    /// As [`Freedoms::orient`].
+    fn orient_at<N: Moments>(&self, _y: &[N::Each], _w: &mut Workspace<N>) {}
     /// As [`Freedoms::accelerate`].
     fn rates_at<N: Moments>(&self, y: &[N::Each], w: &Workspace<N>, dy: &mut [N::Each]);
 }
 
-/// [`Freedoms::gaps`] and [`Freedoms::accelerate`] by fused arithmetic ([`crate::lanes`]), and at eight moments for each kind of registers: see
-/// [`crate::model::OnEight`].
+/// [`Freedoms::gaps`] and [`Freedoms::accelerate`] by fused arithmetic ([`crate::lanes`]), at eight moments for each kind of registers, and with
+/// derivatives: see [`crate::model::OnEight`].
 #[allow(missing_docs)]
 pub trait FreedomsOnEight {
     /// # Safety
@@ -134,6 +136,9 @@ pub trait FreedomsOnEight {
     #[cfg(target_arch = "x86_64")]
     #[allow(unsafe_code)]
     unsafe fn accelerate_fused(&self, y: &[f64], w: &Workspace, dy: &mut [f64]);
+    fn gaps_slopes(&self, y: &[Slope], w: &mut Workspace<Slopes>);
+    fn orient_slopes(&self, y: &[Slope], w: &mut Workspace<Slopes>);
+    fn rates_slopes(&self, y: &[Slope], w: &Workspace<Slopes>, dy: &mut [Slope]);
     fn gaps_plain(&self, y: &[Plain8], w: &mut Workspace<Eight<Plain8>>);
     fn rates_plain(&self, y: &[Plain8], w: &Workspace<Eight<Plain8>>, dy: &mut [Plain8]);
     /// # Safety
@@ -170,6 +175,15 @@ impl<T: Coordinates> FreedomsOnEight for T {
     #[allow(unsafe_code)]
     unsafe fn accelerate_fused(&self, y: &[f64], w: &Workspace, dy: &mut [f64]) {
         self.rates_at(FusedEach::all(y), w.as_fused(), FusedEach::all_mut(dy));
+    }
+    fn gaps_slopes(&self, y: &[Slope], w: &mut Workspace<Slopes>) {
+        self.gaps_at(y, w, All);
+    }
+    fn orient_slopes(&self, y: &[Slope], w: &mut Workspace<Slopes>) {
+        self.orient_at(y, w);
+    }
+    fn rates_slopes(&self, y: &[Slope], w: &Workspace<Slopes>, dy: &mut [Slope]) {
+        self.rates_at(y, w, dy);
     }
     fn gaps_plain(&self, y: &[Plain8], w: &mut Workspace<Eight<Plain8>>) {
         self.gaps_at(y, w, All);

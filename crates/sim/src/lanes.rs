@@ -4,17 +4,20 @@
 //! parameters are zero, so that it exerts nothing.
 //!
 //! Every processor can do what is written for [`Now`]. One that has FMA and AVX2 does the same by fused arithmetic, with one instruction and one
-//! rounding where there are two, so that results differ between the two by rounding alone; several moments at once are [`Eight`].
+//! rounding where there are two, so that results differ between the two by rounding alone; several moments at once are [`Eight`], one moment with its
+//! derivatives is [`Slopes`].
 
 mod eight;
 #[cfg(target_arch = "x86_64")]
 mod fused;
 mod number;
+mod slope;
 
 pub use eight::*;
 #[cfg(target_arch = "x86_64")]
 pub use fused::{Fused, FusedEach, FusedPair};
 pub use number::{Eight, Moments, Now, Number, Two};
+pub use slope::{Slope, Slopes};
 use wide::bytemuck::cast;
 pub use wide::f64x2;
 use wide::i64x2;

@@ -14,6 +14,7 @@ mod eight;
 mod heading;
 mod rest;
 mod sideways;
+mod slopes;
 mod term;
 mod workspace;
 
@@ -22,6 +23,7 @@ pub(crate) use eight::{Octet, SideBySide};
 pub use heading::Heading;
 pub(crate) use rest::Bend;
 pub(crate) use sideways::Sideways;
+pub(crate) use slopes::Differentiator;
 pub use term::{
     Account, AsWhole, Book, Local, OnBlock, OnEight, Power, PowerOnEight, Stage, Switch, Term,
     Whole,
@@ -688,15 +690,20 @@ impl Model {
         }
         let out = dy[self.layout.ledger_range()].chunks_exact_mut(2);
         for ((_, account), out) in self.accounts.iter().zip(out) {
-            // SAFETY: the processor was asked.
-            #[allow(unsafe_code)]
-            let power = if self.fused {
-                unsafe { account.power_fused(w) }
-            } else {
-                account.power(w, &w.pair, 0)
-            };
+            let power = self.power(&**account, w);
             out.copy_from_slice(&[power.work_w, power.dissipated_w]);
         }
+    }
+
+    #[inline(always)]
+    fn power(&self, account: &dyn Account, w: &Workspace) -> Power {
+        #[cfg(target_arch = "x86_64")]
+        if self.fused {
+            // SAFETY: the processor was asked.
+            #[allow(unsafe_code)]
+            return unsafe { account.power_fused(w) };
+        }
+        account.power(w, &w.pair, 0)
     }
 
     #[cold]
@@ -751,15 +758,16 @@ impl Model {
     #[inline(always)]
     fn apply<const FUSED: bool>(terms: &[Box<dyn Term>], t_s: f64, w: &mut Workspace) {
         for term in terms {
+            #[cfg(target_arch = "x86_64")]
             if FUSED {
                 // SAFETY: where this is true the processor was asked.
                 #[allow(unsafe_code)]
                 unsafe {
                     term.apply_fused(t_s, w);
                 }
-            } else {
-                term.apply(t_s, w);
+                continue;
             }
+            term.apply(t_s, w);
         }
     }
 

@@ -13,8 +13,8 @@
 //! all at x = 0 does not bend. Source: cantilever deflection under an end load, Timoshenko, *Strength of
 //! Materials* I, §39; modal reduction: Meirovitch, *Fundamentals of Vibrations* (2001), ch. 8.
 
-use crate::lanes::{f64x2, pack, sum};
-use crate::model::{Account, Bend, Model, Pair, Power, Stage, Term, Workspace};
+use crate::lanes::{Moments, Number, f64x2, pack};
+use crate::model::{AsWhole, Bend, Book, Model, Pair, Power, Stage, Whole, Workspace};
 use crate::scene::{Checker, Problem, Scene};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -90,8 +90,8 @@ impl Flexure {
             stiffness,
             damping: 2.0 * self.damping_ratio * self.modal_mass_kg * w,
         };
-        model.add(Stage::Bends, Bent(law.clone()));
-        model.add(Stage::Body, law.clone());
+        model.add(Stage::Bends, AsWhole(Bent(law.clone())));
+        model.add(Stage::Body, AsWhole(law.clone()));
         model.add_account("flexure", law);
     }
 }
@@ -116,24 +116,26 @@ struct Bending {
 #[derive(Debug)]
 struct Bent(Bending);
 
-impl Term for Bent {
-    fn apply(&self, _t_s: f64, w: &mut Workspace) {
-        let r = w.rotation;
-        let [ux, uy, uz] = r.map(|row| row[2]);
-        let [wx, wy, wz] =
-            r.map(|row| row[0] * w.spin[0] + row[1] * w.spin[1] + row[2] * w.spin[2]);
+impl Whole for Bent {
+    #[inline(always)]
+    fn act<N: Moments>(&self, _t_s: N::Each, w: &mut Workspace<N>) {
+        let up = w.rotation.map(|row| row[2]);
+        let [ux, uy, uz] = up;
+        let [wx, wy, wz] = w
+            .rotation
+            .map(|row| row[0] * w.spin[0] + row[1] * w.spin[1] + row[2] * w.spin[2]);
         // The deflection turns with the body: its rate is q̇ u + q ω × u.
-        let (up, swept) = (
-            [ux, uy, uz],
-            [wy * uz - wz * uy, wz * ux - wx * uz, wx * uy - wy * ux],
-        );
+        let swept = [wy * uz - wz * uy, wz * ux - wx * uz, wx * uy - wy * ux];
         for pole in &self.0.poles {
             let (q, rate) = (w.extra[pole.first], w.extra[pole.first + 1]);
+            let moved = up.map(|up| N::both(q * up));
+            let moving = [0, 1, 2].map(|a| N::both(rate * up[a] + q * swept[a]));
             for (p, shape) in w.pair.iter_mut().zip(&pole.shape) {
+                let shape = N::always(*shape);
                 for axis in 0..3 {
-                    p.arm[axis] += *shape * (q * up[axis]);
-                    p.gap[axis] -= *shape * (q * up[axis]);
-                    p.gap_rate[axis] -= *shape * (rate * up[axis] + q * swept[axis]);
+                    p.arm[axis] += shape * moved[axis];
+                    p.gap[axis] -= shape * moved[axis];
+                    p.gap_rate[axis] -= shape * moving[axis];
                 }
             }
         }
@@ -141,32 +143,40 @@ impl Term for Bent {
 }
 
 /// What the forces do to the deflection.
-impl Term for Bending {
-    fn apply(&self, _t_s: f64, w: &mut Workspace) {
-        let [ux, uy, uz] = w.rotation.map(|row| row[2]);
+impl Whole for Bending {
+    #[inline(always)]
+    fn act<N: Moments>(&self, _t_s: N::Each, w: &mut Workspace<N>) {
+        let up = w.rotation.map(|row| N::both(row[2]));
         for pole in &self.poles {
-            let mut load = f64x2::ZERO;
+            let mut load = N::Pair::splat(0.0);
             for (p, shape) in w.pair.iter().zip(&pole.shape) {
-                load += *shape * (p.tangential[0] * ux + p.tangential[1] * uy + p.normal * uz);
+                load += N::always(*shape)
+                    * (p.tangential[0] * up[0] + p.tangential[1] * up[1] + p.normal * up[2]);
             }
             let (q, rate) = (w.extra[pole.first], w.extra[pole.first + 1]);
+            let left = N::sum(load) - q * self.stiffness - rate * self.damping;
             w.extra_rate[pole.first] = rate;
-            w.extra_rate[pole.first + 1] =
-                (sum(load) - self.stiffness * q - self.damping * rate) / self.mass;
+            w.extra_rate[pole.first + 1] = left / N::Each::splat(self.mass);
         }
     }
 }
 
-impl Account for Bending {
-    fn power(&self, w: &Workspace, _pairs: &[Pair], _first: usize) -> Power {
-        let rate2: f64 = self
-            .poles
-            .iter()
-            .map(|p| w.extra[p.first + 1].powi(2))
-            .sum();
+impl Book for Bending {
+    #[inline(always)]
+    fn power<N: Moments>(
+        &self,
+        w: &Workspace<N>,
+        _pairs: &[Pair<N>],
+        _first: usize,
+    ) -> Power<N::Each> {
+        let mut rate2 = N::Each::splat(0.0);
+        for pole in &self.poles {
+            let rate = w.extra[pole.first + 1];
+            rate2 += rate * rate;
+        }
         Power {
-            work_w: 0.0,
-            dissipated_w: self.damping * rate2,
+            work_w: N::Each::splat(0.0),
+            dissipated_w: rate2 * self.damping,
         }
     }
 

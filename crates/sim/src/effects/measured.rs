@@ -8,7 +8,8 @@
 //! taken out). Samples are moments that the solver meets, so that each of its steps lies within one cubic. The scene may not run
 //! past the samples. `sim replay` writes this table from a recording. Source: the spline's own, `spline.rs`.
 
-use crate::model::{Model, Stage, Switch, Term, Workspace};
+use crate::lanes::Moments;
+use crate::model::{AsWhole, Model, Stage, Switch, Whole, Workspace};
 use crate::scene::{Checker, Problem, Scene, problem};
 use crate::spline::Spline;
 use schemars::JsonSchema;
@@ -103,7 +104,7 @@ impl Measured {
             model.need_phases();
             let phases: Vec<Spline> = self.phase_rad.iter().map(|x| spline(x)).collect();
             model.set_phases_at_start(phases.iter().map(|s| s.at(0.0)[0]).collect());
-            model.add(Stage::Phases, Phases(phases));
+            model.add(Stage::Phases, AsWhole(Phases(phases)));
         }
         if !self.shoulder_m.is_empty() {
             let axes = |places: &Vec<[f64; 3]>| {
@@ -111,7 +112,7 @@ impl Measured {
             };
             model.add(
                 Stage::Party,
-                Shoulders(self.shoulder_m.iter().map(axes).collect()),
+                AsWhole(Shoulders(self.shoulder_m.iter().map(axes).collect())),
             );
         }
         model.add_switch(Samples(self.t_s.clone()));
@@ -122,12 +123,13 @@ impl Measured {
 #[derive(Debug)]
 struct Phases(Vec<Spline>);
 
-impl Term for Phases {
-    fn apply(&self, t_s: f64, w: &mut Workspace) {
-        // The segment decides which cubic: a step's last stage lies on the seam.
-        let piece = self.0[0].piece(w.segment_s);
+impl Whole for Phases {
+    #[inline(always)]
+    fn act<N: Moments>(&self, t_s: N::Each, w: &mut Workspace<N>) {
+        let piece = piece(&self.0[0], w);
         for (i, spline) in self.0.iter().enumerate() {
-            *w.of_mut(i, |p| &mut p.rate) = spline.of_piece(piece, t_s)[1];
+            let [_, rate] = at::<N>(spline, piece, t_s);
+            w.set(i, |p| &mut p.rate, rate);
         }
     }
 }
@@ -135,17 +137,36 @@ impl Term for Phases {
 #[derive(Debug)]
 struct Shoulders(Vec<[Spline; 3]>);
 
-impl Term for Shoulders {
-    fn apply(&self, t_s: f64, w: &mut Workspace) {
-        let piece = self.0[0][0].piece(w.segment_s);
+impl Whole for Shoulders {
+    #[inline(always)]
+    fn act<N: Moments>(&self, t_s: N::Each, w: &mut Workspace<N>) {
+        let piece = piece(&self.0[0][0], w);
         for (i, axes) in self.0.iter().enumerate() {
             for (a, spline) in axes.iter().enumerate() {
-                let [place, rate] = spline.of_piece(piece, t_s);
-                *w.of_mut(i, |p| &mut p.base[a]) = place;
-                *w.of_mut(i, |p| &mut p.base_rate[a]) = rate;
+                let [place, rate] = at::<N>(spline, piece, t_s);
+                w.set(i, |p| &mut p.base[a], place);
+                w.set(i, |p| &mut p.base_rate[a], rate);
             }
         }
     }
+}
+
+/// The number of the cubic: the segment decides, as a step's last stage lies on the seam.
+#[inline(always)]
+fn piece<N: Moments>(spline: &Spline, w: &Workspace<N>) -> N::Each {
+    let [piece] = N::look_up(
+        [w.segment_s],
+        |[segment_s]| [spline.piece(segment_s) as f64],
+    );
+    piece
+}
+
+/// Value and slope of a piece.
+#[inline(always)]
+fn at<N: Moments>(spline: &Spline, piece: N::Each, t_s: N::Each) -> [N::Each; 2] {
+    N::look_up([piece, t_s], |[piece, t_s]| {
+        spline.of_piece(piece as usize, t_s)
+    })
 }
 
 /// A cubic ends at each sample.

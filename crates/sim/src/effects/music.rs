@@ -215,7 +215,7 @@ struct Varied {
 impl Whole for Varied {
     #[inline(always)]
     fn act<N: Moments>(&self, t_s: N::Each, w: &mut Workspace<N>) {
-        let [silent, begin_s, rate, bend, phase] = N::look_up(w.segment_s, |segment_s| {
+        let [silent, begin_s, rate, bend, phase] = N::look_up([w.segment_s], |[segment_s]| {
             let piece = self.beat.piece(segment_s);
             let silent = f64::from(!self.beat.sounds(segment_s));
             [

@@ -15,8 +15,8 @@
 //! The slope replaces the direction of `body.gravity_m_per_s2`, not its size. Source: rigid kinematics; S is the quintic of
 //! least jerk (Flash & Hogan 1985).
 
-use crate::lanes::f64x2;
-use crate::model::{Heading, Model, Stage, Switch, Term, Workspace};
+use crate::lanes::Moments;
+use crate::model::{AsWhole, Heading, Model, Stage, Switch, Whole, Workspace};
 use crate::scene::{Checker, Freedom, Problem, Scene, problem, shown};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -122,11 +122,11 @@ impl Path {
         let first = model.add_states(["path_x_m", "path_y_m"].map(|name| (name.to_owned(), 0.0)));
         model.add(
             Stage::Party,
-            Turn {
+            AsWhole(Turn {
                 first,
                 walk: scene.carriers.walk_m_per_s,
                 heading: self.heading(),
-            },
+            }),
         );
         model.set_heading(self.heading());
         model.add_switch(Ends([
@@ -143,23 +143,29 @@ struct Turn {
     heading: Heading,
 }
 
-impl Term for Turn {
-    fn apply(&self, t_s: f64, w: &mut Workspace) {
-        let [heading, rate] = self.heading.at(t_s);
-        let (sin, cos) = heading.sin_cos();
-        let centre = [w.extra[self.first], w.extra[self.first + 1]];
+impl Whole for Turn {
+    #[inline(always)]
+    fn act<N: Moments>(&self, t_s: N::Each, w: &mut Workspace<N>) {
         let [x, y, _] = self.walk;
-        let velocity = [x * (cos - 1.0) - y * sin, x * sin + y * (cos - 1.0)];
+        let [sin, cos, rate, along_x, along_y] = N::look_up([t_s], |[t_s]| {
+            let [heading, rate] = self.heading.at(t_s);
+            let (sin, cos) = heading.sin_cos();
+            let along = [x * (cos - 1.0) - y * sin, x * sin + y * (cos - 1.0)];
+            [sin, cos, rate, along[0], along[1]]
+        });
+        let centre = [w.extra[self.first], w.extra[self.first + 1]].map(N::both);
+        let velocity = [along_x, along_y].map(N::both);
+        let (sin, cos, rate) = (N::both(sin), N::both(cos), N::both(rate));
         for p in &mut w.pair {
             let ([x, y, _], [vx, vy, _]) = (p.base, p.base_rate);
             let (turned_x, turned_y) = (x * cos - y * sin, x * sin + y * cos);
-            p.base[0] = turned_x + f64x2::splat(centre[0]);
-            p.base[1] = turned_y + f64x2::splat(centre[1]);
-            p.base_rate[0] = vx * cos - vy * sin - turned_y * rate + f64x2::splat(velocity[0]);
-            p.base_rate[1] = vx * sin + vy * cos + turned_x * rate + f64x2::splat(velocity[1]);
+            p.base[0] = turned_x + centre[0];
+            p.base[1] = turned_y + centre[1];
+            p.base_rate[0] = vx * cos - vy * sin - turned_y * rate + velocity[0];
+            p.base_rate[1] = vx * sin + vy * cos + turned_x * rate + velocity[1];
         }
-        w.extra_rate[self.first] = velocity[0];
-        w.extra_rate[self.first + 1] = velocity[1];
+        w.extra_rate[self.first] = along_x;
+        w.extra_rate[self.first + 1] = along_y;
     }
 }
 

@@ -92,13 +92,15 @@ impl<const AXIS: usize> Turning for Hinge<AXIS> {
         place_handles(&mut w.pair, &self.handles, part, motion, &swung);
     }
 
-    fn orient(&self, y: &[f64], w: &mut Workspace) {
-        let (sin, cos) = self.place.map_or((0.0, 1.0), |p| Number::sin_cos(y[p]));
+    fn orient<N: Moments>(&self, y: &[N::Each], w: &mut Workspace<N>) {
+        let number = N::Each::splat;
+        let upright = (number(0.0), number(1.0));
+        let (sin, cos) = self.place.map_or(upright, |p| Number::sin_cos(y[p]));
         let [a, b, c] = &self.rotation;
         for row in 0..3 {
             for column in 0..3 {
                 w.rotation[row][column] =
-                    a[row][column] + b[row][column] * cos + c[row][column] * sin;
+                    cos * b[row][column] + a[row][column] + sin * c[row][column];
             }
         }
     }

@@ -241,7 +241,7 @@ pub(super) trait Turning: Send + Sync {
         part: impl Part,
     );
     /// Fills `rotation` of the workspace, if `gaps` did not.
-    fn orient(&self, _y: &[f64], _w: &mut Workspace) {}
+    fn orient<N: Moments>(&self, _y: &[N::Each], _w: &mut Workspace<N>) {}
     /// Writes the second derivatives of the free angles; `torque` of the handle forces in the world (N·m).
     fn accelerate<N: Moments>(
         &self,
@@ -306,6 +306,10 @@ impl<T: Turning> Coordinates for Reduced<T> {
         let velocity = [rails.rate(0, y), rails.rate(1, y), rails.rate(2, y)];
         let motion = [position, velocity];
         self.turning.gaps(rails, y, motion, w, part);
+    }
+
+    fn orient_at<N: Moments>(&self, y: &[N::Each], w: &mut Workspace<N>) {
+        self.turning.orient(y, w);
     }
 
     #[inline(always)]
@@ -411,7 +415,7 @@ impl<T: Turning> Freedoms for Reduced<T> {
     }
 
     fn orient(&self, y: &[f64], w: &mut Workspace) {
-        self.turning.orient(y, w);
+        self.orient_at(y, w);
     }
 
     fn accelerate(&self, y: &[f64], w: &mut Workspace, dy: &mut [f64]) {

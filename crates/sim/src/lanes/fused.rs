@@ -151,7 +151,10 @@ impl Moments for Fused {
         pair.0.as_mut_array()[lane] = each.0;
     }
     #[inline(always)]
-    fn look_up<const K: usize>(each: FusedEach, table: impl Fn(f64) -> [f64; K]) -> [FusedEach; K] {
-        table(each.0).map(FusedEach)
+    fn look_up<const I: usize, const K: usize>(
+        at: [FusedEach; I],
+        table: impl Fn([f64; I]) -> [f64; K],
+    ) -> [FusedEach; K] {
+        table(at.map(|at| at.0)).map(FusedEach)
     }
 }

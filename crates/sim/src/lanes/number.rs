@@ -1,6 +1,6 @@
 //! Arithmetic that is written once and done at one moment or at eight moments side by side.
 
-use super::{Wide, f64x2};
+use super::{MOMENTS, Wide, f64x2};
 use std::fmt::Debug;
 use std::ops::{Add, AddAssign, Div, Mul, Neg, Sub, SubAssign};
 
@@ -141,10 +141,10 @@ pub trait Moments: Copy + Debug + Send + Sync + 'static {
     fn of(pair: Self::Pair, lane: usize) -> Self::Each;
     /// The same, to be changed.
     fn set(pair: &mut Self::Pair, lane: usize, each: Self::Each);
-    /// What a table says at each moment.
-    fn look_up<const K: usize>(
-        each: Self::Each,
-        table: impl Fn(f64) -> [f64; K],
+    /// What a table says at each moment; it is asked by numbers that depend on time alone.
+    fn look_up<const I: usize, const K: usize>(
+        at: [Self::Each; I],
+        table: impl Fn([f64; I]) -> [f64; K],
     ) -> [Self::Each; K];
 }
 
@@ -176,8 +176,11 @@ impl Moments for Now {
         pair.as_mut_array()[lane] = each;
     }
     #[inline(always)]
-    fn look_up<const K: usize>(each: f64, table: impl Fn(f64) -> [f64; K]) -> [f64; K] {
-        table(each)
+    fn look_up<const I: usize, const K: usize>(
+        at: [f64; I],
+        table: impl Fn([f64; I]) -> [f64; K],
+    ) -> [f64; K] {
+        table(at)
     }
 }
 
@@ -185,7 +188,7 @@ impl Moments for Now {
 #[derive(Clone, Copy, Debug)]
 pub struct Eight<E>(std::marker::PhantomData<E>);
 
-/// Numbers of two carriers at eight moments.
+/// Numbers of two carriers, of which each is several.
 #[derive(Clone, Copy, Debug)]
 pub struct Two<E>(pub [E; 2]);
 
@@ -214,10 +217,14 @@ impl<E: Wide> Moments for Eight<E> {
         pair.0[lane] = each;
     }
     #[inline(always)]
-    fn look_up<const K: usize>(each: E, table: impl Fn(f64) -> [f64; K]) -> [E; K] {
+    fn look_up<const I: usize, const K: usize>(
+        at: [E; I],
+        table: impl Fn([f64; I]) -> [f64; K],
+    ) -> [E; K] {
         let mut out = [E::splat(0.0); K];
-        for (moment, at) in each.as_array().iter().enumerate() {
-            for (out, found) in out.iter_mut().zip(table(*at)) {
+        for moment in 0..MOMENTS {
+            let found = table(at.map(|at| at.as_array()[moment]));
+            for (out, found) in out.iter_mut().zip(found) {
                 out.as_mut_array()[moment] = found;
             }
         }
@@ -227,7 +234,7 @@ impl<E: Wide> Moments for Eight<E> {
 
 macro_rules! by_carrier {
     ($($trait:ident $op:ident),*) => {$(
-        impl<E: Wide> $trait for Two<E> {
+        impl<E: Number> $trait for Two<E> {
             type Output = Self;
             #[inline(always)]
             fn $op(self, other: Self) -> Self {
@@ -238,33 +245,33 @@ macro_rules! by_carrier {
 }
 by_carrier!(Add add, Sub sub, Mul mul, Div div);
 
-impl<E: Wide> Neg for Two<E> {
+impl<E: Number> Neg for Two<E> {
     type Output = Self;
     #[inline(always)]
     fn neg(self) -> Self {
         Two([-self.0[0], -self.0[1]])
     }
 }
-impl<E: Wide> AddAssign for Two<E> {
+impl<E: Number> AddAssign for Two<E> {
     #[inline(always)]
     fn add_assign(&mut self, other: Self) {
         *self = *self + other;
     }
 }
-impl<E: Wide> SubAssign for Two<E> {
+impl<E: Number> SubAssign for Two<E> {
     #[inline(always)]
     fn sub_assign(&mut self, other: Self) {
         *self = *self - other;
     }
 }
-impl<E: Wide> Mul<f64> for Two<E> {
+impl<E: Number> Mul<f64> for Two<E> {
     type Output = Self;
     #[inline(always)]
     fn mul(self, by: f64) -> Self {
         Two([self.0[0] * by, self.0[1] * by])
     }
 }
-impl<E: Wide> Add<f64> for Two<E> {
+impl<E: Number> Add<f64> for Two<E> {
     type Output = Self;
     #[inline(always)]
     fn add(self, other: f64) -> Self {
@@ -272,7 +279,7 @@ impl<E: Wide> Add<f64> for Two<E> {
     }
 }
 
-impl<E: Wide> Number for Two<E> {
+impl<E: Number> Number for Two<E> {
     #[inline(always)]
     fn splat(x: f64) -> Self {
         Two([E::splat(x); 2])

@@ -1,4 +1,4 @@
-//! The right-hand side at eight moments side by side, for models all of whose parts are written for that.
+//! The right-hand side at eight moments side by side.
 
 use super::term::Staged;
 use super::{Layout, Model, OnEight, Pair, Power, PowerOnEight, Stage, Workspace};
@@ -63,14 +63,11 @@ registers!(Avx2, avx2, gaps_avx2, rates_avx2);
 registers!(Avx512, avx512, gaps_avx512, rates_avx512);
 
 impl Model {
-    /// Whether the right-hand side can be evaluated at eight moments side by side: few carriers, and every effect written for it.
+    /// Whether the right-hand side can be evaluated at eight moments side by side: few carriers, and nothing that moves them after their phases
+    /// or bends what they hold.
     pub fn on_eight(&self) -> bool {
         let empty = |stage: Stage| self.terms.of(stage).is_empty();
-        super::pairs(self.carriers()) <= MOST_PAIRS
-            && empty(Stage::Party)
-            && empty(Stage::Bends)
-            && self.terms.all().all(|t| t.on_eight().is_some())
-            && self.accounts.iter().all(|(_, a)| a.on_eight().is_some())
+        super::pairs(self.carriers()) <= MOST_PAIRS && empty(Stage::Party) && empty(Stage::Bends)
     }
 
     /// Whether the carriers go their way whatever the load does, so that their phases can be solved before it: only states of an effect's
@@ -79,20 +76,13 @@ impl Model {
         self.layout.extra_range().is_empty()
     }
 
-    /// The right-hand side for eight moments.
-    ///
-    /// # Panics
-    /// Where [`Self::on_eight`] says no for a term or an account: it is asked first.
+    /// The right-hand side for eight moments, where [`Self::on_eight`] says yes.
     pub(crate) fn side_by_side(&self) -> SideBySide<'_> {
         SideBySide {
             layout: &self.layout,
             freedoms: &*self.freedoms,
-            terms: self.terms.map(|t| t.on_eight().expect("written for eight")),
-            accounts: self
-                .accounts
-                .iter()
-                .map(|(_, a)| a.on_eight().expect("written for eight"))
-                .collect(),
+            terms: self.terms.map(|t| t.on_eight()),
+            accounts: self.accounts.iter().map(|(_, a)| a.on_eight()).collect(),
         }
     }
 }

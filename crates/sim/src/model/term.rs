@@ -3,28 +3,25 @@
 use super::workspace::{All, Block, Pair, Part, Workspace};
 #[cfg(target_arch = "x86_64")]
 use crate::lanes::{Avx2, Avx512, Fused, FusedEach};
-use crate::lanes::{Eight, Moments, Plain8};
+use crate::lanes::{Eight, Moments, Plain8, Slope, Slopes};
 
 /// A part of the right-hand side.
 pub trait Term: Send + Sync {
     /// Adds its part to the workspace at time `t_s`.
     fn apply(&self, t_s: f64, w: &mut Workspace);
-    /// The same by fused arithmetic ([`crate::lanes`]), if it is written for that.
+    /// The same by fused arithmetic ([`crate::lanes`]).
     ///
     /// # Safety
     /// The processor has AVX2 and FMA.
+    #[cfg(target_arch = "x86_64")]
     #[allow(unsafe_code)]
-    unsafe fn apply_fused(&self, t_s: f64, w: &mut Workspace) {
-        self.apply(t_s, w);
-    }
+    unsafe fn apply_fused(&self, t_s: f64, w: &mut Workspace);
     /// The same for a block of pairs, if each is treated by itself.
     fn on_block(&self) -> Option<&dyn OnBlock> {
         None
     }
-    /// The same at eight moments side by side, if it is written for that.
-    fn on_eight(&self) -> Option<&dyn OnEight> {
-        None
-    }
+    /// The same at eight moments side by side, and with derivatives.
+    fn on_eight(&self) -> &dyn OnEight;
 }
 
 /// A term written for any number of moments that treats every pair by itself: where there are thousands of pairs, all such terms are
@@ -69,8 +66,8 @@ impl<T: Local> Term for T {
     fn on_block(&self) -> Option<&dyn OnBlock> {
         Some(self)
     }
-    fn on_eight(&self) -> Option<&dyn OnEight> {
-        Some(self)
+    fn on_eight(&self) -> &dyn OnEight {
+        self
     }
 }
 
@@ -84,16 +81,17 @@ impl<T: Whole> Term for AsWhole<T> {
     unsafe fn apply_fused(&self, t_s: f64, w: &mut Workspace) {
         self.0.act(FusedEach(t_s), w.fused());
     }
-    fn on_eight(&self) -> Option<&dyn OnEight> {
-        Some(self)
+    fn on_eight(&self) -> &dyn OnEight {
+        self
     }
 }
 
-/// [`Term::apply`] at eight moments, for each kind of registers.
+/// [`Term::apply`] at eight moments, for each kind of registers, or at one with derivatives in eight directions.
 ///
 /// A trait object's functions do not inherit the processor features of their caller: each asks for its own.
 #[allow(missing_docs)]
 pub trait OnEight {
+    fn slopes(&self, t_s: Slope, w: &mut Workspace<Slopes>);
     fn plain(&self, t_s: Plain8, w: &mut Workspace<Eight<Plain8>>);
     /// # Safety
     /// The processor has AVX2 and FMA.
@@ -110,6 +108,10 @@ pub trait OnEight {
 macro_rules! on_eight {
     ($bound:ident, $type:ty, |$self:ident, $t:ident, $w:ident| $act:expr) => {
         impl<T: $bound> OnEight for $type {
+            fn slopes(&self, $t: Slope, $w: &mut Workspace<Slopes>) {
+                let $self = self;
+                $act
+            }
             fn plain(&self, $t: Plain8, $w: &mut Workspace<Eight<Plain8>>) {
                 let $self = self;
                 $act
@@ -170,7 +172,7 @@ impl Stage {
 }
 
 /// Things in the order of their stages, a part's side by side: they are gone through in one loop.
-#[derive(Debug)]
+#[derive(Clone, Debug)]
 pub(crate) struct Staged<T> {
     parts: [Vec<T>; 4],
     /// Where each stage ends in its part.
@@ -250,22 +252,17 @@ pub struct Power<T = f64> {
 pub trait Account: Send + Sync {
     /// Power at the evaluated state, of `pairs` alone: those from the pair numbered `first` on.
     fn power(&self, w: &Workspace, pairs: &[Pair], first: usize) -> Power;
-    /// The same of all pairs by fused arithmetic, if it is written for that.
+    /// The same of all pairs by fused arithmetic.
     ///
     /// # Safety
     /// The processor has AVX2 and FMA.
+    #[cfg(target_arch = "x86_64")]
     #[allow(unsafe_code)]
-    unsafe fn power_fused(&self, w: &Workspace) -> Power {
-        self.power(w, &w.pair, 0)
-    }
+    unsafe fn power_fused(&self, w: &Workspace) -> Power;
     /// Energy stored in the effect's springs, J.
-    fn stored_j(&self, _w: &Workspace) -> f64 {
-        0.0
-    }
-    /// The power at eight moments side by side, if it is written for that.
-    fn on_eight(&self) -> Option<&dyn PowerOnEight> {
-        None
-    }
+    fn stored_j(&self, w: &Workspace) -> f64;
+    /// The power at eight moments side by side.
+    fn on_eight(&self) -> &dyn PowerOnEight;
 }
 
 /// An account written for any number of moments.
@@ -301,8 +298,8 @@ impl<T: Book> Account for T {
     fn stored_j(&self, w: &Workspace) -> f64 {
         Book::stored_j(self, w)
     }
-    fn on_eight(&self) -> Option<&dyn PowerOnEight> {
-        Some(self)
+    fn on_eight(&self) -> &dyn PowerOnEight {
+        self
     }
 }
 
