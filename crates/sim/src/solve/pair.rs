@@ -139,7 +139,7 @@ pub fn sum<F: Arithmetic>(row: Row, k: &Slopes) -> Tile {
 }
 
 /// So many steps in a row without a stop, each limited by stability, cost more than the one implicit step that could replace them:
-/// its Jacobian takes an evaluation per state, its iteration some more.
+/// its Jacobian takes about two evaluations per state, its iteration some more.
 const MANY: u32 = 100;
 const SAFETY: f64 = 0.9;
 const SHRINK: f64 = 0.2;
