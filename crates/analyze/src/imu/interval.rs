@@ -9,6 +9,7 @@ use crate::inputs::{Inputs, Window, between};
 use crate::median::median;
 use crate::metrics::{Datum, Metrics, Value, metrics_of, rival_hz};
 use crate::random::Random;
+use std::ops::Range;
 
 /// Number of draws behind an interval.
 const DRAWS: usize = 40;
@@ -201,6 +202,12 @@ const SEEN: f64 = 5.0;
 /// docs/field.md.
 const EDGE_SAMPLES: f64 = 0.2;
 
+/// So much of its SD has a wandering of [`WANDER_S`] between 0.2 and 0.4 Hz, as [`slow_course_m`] sees it: ∫ of its spectrum times the difference
+/// of the two gains 1/(1 + (f₀/f)⁴), squared.
+const ABOVE_CORNER: f64 = 0.185;
+/// Largest minus smallest of a course of SD 1 that is alike for [`WANDER_S`], in a minute: of 20 to 25 normal numbers (Tippett, Biometrika 17 (1925)).
+const RANGE_OF_WANDER: f64 = 3.8;
+
 /// Standard error of a metric that no draw shows, in its own unit: what the window holds and the estimate does not.
 fn beyond_the_budget(name: &str, motion: &Motion, window: Window) -> f64 {
     let inputs = &motion.inputs;
@@ -228,6 +235,13 @@ fn beyond_the_budget(name: &str, motion: &Motion, window: Window) -> f64 {
         }
         // The definition counts samples at 30 Hz; others of the same motion come up to one of them later, evenly spread.
         "onset_time_s" => (1.0 / 30.0) / 3f64.sqrt(),
+        // What is slower than the corner is lost, and what lies just above it is as much the sensor's: more of that than the budget's own wandering
+        // has there speaks of a course below that is as large, whose largest minus smallest is missing or too much.
+        "dz_pp_m" => {
+            let excess = |seen: f64, of_budget: f64| (seen.powi(2) - of_budget.powi(2)).max(0.0);
+            let of_budget = ABOVE_CORNER * motion.settings.budget.height_wander_m;
+            RANGE_OF_WANDER * excess(slow_course_m(motion, range), of_budget).sqrt()
+        }
         // The weights 1, 2, 1 move a touch-down by a part of a sample, all of them to the same side (docs/field.md: twins at 100 and 200 Hz).
         "t_float" if motion.settings.lever_m != [0.0; 3] => {
             let (t_s, ratio) = (&inputs.t_s[range.clone()], &inputs.support_ratio[range]);
@@ -270,6 +284,22 @@ fn beyond_the_budget(name: &str, motion: &Motion, window: Window) -> f64 {
         }
         _ => 0.0,
     }
+}
+
+/// SD of the height between its corner f₀ and 2f₀, m: of what the window knows of it.
+fn slow_course_m(motion: &Motion, range: Range<usize>) -> f64 {
+    let faster = motion.height_m(2.0 * motion.settings.height_corner_hz);
+    let both = motion.inputs.height_m[range.clone()]
+        .iter()
+        .zip(&faster[range]);
+    let course: Vec<f64> = both
+        .filter(|(z, _)| z.is_finite())
+        .map(|(z, faster)| z - faster)
+        .collect();
+    if course.len() < 2 {
+        return 0.0;
+    }
+    variance(&course).sqrt()
 }
 
 /// How far a metric of the height goes when so much (s) is cut off the beginning and the end of what is known of it.
