@@ -387,7 +387,7 @@ fn music_pauses_and_changes_tempo() {
 fn val_straps_swing_and_slip() {
     let swing = |more: &str| {
         samples(&scene(&format!(
-            "name = \"swing\"\nduration_s = 10.0\nfreedom = [\"y\"]\n[start]\nposition_m = [0.0, 0.3]\n[effects.contact]\n[effects.sling]\n{more}"
+            "name = \"swing\"\nduration_s = 10.0\nfreedom = [\"y\"]\n[start]\nposition_m = [0.0, 0.3]\n[effects.contact]\n[effects.sling]\ndamping_s = 0.0\n{more}"
         )))
     };
     let w = (9.81_f64 / 0.7).sqrt();

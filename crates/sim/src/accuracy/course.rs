@@ -74,7 +74,10 @@ impl Course {
         self.normal_n.extend_from_slice(&s.normal_n);
         if let Some(e) = &s.energy {
             self.unexplained_j = self.unexplained_j.max(e.unexplained_j.abs());
-            self.throughput_j = e.work_in_j.abs() + e.dissipated_j.abs();
+            // What a body at rest holds counts as well: nothing goes through it.
+            let held_j = e.kinetic_j + e.elastic_j.abs();
+            let throughput_j = e.work_in_j.abs() + e.dissipated_j.abs() + held_j;
+            self.throughput_j = self.throughput_j.max(throughput_j);
         }
     }
 

@@ -454,6 +454,14 @@ pub const CASES: &[Case] = &[
             c.ended(r);
             c.every("height, m", &r.samples, 1e-7, |s| (height(s), sinking(MASS_KG, SPRING, DAMPER, TOUCH_M, s.t_s)));
         }),
+    case!("resting-on-edge", precise, "a minute without gravity: handles exactly on the shoulders, and nothing that moves them",
+        "nothing moves, nothing pushes",
+        "duration_s = 60.0\n[body]\ngravity_m_per_s2 = [0.0, 0.0, 0.0]\n[start]\nheight_m = 0.9\n[effects.contact]\n",
+        |r, c| {
+            c.ended(r);
+            c.every("height, m", &r.samples, 1e-12, |s| (height(s), TOUCH_M));
+            c.every("force, N", &r.samples, 1e-9, |s| (s.normal_n.iter().sum(), 0.0));
+        }),
     case!("step-too-large", fixed, "a step of 0.1 s where handles tied to the shoulders swing in 0.03 s",
         "stops with the time and the cause, before any number is lost",
         format!("duration_s = 60.0\n{}[solver]\nstep_s = 0.1\n", CARRIED.replace("damping", "stiffness_n_per_m = 1e6\nbilateral = true\ndamping")),

@@ -27,6 +27,7 @@ pub struct Args {
 
 /// Writes the sound; the file appears whole or not at all.
 pub fn run(args: &Args) -> Result<()> {
+    super::is_file(&args.out)?;
     let mut scene = load(&args.scene, &args.set)?;
     if scene.effects.music.is_none() {
         return Err(anyhow!(

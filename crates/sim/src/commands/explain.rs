@@ -76,14 +76,18 @@ pub fn run(args: &Args) -> Result<()> {
 
 fn explore(scene: Scene) -> Findings {
     let model = Model::new(&scene);
-    // A second tells how long a trial may be.
+    // A short beginning, and ever longer ones, tell how long a trial may be.
     let mut trial = scene.clone();
-    trial.duration_s = scene.duration_s.min(1.0);
-    let pace = ms_per_s(&trial) / 1e3;
-    trial.duration_s = scene
-        .duration_s
-        .min((TRIAL_WALL_S / pace).clamp(1.0, TRIAL_S));
-    let ms = ms_per_s(&trial);
+    trial.duration_s = scene.duration_s.min(1e-3);
+    loop {
+        let wall_s = ms_per_s([&trial])[0] / 1e3 * trial.duration_s;
+        let most_s = scene.duration_s.min(TRIAL_S);
+        if !(wall_s < 0.1 * TRIAL_WALL_S) || trial.duration_s >= most_s {
+            break;
+        }
+        trial.duration_s = most_s.min(4.0 * trial.duration_s);
+    }
+    let [ms] = ms_per_s([&trial]);
     let effects = TABLE
         .iter()
         .map(|e| {
@@ -100,7 +104,9 @@ fn explore(scene: Scene) -> Findings {
                 effect.adds_state = a.layout().size() - b.layout().size();
                 let [a, b] = cost_ns([&a, &b]);
                 effect.cost_ns = Some(a - b);
-                effect.without_ms = Some(ms - ms_per_s(&with) + ms_per_s(&without));
+                // In proportion, where the scene with it alone is not the whole.
+                let [with_ms, without_ms] = ms_per_s([&with, &without]);
+                effect.without_ms = Some(ms * without_ms / with_ms);
             }
             effect
         })
@@ -157,15 +163,25 @@ fn cost_ns<const N: usize>(models: [&Model; N]) -> [f64; N] {
     least
 }
 
-/// Cost of a simulated second with its instruments, ms: the better of two runs. NaN for a scene that fails.
-fn ms_per_s(scene: &Scene) -> f64 {
-    let once = || {
-        let began = Instant::now();
-        let outcome = sim::run::run(scene, &mut |_: &Sample| true);
-        let wall_s = began.elapsed().as_secs_f64();
-        outcome.map_or(f64::NAN, |_| wall_s * 1e3 / scene.duration_s)
-    };
-    once().min(once())
+/// Cost of a simulated second of each scene with its instruments, ms, by turns: the best of two runs or more. NaN for a scene that fails.
+fn ms_per_s<const N: usize>(scenes: [&Scene; N]) -> [f64; N] {
+    let began = Instant::now();
+    let mut least = [f64::INFINITY; N];
+    for round in 0..10 {
+        for (scene, least) in scenes.iter().zip(&mut least) {
+            let began = Instant::now();
+            let outcome = sim::run::run(scene, &mut |_: &Sample| true);
+            let wall_s = began.elapsed().as_secs_f64();
+            *least = match outcome {
+                Ok(_) => least.min(wall_s * 1e3 / scene.duration_s),
+                Err(_) => f64::NAN,
+            };
+        }
+        if round > 0 && began.elapsed().as_secs_f64() > 0.1 {
+            break;
+        }
+    }
+    least
 }
 
 /// The six coordinates in every sample.

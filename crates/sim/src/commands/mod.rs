@@ -52,6 +52,16 @@ fn seconds(text: &str) -> Result<f64, String> {
     }
 }
 
+/// Refuses `-`, which only `sim record` takes for standard output.
+fn is_file(out: &std::path::Path) -> anyhow::Result<()> {
+    match out.as_os_str() == "-" {
+        true => Err(anyhow::anyhow!(
+            "--out -: this is written to a file; give it a name"
+        )),
+        false => Ok(()),
+    }
+}
+
 /// Runs a command; errors go to stderr, one sentence first, then the causes.
 pub fn run(command: Command) -> ExitCode {
     let outcome = match command {

@@ -106,7 +106,7 @@ pub fn run(args: &Args) -> Result<()> {
     let path = args
         .out
         .clone()
-        .unwrap_or_else(|| PathBuf::from(format!("{}-{}.mcap", scene.name, scene.seed)));
+        .unwrap_or_else(|| file_of(&scene.name, scene.seed));
     apart([path.as_path()], [Path::new(&args.scene)]).map_err(anyhow::Error::msg)?;
     let options = WriterOptions::beside();
     let writer = if to_stdout {
@@ -179,11 +179,32 @@ pub fn run(args: &Args) -> Result<()> {
         stats.events
     );
     if let Some((handle, beside_m, t_s)) = watch.astray {
+        let advice = match &scene.effects.sling {
+            Some(sling) if beside_m > sling.length_m => {
+                "farther than its strap is long; `effects.sling` holds for small swings: give it more damping_s, or the contact more damping"
+            }
+            Some(_) => "the straps of `effects.sling` let it",
+            None => {
+                "contact asks for height alone; `effects.hold`, `friction` or `sling` keep a load with its carriers"
+            }
+        };
         recording::note!(
-            "handle {handle} was carried from {beside_m:.1} m beside its shoulder at {t_s:.1} s: contact asks for height alone; `effects.hold`, `friction` or `sling` keep a load with its carriers"
+            "handle {handle} was carried from {beside_m:.1} m beside its shoulder at {t_s:.1} s: {advice}"
         );
     }
     Ok(())
+}
+
+/// The file that a scene is recorded to, in this folder whatever it is called.
+fn file_of(name: &str, seed: u64) -> PathBuf {
+    let plain = |c: char| c.is_alphanumeric() || "-_. ".contains(c);
+    let name: String = name
+        .chars()
+        .map(|c| if plain(c) { c } else { '_' })
+        .collect();
+    let name = name.trim_start_matches(['.', ' ', '-']);
+    let name = if name.is_empty() { "scene" } else { name };
+    PathBuf::from(format!("{name}-{seed}.mcap"))
 }
 
 /// A flag that ctrl-C sets. The run notices it at its next sample; a second ctrl-C ends the program at once.
@@ -247,5 +268,24 @@ impl Listener for Watch<'_> {
             }
         }
         !self.interrupted.load(Ordering::Relaxed) && self.recorder.sample(sample)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_name_does_not_lead_out_of_the_folder() {
+        for (name, file) in [
+            ("music", "music-1.mcap"),
+            ("../../x", "_.._x-1.mcap"),
+            ("/etc/x", "_etc_x-1.mcap"),
+            ("", "scene-1.mcap"),
+            ("-", "scene-1.mcap"),
+            ("Śrī rath 2", "Śrī rath 2-1.mcap"),
+        ] {
+            assert_eq!(file_of(name, 1), PathBuf::from(file));
+        }
     }
 }

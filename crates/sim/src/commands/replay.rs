@@ -29,13 +29,13 @@ pub struct Args {
     #[arg(long, value_enum, default_value_t = What::Phases)]
     drive: What,
     /// From, s after the recording's start. Default: where what drives begins.
-    #[arg(long, value_name = "S", value_parser = seconds)]
+    #[arg(long, value_name = "S", value_parser = seconds, allow_hyphen_values = true)]
     from: Option<f64>,
     /// To, s after the recording's start. Default: where what drives ends.
-    #[arg(long, value_name = "S", value_parser = seconds)]
+    #[arg(long, value_name = "S", value_parser = seconds, allow_hyphen_values = true)]
     to: Option<f64>,
     /// Left out of the misfit at the beginning, s. Default: 0 where the body starts as measured, else 3.
-    #[arg(long, value_name = "S", value_parser = seconds)]
+    #[arg(long, value_name = "S", value_parser = seconds, allow_hyphen_values = true)]
     settle: Option<f64>,
     /// Change a value of the scene; `effects.NAME=false` takes an effect away. May be repeated.
     #[arg(long, value_name = "KEY=VALUE", value_parser = setting)]
@@ -125,6 +125,7 @@ pub fn run(args: &Args) -> Result<Input> {
         let stem = args.file.file_stem().unwrap_or_default().to_string_lossy();
         PathBuf::from(format!("{stem}-replay.mcap"))
     });
+    super::is_file(&out)?;
     apart([out.as_path()], [args.file.as_path()]).map_err(anyhow::Error::msg)?;
     let model = Model::new(&replay.scene);
     let writer = RecordingWriter::create(&out, &WriterOptions::beside())?;

@@ -6,7 +6,8 @@
 //! N normal force (N), taken as 0 where it would pull; d shoulder minus handle in the plane normal to z (m); L length of
 //! the strap (m): the force keeps pointing along a strap of that length, small angles; τ damping time (s). A slack handle is
 //! free sideways. The force is conservative at constant N only: where N changes with d held, the load does the work, so
-//! the account books no stored energy and everything absorbed as dissipated (it may be given back).
+//! the account books no stored energy and everything absorbed as dissipated (it may be given back). Valid for |d| well below L: a load that
+//! bounces at twice its swing is fed by this, and with τ = 0, or contacts that hardly damp, swings beyond any strap; `sim record` says so.
 //!
 //! Source: the paper's logs. In its music runs the centre of mass swings sideways as −(0.0995 m) sin(roll) with y to the
 //! left, the same ratio at every amplitude, and is free in flight: a force in proportion to the load does that (with
@@ -32,7 +33,7 @@ impl Default for Sling {
     fn default() -> Self {
         Self {
             length_m: 0.7,
-            damping_s: 0.0,
+            damping_s: 0.06,
         }
     }
 }

@@ -472,8 +472,14 @@ fn spin_of([[roll, p], [pitch, q], [_, r]]: [[f64; 2]; 3]) -> [f64; 3] {
     [p - r * sp, q * cr + r * sr * cp, -q * sr + r * cr * cp]
 }
 
-/// Phases without the jumps of 2π.
+/// Phases without the jumps of 2π of those that stay within a turn; others count their turns already, and may go more than half of one from sample
+/// to sample.
 fn unwrapped(x: &[f64]) -> Vec<f64> {
+    let least = x.iter().copied().fold(f64::INFINITY, f64::min);
+    let most = x.iter().copied().fold(f64::NEG_INFINITY, f64::max);
+    if most - least > TAU * (1.0 + 1e-6) {
+        return x.to_vec();
+    }
     let mut turns = 0.0;
     let mut last = x.first().copied().unwrap_or(0.0);
     x.iter()
@@ -485,4 +491,21 @@ fn unwrapped(x: &[f64]) -> Vec<f64> {
             x + TAU * turns
         })
         .collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn phases_that_count_their_turns_are_left_alone() {
+        // 2.15 Hz seen twice a second: more than a turn a sample.
+        let counted: Vec<f64> = (0..20).map(|k| TAU * 1.075 * f64::from(k)).collect();
+        assert_eq!(unwrapped(&counted), counted);
+        let fine: Vec<f64> = (0..200).map(|k| 0.45 * f64::from(k) - 1.0).collect();
+        let within: Vec<f64> = fine.iter().map(|x| x.sin().atan2(x.cos())).collect();
+        for (a, b) in unwrapped(&within).iter().zip(&fine) {
+            assert!((a - b).abs() < 1e-12, "{a} {b}");
+        }
+    }
 }

@@ -108,6 +108,9 @@ pub(crate) fn problem(key: &str, message: impl Into<String>) -> Problem {
 /// Most samples that a run may log, and cells that its noise may have; beyond it a slip of the keyboard is likelier than a wish.
 pub(crate) const MOST_SAMPLES: f64 = 1e9;
 
+/// Most steps that a run of fixed steps may take: an hour or so of computing.
+const MOST_STEPS: f64 = 1e10;
+
 /// Checks everything that the types do not.
 ///
 /// # Errors
@@ -226,8 +229,18 @@ pub fn check(scene: &Scene) -> Result<(), Problem> {
         ));
     }
     Checker::positive("solver.step_s", scene.solver.step_s)?;
-    crate::solve::method(&scene.solver.method)
+    let method = crate::solve::method(&scene.solver.method)
         .map_err(|message| problem("solver.method", message))?;
+    if !method.adaptive && scene.duration_s / scene.solver.step_s > MOST_STEPS {
+        return Err(problem(
+            "solver.step_s",
+            format!(
+                "{} s in steps of {} s are more than {MOST_STEPS:e}; take longer ones",
+                shown(scene.duration_s),
+                shown(scene.solver.step_s)
+            ),
+        ));
+    }
 
     crate::effects::check(scene)
 }

@@ -116,6 +116,8 @@ const CHATTER_S: f64 = 1e-9;
 /// So long it is then clamped; twice as long as the last time, up to the longest, if it has been off the edge for less than so many times as long.
 const CLAMPED_S: f64 = 2.0 * CHATTER_S;
 const LONGEST_CLAMPED_S: f64 = 1e-5;
+/// The same where nothing moves the handle off its edge: then the moment at which something does is known to this.
+const LONGEST_AT_REST_S: f64 = 1e-3;
 const BACK_AT_ONCE: f64 = 32.0;
 
 /// Whether every number is at most `most` in size; false for what is not a number. Without a branch for each.
@@ -487,12 +489,19 @@ impl<'m> Course<'m> {
         self.model.forces(self.t_s, &self.y, &mut self.w);
         self.stats.evaluations += 1;
         for i in 0..self.contacts.len() {
-            let recent = &self.recent[i];
-            let long_enough = self.t_s - recent.event_s >= 0.5 * recent.clamped_for_s;
-            if self.contacts[i] == Contact::Clamped && long_enough {
-                let contact = Self::standing(self.w.of(i, |p| p.unclamped));
-                self.set_contact(i, contact);
+            if self.contacts[i] != Contact::Clamped {
+                continue;
             }
+            let contact = Self::standing(self.w.of(i, |p| p.unclamped));
+            let recent = &mut self.recent[i];
+            if self.t_s - recent.event_s < 0.5 * recent.clamped_for_s {
+                self.edge_s = self.edge_s.min(recent.event_s + recent.clamped_for_s);
+                continue;
+            }
+            if contact == Contact::Clamped {
+                recent.clamped_for_s = (2.0 * recent.clamped_for_s).min(LONGEST_AT_REST_S);
+            }
+            self.set_contact(i, contact);
         }
     }
 
@@ -509,7 +518,8 @@ impl<'m> Course<'m> {
     fn set_contact(&mut self, i: usize, contact: Contact) {
         self.contacts[i] = contact;
         if contact == Contact::Clamped {
-            self.edge_s = self.t_s + self.recent[i].clamped_for_s;
+            let until_s = self.t_s + self.recent[i].clamped_for_s;
+            self.edge_s = self.edge_s.min(until_s);
         }
         let (gain, floor) = match contact {
             Contact::Closed => (1.0, f64::NEG_INFINITY),
