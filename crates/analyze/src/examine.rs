@@ -486,7 +486,6 @@ impl<'a> Pass<'a> {
             let start_ns = i128::from(self.recording.info().start_ns);
             match self.request.window {
                 (None, None) => {
-                    entry.stream.push(values, finite);
                     if rows.is_some() && entry.times.is_none() {
                         entry.times = Some(Times::default());
                     }
@@ -494,9 +493,14 @@ impl<'a> Pass<'a> {
                     if batch.channel != entry.channel && entry.times.is_none() {
                         entry.times = Some(self.times[entry.channel].clone());
                     }
-                    if let Some(own) = &mut entry.times {
-                        own.push(times);
-                    }
+                    let gaps = match &mut entry.times {
+                        Some(own) => {
+                            own.push(times);
+                            own.gaps()
+                        }
+                        None => self.times[batch.channel].gaps(),
+                    };
+                    entry.stream.push(values, finite, gaps);
                 }
                 _ => {
                     let inside =
@@ -505,8 +509,9 @@ impl<'a> Pass<'a> {
                         .filter(|(t, _)| inside(**t))
                         .map(|(t, x)| (*t, *x))
                         .unzip();
-                    entry.stream.push(&x, finite);
-                    entry.times.get_or_insert_default().push(&kept);
+                    let own = entry.times.get_or_insert_default();
+                    own.push(&kept);
+                    entry.stream.push(&x, finite, own.gaps());
                 }
             }
         }

@@ -147,6 +147,16 @@ pub struct Times {
     first: Vec<(u64, f64)>,
     /// Messages that share the time of the last.
     shared: u64,
+    gaps: Vec<Gap>,
+}
+
+/// Messages that were lost before one of a batch.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Gap {
+    /// Its place in the batch.
+    pub before: usize,
+    /// How many, as far as the rate tells.
+    pub missing: u64,
 }
 
 /// A step so many times the mean of those before it is a gap; the first few are measured against their median.
@@ -172,6 +182,8 @@ impl Times {
             return;
         };
         self.buffer.clear();
+        self.gaps.clear();
+        let place = usize::from(self.count == 0);
         if self.count == 0 {
             (self.first_ns, self.earliest_ns, self.latest_ns) = (first, first, first);
         } else {
@@ -183,7 +195,7 @@ impl Times {
             self.earliest_ns = self.earliest_ns.min(*t);
             self.latest_ns = self.latest_ns.max(*t);
         }
-        for step in &self.buffer {
+        for (k, step) in self.buffer.iter().enumerate() {
             // Messages that came together share the step to them; a clock that steps back tells no rate.
             if *step <= 0.0 {
                 self.shared = if *step < 0.0 { 0 } else { self.shared + 1 };
@@ -199,11 +211,22 @@ impl Times {
                 // Against the mean of those before, without a division for every message.
                 self.ordinary += messages;
                 self.ordinary_s += step;
+            } else {
+                let periods = (step * self.ordinary as f64 / self.ordinary_s).round() as u64;
+                self.gaps.push(Gap {
+                    before: k + place,
+                    missing: periods.saturating_sub(messages),
+                });
             }
         }
         self.count += times_ns.len() as u64;
         self.last_ns = last;
         self.steps.push_finite(&self.buffer);
+    }
+
+    /// Where messages were lost in the batch that was pushed last; known once the first steps have shown the rate.
+    pub fn gaps(&self) -> &[Gap] {
+        &self.gaps
     }
 
     /// Messages so far.
@@ -283,9 +306,24 @@ impl Stream {
         }
     }
 
-    /// The next values, and whether all are known to be finite. Others do not count; in the spectrum the last finite one stands for them, and
-    /// those before the first are left out.
-    pub fn push(&mut self, x: &[f64], finite: bool) {
+    /// The next values, whether all are known to be finite, and where between them others were lost ([`Times::gaps`]).
+    ///
+    /// What is not finite does not count; in the spectrum the last finite value stands for it, and what comes before the first is left out. Lost
+    /// values are bridged there ([`WelchStream::bridge`]).
+    pub fn push(&mut self, x: &[f64], finite: bool, gaps: &[Gap]) {
+        let mut from = 0;
+        for gap in gaps {
+            self.push_on(&x[from..gap.before], finite);
+            let next = Some(x[gap.before]).filter(|x| x.is_finite()).or(self.held);
+            if let (Some(welch), Some(last), Some(next)) = (&mut self.welch, self.held, next) {
+                welch.bridge(gap.missing, last, next);
+            }
+            from = gap.before;
+        }
+        self.push_on(&x[from..], finite);
+    }
+
+    fn push_on(&mut self, x: &[f64], finite: bool) {
         if finite || x.iter().all(|x| x.is_finite()) {
             self.moments.push_finite(x);
             if let Some(last) = x.last() {
@@ -412,18 +450,65 @@ mod tests {
                 }
             })
             .collect();
-        s.push(&x, false);
+        s.push(&x, false, &[]);
         times.push(&(0..1000).map(|k| k * 10_000_000).collect::<Vec<_>>());
         let (summary, _) = s.finish(&times, "m", false);
         assert_eq!(summary.count, 941);
         assert!((summary.peak_hz.unwrap() - 5.0).abs() < 0.1);
     }
 
+    /// A tone keeps its frequency whatever is lost of it: many short parts, a long one, all but short ones.
+    #[test]
+    fn lost_messages_do_not_move_a_line() {
+        let keep: [(&str, fn(f64) -> bool); 5] = [
+            ("all", |_| true),
+            ("many", |t| t % 5.0 < 4.6),
+            ("long", |t| !(30.0..35.2).contains(&t)),
+            ("most", |t| !(9.0..51.3).contains(&t)),
+            ("islands", |t| t % 12.0 < 8.0),
+        ];
+        for (what, keep) in keep {
+            for batch in [1, 64, 10_000] {
+                let t: Vec<f64> = (0..6000).map(|k| f64::from(k) / 100.0).collect();
+                let t: Vec<f64> = t.into_iter().filter(|t| keep(*t)).collect();
+                let x: Vec<f64> = t
+                    .iter()
+                    .map(|t| 3.0 + (std::f64::consts::TAU * 1.3 * t).sin())
+                    .collect();
+                let (mut stream, mut times) = (Stream::new(100.0, 1024), Times::default());
+                for (t, x) in t.chunks(batch).zip(x.chunks(batch)) {
+                    let ns: Vec<i64> = t.iter().map(|t| (t * 1e9).round() as i64).collect();
+                    times.push(&ns);
+                    stream.push(x, true, times.gaps());
+                }
+                let peak_hz = stream.finish(&times, "", false).0.peak_hz.unwrap();
+                assert!((peak_hz - 1.3).abs() < 0.01, "{what} {batch}: {peak_hz}");
+            }
+        }
+    }
+
+    /// Gaps that would be filled with more than came are not.
+    #[test]
+    fn absurd_gaps_cost_nothing() {
+        let (mut stream, mut times) = (Stream::new(1e6, 1 << 20), Times::default());
+        let mut ns = 0;
+        for k in 0..100_000 {
+            ns += if k < 100 || k % 2 == 0 {
+                1_000
+            } else {
+                200_000_000
+            };
+            times.push(&[ns]);
+            stream.push(&[f64::from(k % 7)], true, times.gaps());
+        }
+        assert!(stream.finish(&times, "", true).1.is_some());
+    }
+
     #[test]
     fn a_constant_has_no_peak() {
         let mut s = Stream::new(100.0, 128);
         let mut times = Times::default();
-        s.push(&[9.81; 500], true);
+        s.push(&[9.81; 500], true, &[]);
         times.push(&(0..500).map(|k| k * 10_000_000).collect::<Vec<_>>());
         assert_eq!(s.finish(&times, "", false).0.peak_hz, None);
     }

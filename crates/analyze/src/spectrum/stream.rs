@@ -14,6 +14,10 @@ pub struct WelchStream {
     buffer: Vec<f64>,
     sums: Vec<f64>,
     count: usize,
+    /// The longest part that came before a restart and made no segment.
+    aside: Vec<f64>,
+    samples: u64,
+    bridged: u64,
     /// How many samples came while all were the same, and which: they are not held and not transformed, since nothing is left of them
     /// without their mean. `None` once one was different.
     still: Option<(usize, f64)>,
@@ -32,13 +36,40 @@ impl WelchStream {
             fs_hz,
             options: *options,
             buffer: Vec::new(),
+            aside: Vec::new(),
+            samples: 0,
+            bridged: 0,
             sums: Vec::new(),
             count: 0,
         })
     }
 
     /// The next samples. They have to be finite: leave others out before.
-    pub fn push(&mut self, mut x: &[f64]) {
+    pub fn push(&mut self, x: &[f64]) {
+        self.samples += x.len() as u64;
+        self.feed(x);
+    }
+
+    /// Goes on after `missing` samples that were lost between `last` and `next`: along the straight line between these, so that lines keep their
+    /// phase, or, where they would be more than a quarter of a segment or all of them together more than what came, with a new segment.
+    pub fn bridge(&mut self, missing: u64, last: f64, next: f64) {
+        self.bridged = self.bridged.saturating_add(missing);
+        if missing > self.segments.nperseg as u64 / 4 || self.bridged > self.samples {
+            let part = std::mem::take(&mut self.buffer);
+            if part.len() > self.aside.len() {
+                self.aside = part;
+            }
+            return;
+        }
+        let share = 1.0 / (missing + 1) as f64;
+        let line: Vec<f64> = (1..=missing)
+            .map(|k| k as f64 * share)
+            .map(|u| last * (1.0 - u) + next * u)
+            .collect();
+        self.feed(&line);
+    }
+
+    fn feed(&mut self, mut x: &[f64]) {
         if let Some((count, value)) = &mut self.still {
             if let (0, Some(first)) = (*count, x.first()) {
                 *value = *first;
@@ -111,7 +142,10 @@ impl WelchStream {
             return moved.finish_at(fs_hz);
         }
         if self.count == 0 {
-            return super::welch(&self.buffer, fs_hz, &self.options);
+            let longest = [&self.buffer, &self.aside]
+                .into_iter()
+                .max_by_key(|part| part.len());
+            return super::welch(longest.map_or(&[], |part| part), fs_hz, &self.options);
         }
         let mut sums = self.sums.clone();
         sums.resize(self.segments.bins(), 0.0);

@@ -24,7 +24,7 @@ pub fn draw(store: &mut Store<'_>, take: &Take) -> anyhow::Result<Vec<Panel>> {
         // What `analyze` estimates from the load's sensor stands over the display's own estimate.
         let known =
             take.main_imu.as_ref() == Some(&sensor.topic) && !take.inputs.roll_rad.is_empty();
-        out.extend(self::sensor(store, sensor, !known, take.growing)?);
+        out.extend(self::sensor(store, sensor, !known, take)?);
     }
     for topic in &take.topics {
         out.push(self::topic(store, topic, take.growing)?);
@@ -51,7 +51,7 @@ fn sensor(
     store: &mut Store<'_>,
     sensor: &Sensor,
     attitude: bool,
-    growing: bool,
+    take: &Take,
 ) -> anyhow::Result<Option<Panel>> {
     let origin = place(&sensor.topic);
     let xyz = "x vermilion, y green, z blue";
@@ -88,10 +88,13 @@ fn sensor(
             continue;
         }
         let path = format!("{origin}/{name}");
-        let range = spread(&made, growing);
+        let range = spread(&made, take.growing);
         plots.push(plot(store, title, &path, made, range)?);
     }
-    let f_hz = gait_line(&sensor.accel_spectra).or_else(|| gait_line(&sensor.gyro_spectra));
+    // One f for all of a recording; where nothing tells it, the sensor's own line.
+    let f_hz = spectra::drive_hz(take)
+        .or_else(|| gait_line(&sensor.accel_spectra))
+        .or_else(|| gait_line(&sensor.gyro_spectra));
     let top_hz = f_hz.map_or(TOP_HZ, |f_hz| (TOP_TIMES * f_hz).clamp(4.0, TOP_HZ));
     let mut small: Vec<View> = Vec::new();
     let groups = [

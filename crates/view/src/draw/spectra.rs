@@ -4,7 +4,8 @@
 //!
 //! Rerun plots over timelines only, and its bar charts have no logarithm; hence lines in a plane with ticks of their own.
 
-use analyze::spectrum::{DEFAULT_SEGMENT_S, Options, Spectrum, welch};
+use analyze::peaks::SpectrumSummary;
+use analyze::spectrum::Spectrum;
 use re_sdk_types::archetypes::{LineStrips2D, Points2D};
 use re_sdk_types::components::Radius;
 
@@ -19,6 +20,12 @@ const WIDTH: f64 = 1.5;
 const HEIGHT: f64 = 1.0;
 /// The lowest power that is drawn, dB below the peak.
 const FLOOR_DB: f64 = -60.0;
+/// The axis reaches at least so far, Hz: a slow line is seen as slow.
+const LEAST_TOP_HZ: f64 = 4.0;
+/// Fewer bins make no spectrum for the eye.
+const FEWEST_BINS: usize = 12;
+/// What moves by no more, m or rad, is at rest: its spectrum is of rounding.
+const NOTHING: f64 = 1e-9;
 
 /// One curve.
 pub struct Curve<'a> {
@@ -30,48 +37,44 @@ pub struct Curve<'a> {
     pub color: u32,
 }
 
+/// The drive's frequency f, Hz, as in every table: the beat where one is known, else the strongest line of the height.
+pub fn drive_hz(take: &Take) -> Option<f64> {
+    let number = |name: &str| take.metrics.number(name);
+    number("beat_hz").or_else(|| number("peak_hz"))
+}
+
 /// Draws the spectra of height and roll where there are both or one of them.
 pub fn draw(store: &mut Store<'_>, take: &Take) -> anyhow::Result<Option<View>> {
-    let inputs = &take.inputs;
-    let window = take.window;
+    let (inputs, f_hz) = (&take.inputs, drive_hz(take));
+    let top_hz = f_hz.map_or(6.0, |f| (2.6 * f).max(LEAST_TOP_HZ));
     let of = |x: &[f64]| -> Option<Spectrum> {
-        if x.len() != inputs.t_s.len() {
-            return None;
-        }
-        let mut range = window.range(&inputs.t_s);
-        // An estimated height is not known at the very beginning and end.
-        let known = |k: &usize| x[*k].is_finite();
-        range = range.clone().find(known)?..range.clone().rfind(known)? + 1;
-        let step_s = analyze::inputs::mean_step_s(&inputs.t_s[range.clone()])?;
-        let options = Options::seconds(DEFAULT_SEGMENT_S, 1.0 / step_s);
-        // Non-finite samples have no spectrum: the curve is left out.
-        welch(&x[range], 1.0 / step_s, &options).ok()
+        let finite = || x.iter().copied().filter(|x| x.is_finite());
+        let range = finite().fold(f64::MIN, f64::max) - finite().fold(f64::MAX, f64::min);
+        let found = SpectrumSummary::of(&inputs.t_s, x, take.window, f_hz, "")?.spectrum;
+        let told = bins(&found, top_hz).count() >= FEWEST_BINS && peak(&found, top_hz) > 0.0;
+        (told && range > NOTHING).then_some(found)
     };
     let (height, roll) = (of(&inputs.height_m), of(&inputs.roll_rad));
-    // f is the metric, from the same code as in every table.
-    let f_hz = take.metrics.number("peak_hz");
-    let mut curves = Vec::new();
-    if let Some(spectrum) = &height {
-        curves.push(Curve {
-            entity: "height",
-            spectrum,
-            color: palette::BLUE,
-        });
-    }
-    if let Some(spectrum) = &roll {
-        curves.push(Curve {
-            entity: "roll",
-            spectrum,
-            color: palette::VERMILION,
-        });
-    }
-    let title = match curves.len() {
-        2 => "Spectra of height (blue), roll (vermilion)",
-        1 if height.is_some() => "Spectrum of the height",
-        1 => "Spectrum of the roll",
-        _ => return Ok(None),
+    let title = match (&height, &roll) {
+        (Some(_), Some(_)) => "Spectra of height (blue), roll (vermilion)",
+        (Some(_), None) => "Spectrum of the height",
+        (None, Some(_)) => "Spectrum of the roll",
+        (None, None) => return Ok(None),
     };
-    let top_hz = f_hz.map_or(6.0, |f| 2.6 * f);
+    let found = [
+        ("height", &height, palette::BLUE),
+        ("roll", &roll, palette::VERMILION),
+    ];
+    let curves: Vec<Curve<'_>> = found
+        .into_iter()
+        .filter_map(|(entity, spectrum, color)| {
+            Some(Curve {
+                entity,
+                spectrum: spectrum.as_ref()?,
+                color,
+            })
+        })
+        .collect();
     // Metres and radians have no common decibel.
     let own = curves
         .iter()
@@ -128,7 +131,12 @@ pub fn drawing(
         return Ok(None);
     }
     axes(store, origin, top_hz)?;
-    if let Some(f_hz) = f_hz {
+    // In the first bins lies what is left of drifts, no line.
+    let resolved = |f_hz: &f64| {
+        let mut all = curves.iter();
+        all.any(|c| c.spectrum.hz.get(3).is_some_and(|hz| f_hz >= hz))
+    };
+    if let Some(f_hz) = f_hz.filter(resolved) {
         marks(store, origin, f_hz, top_hz)?;
     }
     Ok(Some(View::plane(
@@ -282,6 +290,7 @@ fn text(
 #[cfg(test)]
 mod tests {
     use super::*;
+    use analyze::spectrum::{Options, welch};
 
     #[test]
     fn a_line_is_drawn_at_its_frequency_and_at_the_top() {

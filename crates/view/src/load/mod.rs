@@ -140,6 +140,8 @@ impl<'a> Plan<'a> {
             "tf2_msgs/TFMessage",
             "foxglove.FrameTransform",
             "foxglove.FrameTransforms",
+            // Sound has no curve but the one that nobody sees at this scale.
+            "foxglove.RawAudio",
         ];
         let mut ours = of(&schemas);
         // The state says the same.
@@ -183,16 +185,16 @@ fn within(path: &str, topic: &str, field: &str) -> bool {
 
 /// Stamps, covariances and status fields are no curves that anybody wants to see.
 fn is_measurement(path: &str) -> bool {
-    ![
-        "covariance",
-        ".stamp.",
-        ".header.",
-        ".seq",
-        ".sec",
-        ".nanosec",
-    ]
-    .iter()
-    .any(|word| path.contains(word))
+    let words = [
+        "stamp",
+        "header",
+        "timestamp",
+        "seq",
+        "sec",
+        "nsec",
+        "nanosec",
+    ];
+    !path.contains("covariance") && !path.split('.').any(|part| words.contains(&part))
 }
 
 /// The scene's name and seed, where the recording says them.
@@ -206,5 +208,29 @@ fn name_of_scene(take: &mut Take, info: &Info) {
             .map(|seed| format!(", seed {seed}"))
             .unwrap_or_default();
         take.name = format!("{scene}{seed}");
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn stamps_are_no_measurements_and_fields_that_sound_like_them_are() {
+        for path in [
+            "/imu.header.stamp.sec",
+            "/drum.timestamp.nanos",
+            "/x.seq",
+            "/imu.orientation_covariance[3]",
+        ] {
+            assert!(!is_measurement(path), "{path}");
+        }
+        for path in [
+            "/truss.section_force_n",
+            "/machine.sequence",
+            "/imu.angular_velocity.x",
+        ] {
+            assert!(is_measurement(path), "{path}");
+        }
     }
 }

@@ -1,8 +1,8 @@
 //! An inertial sensor: thinned curves, spectra and an estimate of its attitude, from samples that stream by.
 
 use analyze::imu::orientation;
-use analyze::spectrum::stream::WelchStream;
-use analyze::spectrum::{DEFAULT_SEGMENT_S, Options, Spectrum};
+use analyze::spectrum::{DEFAULT_SEGMENT_S, Spectrum};
+use analyze::summary::{self, Times};
 use recording::read::Batch;
 
 use super::stream::push;
@@ -13,34 +13,37 @@ use crate::thin::Thin;
 pub struct Stream {
     gyro: [Thin; 3],
     accel: [Thin; 3],
-    gyro_spectra: [Option<WelchStream>; 3],
-    accel_spectra: [Option<WelchStream>; 3],
+    gyro_spectra: [summary::Stream; 3],
+    accel_spectra: [summary::Stream; 3],
     filter: Option<orientation::Causal>,
+    /// Samples since it began.
+    turned: u64,
+    options: orientation::Options,
     attitude: [Thin; 2],
-    last_ns: Option<i64>,
     period_s: f64,
 }
 
 impl Stream {
-    /// For a sensor of this rate; `thin` begins a curve of this name.
-    pub fn new(rate_hz: f64, mut thin: impl FnMut(&str) -> Thin) -> Self {
-        let welch =
-            || WelchStream::new(rate_hz, &Options::seconds(DEFAULT_SEGMENT_S, rate_hz)).ok();
+    /// For a sensor of about this rate and so many messages; `thin` begins a curve of this name.
+    pub fn new(rate_hz: f64, messages: u64, mut thin: impl FnMut(&str) -> Thin) -> Self {
+        let wanted = (rate_hz * DEFAULT_SEGMENT_S).clamp(16.0, 1e6) as u64;
+        let spectrum = || summary::Stream::new(rate_hz, wanted.min(messages.max(2)) as usize);
         let axes = ["x", "y", "z"];
         Stream {
             gyro: axes.map(&mut thin),
             accel: axes.map(&mut thin),
-            gyro_spectra: axes.map(|_| welch()),
-            accel_spectra: axes.map(|_| welch()),
+            gyro_spectra: axes.map(|_| spectrum()),
+            accel_spectra: axes.map(|_| spectrum()),
             filter: None,
+            turned: 0,
+            options: orientation::Options::default(),
             attitude: ["roll", "pitch"].map(&mut thin),
-            last_ns: None,
             period_s: 1.0 / rate_hz,
         }
     }
 
-    /// Takes the next samples.
-    pub fn push(&mut self, batch: &Batch<'_>) {
+    /// Takes the next samples, whose times `times` took last.
+    pub fn push(&mut self, batch: &Batch<'_>, times: &Times) {
         let mut columns: [Option<&[f64]>; 6] = [None; 6];
         for column in batch.columns {
             let of = |field: &str, base: usize| {
@@ -55,60 +58,57 @@ impl Stream {
             else {
                 continue;
             };
-            let (thin, welch) = match k {
+            let (thin, spectrum) = match k {
                 0..3 => (&mut self.gyro[k], &mut self.gyro_spectra[k]),
                 _ => (&mut self.accel[k - 3], &mut self.accel_spectra[k - 3]),
             };
-            push(thin, batch.times_ns, column.rows, column.values);
-            match welch {
-                Some(welch) if column.values.iter().all(|x| x.is_finite()) => {
-                    welch.push(column.values)
+            push(thin, batch.times_ns, column.rows, column.values, times);
+            match column.rows {
+                None => {
+                    spectrum.push(column.values, column.finite, times.gaps());
+                    columns[k] = Some(column.values);
                 }
-                // A hole in the samples would be a jump in the phase of every line: no spectrum rather than a wrong one.
-                welch => *welch = None,
-            }
-            if column.rows.is_none() {
-                columns[k] = Some(column.values);
+                Some(_) => spectrum.push(column.values, column.finite, &[]),
             }
         }
         if let [Some(gx), Some(gy), Some(gz), Some(ax), Some(ay), Some(az)] = columns {
-            self.turn(batch.times_ns, [gx, gy, gz], [ax, ay, az]);
+            self.turn(batch.times_ns, times, [gx, gy, gz], [ax, ay, az]);
         }
     }
 
-    /// Runs the causal orientation filter over a batch.
-    fn turn(&mut self, times_ns: &[i64], gyro: [&[f64]; 3], accel: [&[f64]; 3]) {
-        let period_s = self.period_s;
-        let filter = self.filter.get_or_insert_with(|| {
-            orientation::Causal::new(period_s, orientation::Options::default())
-        });
-        let mut times = Vec::with_capacity(times_ns.len());
-        let mut angles = [
-            Vec::with_capacity(times_ns.len()),
-            Vec::with_capacity(times_ns.len()),
-        ];
-        for (k, t) in times_ns.iter().enumerate() {
-            let (w, a) = (gyro.map(|g| g[k]), accel.map(|a| a[k]));
-            let dt_s = self
-                .last_ns
-                .map_or(period_s, |last| t.saturating_sub(last) as f64 / 1e9);
-            let whole = w.iter().chain(&a).all(|x| x.is_finite());
-            if dt_s <= 0.0 || !whole {
-                continue;
+    /// Runs the causal orientation filter over a batch. It begins anew after lost samples, and is believed when it has heard as much as it
+    /// averages over: one sample of a gait says nothing of where down is.
+    fn turn(&mut self, times_ns: &[i64], times: &Times, gyro: [&[f64]; 3], accel: [&[f64]; 3]) {
+        let mut gaps = times.gaps().iter().map(|gap| gap.before).peekable();
+        let unsettled = (self.options.tau_s / self.period_s) as u64;
+        let mut angles = [(); 2].map(|()| Vec::with_capacity(times_ns.len()));
+        for k in 0..times_ns.len() {
+            if gaps.next_if_eq(&k).is_some() {
+                (self.filter, self.turned) = (None, 0);
             }
-            self.last_ns = Some(*t);
-            let (roll, pitch, _) = filter.update(dt_s, w, a).euler_angles();
-            times.push(*t);
-            angles[0].push(roll.to_degrees());
-            angles[1].push(pitch.to_degrees());
+            let (w, a) = (gyro.map(|g| g[k]), accel.map(|a| a[k]));
+            let mut shown = [f64::NAN; 2];
+            if w.iter().chain(&a).all(|x| x.is_finite()) {
+                let filter = self
+                    .filter
+                    .get_or_insert_with(|| orientation::Causal::new(self.period_s, self.options));
+                let (roll, pitch, _) = filter.update(self.period_s, w, a).euler_angles();
+                self.turned += 1;
+                if self.turned > unsettled {
+                    shown = [roll.to_degrees(), pitch.to_degrees()];
+                }
+            }
+            for (angles, shown) in angles.iter_mut().zip(shown) {
+                angles.push(shown);
+            }
         }
         for (thin, angles) in self.attitude.iter_mut().zip(&angles) {
-            thin.push(&times, angles);
+            thin.push(times_ns, angles);
         }
     }
 
     /// What is drawn of it.
-    pub fn finish(self, topic: &str) -> Sensor {
+    pub fn finish(self, topic: &str, times: &Times) -> Sensor {
         let curves = |thin: [Thin; 3]| -> Vec<Curve> {
             let curves: Vec<Curve> = thin.into_iter().map(Thin::finish).collect();
             // A field that the sensor does not have stands in its messages as zeros.
@@ -119,14 +119,17 @@ impl Stream {
                 Vec::new()
             }
         };
-        let spectra = |welch: [Option<WelchStream>; 3]| -> Vec<Spectrum> {
-            let all: Option<Vec<Spectrum>> = welch.into_iter().map(|w| w?.finish().ok()).collect();
+        let spectra = |axes: [summary::Stream; 3]| -> Vec<Spectrum> {
+            let all: Option<Vec<Spectrum>> = axes
+                .into_iter()
+                .map(|axis| axis.finish(times, "", true).1)
+                .collect();
             all.unwrap_or_default()
         };
         let attitude: Vec<Curve> = self.attitude.into_iter().map(Thin::finish).collect();
         let (gyro, accel) = (curves(self.gyro), curves(self.accel));
         // Without a gyroscope there is an average inclination at best: nothing to call a roll.
-        let none = gyro.is_empty() || attitude[0].values.is_empty();
+        let none = gyro.is_empty() || !attitude[0].values.iter().any(|x| x.is_finite());
         Sensor {
             topic: topic.to_owned(),
             gyro,
@@ -139,8 +142,86 @@ impl Stream {
 }
 
 impl Sensor {
-    /// Whether anything was measured.
+    /// Whether anything was measured more than once.
     pub fn has_any(&self) -> bool {
-        !self.gyro.is_empty() || !self.accel.is_empty()
+        let two = |c: &Curve| c.values.iter().filter(|x| x.is_finite()).nth(1).is_some();
+        self.gyro.iter().chain(&self.accel).any(two)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use recording::read::Column;
+    use std::f64::consts::TAU;
+
+    /// A sensor that turns to and fro about x by 1.3 Hz, and nods up and down with it, in batches; without the samples that `lost` names.
+    fn drawn(lost: impl Fn(f64) -> bool) -> Sensor {
+        let t_s: Vec<f64> = (0..6000).map(|k| f64::from(k) / 100.0).collect();
+        let t_s: Vec<f64> = t_s.into_iter().filter(|t| !lost(*t)).collect();
+        let times_ns: Vec<i64> = t_s.iter().map(|t| (t * 1e9).round() as i64).collect();
+        let still = vec![0.0; t_s.len()];
+        let of = |f: fn(f64) -> f64| t_s.iter().map(|t| f(*t)).collect::<Vec<f64>>();
+        let (rate, up) = (
+            of(|t| 0.1 * (TAU * 1.3 * t).cos()),
+            of(|t| 9.81 + (TAU * 1.3 * t).sin()),
+        );
+        let paths = ["angular_velocity", "linear_acceleration"]
+            .map(|field| ["x", "y", "z"].map(|axis| format!("/imu.{field}.{axis}")));
+        let values = [[&rate, &still, &still], [&still, &still, &up]];
+        let mut times = Times::default();
+        let mut sensor: Option<Stream> = None;
+        for from in (0..t_s.len()).step_by(700) {
+            let part = from..(from + 700).min(t_s.len());
+            let columns: Vec<Column<'_>> = (0..6)
+                .map(|k| Column {
+                    id: k,
+                    path: &paths[k / 3][k % 3],
+                    rows: None,
+                    values: &values[k / 3][k % 3][part.clone()],
+                    finite: true,
+                })
+                .collect();
+            let batch = Batch {
+                channel: 0,
+                topic: "/imu",
+                schema: "sensor_msgs/Imu",
+                times_ns: &times_ns[part],
+                stamps_ns: None,
+                columns: &columns,
+            };
+            times.push(batch.times_ns);
+            let hz = times.hz_between_gaps().unwrap();
+            sensor
+                .get_or_insert_with(|| {
+                    Stream::new(hz, 6000, |name| Thin::new(name, 0, 60_000_000_000, 0, 1))
+                })
+                .push(&batch, &times);
+        }
+        sensor.unwrap().finish("/imu", &times)
+    }
+
+    #[test]
+    fn lost_samples_break_curves_and_leave_lines_and_attitude_right() {
+        let lost: [fn(f64) -> bool; 4] = [
+            |_| false,
+            |t| (30.0..35.2).contains(&t),
+            |t| t % 5.0 >= 4.6,
+            |t| t < 40.0,
+        ];
+        for (case, lost) in lost.into_iter().enumerate() {
+            let sensor = drawn(lost);
+            for spectrum in [&sensor.gyro_spectra[0], &sensor.accel_spectra[2]] {
+                let peak_hz = spectrum.peak_hz().unwrap();
+                assert!((peak_hz - 1.3).abs() < 0.01, "{case}: {peak_hz}");
+            }
+            let holes = |c: &Curve| c.values.iter().filter(|x| x.is_nan()).count();
+            assert_eq!(holes(&sensor.gyro[0]), [0, 1, 11, 0][case], "{case}");
+            // It turns by 0.7 degrees to either side.
+            let most = (sensor.attitude[0].values.iter())
+                .filter(|x| x.is_finite())
+                .fold(0.0, |m: f64, x| m.max(x.abs()));
+            assert!((0.3..1.2).contains(&most), "{case}: {most}");
+        }
     }
 }

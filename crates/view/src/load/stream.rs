@@ -1,7 +1,8 @@
 //! Everything that is drawn as curves of its own, sensors and topics that are not ours: read once and thinned on the way.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 
+use analyze::summary::Times;
 use recording::Finding;
 use recording::read::{Batch, ReadError, Recording};
 use recording::signal::unit_of;
@@ -28,11 +29,10 @@ pub fn others(
     findings: &mut Vec<Finding>,
 ) -> Result<(), ReadError> {
     let info = recording.info();
-    let messages: BTreeMap<&str, u64> = info
-        .channels
-        .iter()
-        .map(|c| (c.topic.as_str(), c.messages))
-        .collect();
+    let mut messages: BTreeMap<&str, u64> = BTreeMap::new();
+    for channel in &info.channels {
+        *messages.entry(&channel.topic).or_default() += channel.messages;
+    }
     let curves = 8 * plan.imus.len() as u64
         + info
             .channels
@@ -61,23 +61,29 @@ pub fn others(
         coarsest_ns = coarsest_ns.max(thin.interval_ns());
         thin
     };
+    let mut times: BTreeMap<String, Times> = BTreeMap::new();
     let mut sensors: BTreeMap<&str, sensor::Stream> = BTreeMap::new();
-    for topic in &plan.imus {
-        let count = messages.get(topic).copied().unwrap_or(0);
-        if count < 2 || span_s <= 0.0 {
-            continue;
-        }
-        let rate_hz = (count - 1) as f64 / span_s;
-        sensors.insert(
-            topic,
-            sensor::Stream::new(rate_hz, |name| thin(name, topic)),
-        );
-    }
     let mut plain: BTreeMap<String, Vec<(String, String, Thin)>> = BTreeMap::new();
+    let mut left_out: BTreeSet<String> = BTreeSet::new();
+    let mut fields_left_out: BTreeMap<String, BTreeSet<String>> = BTreeMap::new();
     // The second pass looks at other fields of the same file: what is odd about it was said in the first.
     let more = recording.stream(&|path| plan.is_streamed(path), &mut |batch: &Batch<'_>| {
-        if let Some(sensor) = sensors.get_mut(batch.topic) {
-            sensor.push(batch);
+        if !times.contains_key(batch.topic) {
+            times.insert(batch.topic.to_owned(), Times::default());
+        }
+        let Some(times) = times.get_mut(batch.topic) else {
+            return;
+        };
+        times.push(batch.times_ns);
+        if let Some(topic) = plan.imus.iter().find(|topic| **topic == batch.topic) {
+            let sensor = sensors.entry(topic).or_insert_with(|| {
+                let count = messages.get(topic).copied().unwrap_or(0);
+                // A topic need not last as long as the file.
+                let rough_hz = (count.max(2) - 1) as f64 / span_s;
+                let rate_hz = times.hz_between_gaps().unwrap_or(rough_hz);
+                sensor::Stream::new(rate_hz, count, |name| thin(name, topic))
+            });
+            sensor.push(batch, times);
             return;
         }
         let known = plain.len();
@@ -86,6 +92,9 @@ pub fn others(
             false if known < MAX_TOPICS => Some(plain.entry(batch.topic.to_owned()).or_default()),
             false => None,
         }) else {
+            if !left_out.contains(batch.topic) {
+                left_out.insert(batch.topic.to_owned());
+            }
             return;
         };
         for column in batch.columns {
@@ -101,9 +110,21 @@ pub fn others(
                     topic.push((field.to_owned(), unit, thin(field, batch.topic)));
                     topic.len() - 1
                 }
-                None => continue,
+                None => {
+                    fields_left_out
+                        .entry(batch.topic.to_owned())
+                        .or_default()
+                        .insert(field.to_owned());
+                    continue;
+                }
             };
-            push(&mut topic[at].2, batch.times_ns, column.rows, column.values);
+            push(
+                &mut topic[at].2,
+                batch.times_ns,
+                column.rows,
+                column.values,
+                times,
+            );
         }
     })?;
     for finding in more {
@@ -113,7 +134,7 @@ pub fn others(
     }
     take.imus = sensors
         .into_iter()
-        .map(|(topic, sensor)| sensor.finish(topic))
+        .map(|(topic, sensor)| sensor.finish(topic, &times[topic]))
         .filter(Sensor::has_any)
         .collect();
     // The load's own sensor comes first.
@@ -124,6 +145,19 @@ pub fn others(
         .map(|(name, curves)| topic(name, curves))
         .filter(|t| !t.plots.is_empty())
         .collect();
+    if !left_out.is_empty() {
+        let names: Vec<&str> = left_out.iter().map(String::as_str).collect();
+        take.notes.push(format!(
+            "{MAX_TOPICS} topics beside the sensors are drawn; not these: {}.",
+            names.join(", ")
+        ));
+    }
+    for (topic, fields) in fields_left_out {
+        take.notes.push(format!(
+            "{topic}: {MAX_CURVES} of {} fields are drawn.",
+            MAX_CURVES + fields.len()
+        ));
+    }
     if coarsest_ns > 0 {
         take.notes.push(format!(
             "Curves with many samples show the smallest and the largest value of every {:.3} s at their own times.",
@@ -133,15 +167,26 @@ pub fn others(
     Ok(())
 }
 
-/// The next values of a column; `rows` are their places among the times, where not every message has one.
-pub fn push(thin: &mut Thin, times_ns: &[i64], rows: Option<&[u32]>, values: &[f64]) {
-    match rows {
-        None => thin.push(times_ns, values),
-        Some(rows) => {
-            let times: Vec<i64> = rows.iter().map(|row| times_ns[*row as usize]).collect();
-            thin.push(&times, values);
+/// The next values of a column; `rows` are their places among the times, where not every message has one. Nothing is drawn through where messages
+/// were lost ([`Times::gaps`]).
+pub fn push(
+    thin: &mut Thin,
+    times_ns: &[i64],
+    rows: Option<&[u32]>,
+    values: &[f64],
+    times: &Times,
+) {
+    let Some(rows) = rows else {
+        let mut from = 0;
+        for gap in times.gaps() {
+            thin.push(&times_ns[from..gap.before], &values[from..gap.before]);
+            thin.push(&[times_ns[gap.before].saturating_sub(1)], &[f64::NAN]);
+            from = gap.before;
         }
-    }
+        return thin.push(&times_ns[from..], &values[from..]);
+    };
+    let times: Vec<i64> = rows.iter().map(|row| times_ns[*row as usize]).collect();
+    thin.push(&times, values);
 }
 
 /// A plain topic: curves of one unit share a plot.
@@ -149,7 +194,14 @@ fn topic(name: String, curves: Vec<(String, String, Thin)>) -> Topic {
     let mut plots: Vec<(String, Vec<Curve>)> = Vec::new();
     for (_, unit, thin) in curves {
         let curve = thin.finish();
-        if !curve.values.iter().any(|x| x.is_finite()) {
+        // One point makes no curve.
+        if curve
+            .values
+            .iter()
+            .filter(|x| x.is_finite())
+            .nth(1)
+            .is_none()
+        {
             continue;
         }
         match plots.iter_mut().find(|(u, _)| *u == unit) {
