@@ -25,6 +25,55 @@ fn expect(text: &str, place: &str, words: &[&str]) {
 }
 
 #[test]
+fn a_list_is_no_table() {
+    expect(
+        "name = \"a\"\nbody = [70]",
+        "2:8",
+        &["body", "found a list, expected a table"],
+    );
+    let harmonics = "name = \"a\"\n[effects.gait]\nharmonics = [[2, [0.0, 0.0, 0.1]]]";
+    expect(
+        harmonics,
+        "3:14",
+        &["effects.gait.harmonics.0", "expected a table"],
+    );
+    for setting in [
+        "effects.contact=[]",
+        "start=[2.0]",
+        "body.inertia_kg_m2=[1,2,3]",
+    ] {
+        let said = load("music", &[setting.to_owned()])
+            .unwrap_err()
+            .to_string();
+        let key = setting.split('=').next().unwrap();
+        assert_eq!(
+            said,
+            format!("--set: {key}: found a list, expected a table")
+        );
+    }
+}
+
+/// A scene that is right without the settings is wrong by them, though the key that is complained about is another.
+#[test]
+fn settings_are_blamed_for_what_they_make_wrong() {
+    for setting in [
+        "duration_s=1e9",
+        "effects.lift.onset_s=5",
+        "body.inertia_kg_m2.xx=100",
+    ] {
+        let said = load("music", &[setting.to_owned()])
+            .unwrap_err()
+            .to_string();
+        assert!(said.starts_with("--set: "), "{said}");
+    }
+    let text = "name = \"a\"\nduration_s = -1.0";
+    let said = parse("scene.toml", text, &["seed=7".into()])
+        .unwrap_err()
+        .to_string();
+    assert!(said.starts_with("scene.toml:2:"), "{said}");
+}
+
+#[test]
 fn unknown_keys_are_answered_with_the_nearest() {
     expect(
         "name = \"a\"\ndurration_s = 3",

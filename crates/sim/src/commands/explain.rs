@@ -312,6 +312,12 @@ fn write_effects(out: &mut String, found: &Findings) -> std::fmt::Result {
          'without' what it takes without the effect (the motion is another then)",
         found.rhs_ns, found.ms_per_s
     )?;
+    if found.scene.effects.drum.is_some() {
+        writeln!(
+            out,
+            "the sound of the drum is made when a recording is written, beside the run: it is in none of these times"
+        )?;
+    }
     let names = found.model.state_names();
     writeln!(out, "state, {}: {}", names.len(), shortened(&names))
 }

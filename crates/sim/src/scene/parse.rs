@@ -67,34 +67,58 @@ pub fn load(name_or_path: &str, settings: &[String]) -> Result<Scene, SceneError
 /// As [`load`].
 pub fn parse(origin: &str, text: &str, settings: &[String]) -> Result<Scene, SceneError> {
     let scene: Scene = from_toml(origin, text)?;
-    let mut scene = if settings.is_empty() {
-        scene
+    if let Some(key) = list_for_table(&from_toml(origin, text)?, &scene) {
+        let message = format!("{key}: found a list, expected a table");
+        return Err(located(origin, text, find(text, &key), &message));
+    }
+    let checked = |scene: &mut Scene| scene.expand().and_then(|()| check(scene));
+    let mut changed = if settings.is_empty() {
+        scene.clone()
     } else {
-        apply(scene, settings)?
+        apply(scene.clone(), settings)?
     };
-    scene
-        .expand()
-        .and_then(|()| check(&scene))
-        .map_err(|problem| {
-            let was_set = settings.iter().any(|s| {
-                s.split('=')
-                    .next()
-                    .is_some_and(|k| problem.key.starts_with(k.trim()))
-            });
-            let message = format!("{}: {}", problem.key, problem.message);
-            match find(text, &problem.key) {
-                Some(span) if !was_set => located(origin, text, Some(span), &message),
-                _ => SceneError::Value {
-                    origin: if was_set {
-                        "--set".into()
-                    } else {
-                        origin.into()
-                    },
-                    message,
+    checked(&mut changed).map_err(|problem| {
+        // What is wrong only with the settings is theirs, whatever the key.
+        let was_set = !settings.is_empty() && checked(&mut scene.clone()).is_ok();
+        let message = format!("{}: {}", problem.key, problem.message);
+        match find(text, &problem.key) {
+            Some(span) if !was_set => located(origin, text, Some(span), &message),
+            _ => SceneError::Value {
+                origin: if was_set {
+                    "--set".into()
+                } else {
+                    origin.into()
                 },
+                message,
+            },
+        }
+    })?;
+    Ok(changed)
+}
+
+/// The key of a list that serde took for a table's values in their order, which nobody means.
+fn list_for_table(given: &toml::Table, scene: &Scene) -> Option<String> {
+    fn within(given: &toml::Value, meant: &toml::Value) -> Option<String> {
+        use toml::Value::{Array, Table};
+        let below = |name: String, more: String| match more.is_empty() {
+            true => name,
+            false => format!("{name}.{more}"),
+        };
+        match (given, meant) {
+            (Array(_), Table(_)) => Some(String::new()),
+            (Table(given), Table(meant)) => given.iter().find_map(|(name, value)| {
+                within(value, meant.get(name)?).map(|more| below(name.clone(), more))
+            }),
+            (Array(given), Array(meant)) => {
+                (given.iter().zip(meant).enumerate()).find_map(|(k, (given, meant))| {
+                    within(given, meant).map(|m| below(k.to_string(), m))
+                })
             }
-        })?;
-    Ok(scene)
+            _ => None,
+        }
+    }
+    let meant: toml::Table = toml::from_str(&to_toml(scene)).ok()?;
+    within(&given.clone().into(), &meant.into())
 }
 
 /// Reads anything from TOML with errors as readable as a scene's: line and column, and the nearest name after a slip.
@@ -231,7 +255,11 @@ fn apply(scene: Scene, settings: &[String]) -> Result<Scene, SceneError> {
         set_key(&mut table, &path, parsed).map_err(|m| fail(format!("{key}: {m}")))?;
         // One setting at a time, so that the message names the setting at fault.
         match toml::Table::try_into::<Scene>(table.clone()) {
-            Ok(_) => {}
+            Ok(scene) => {
+                if let Some(key) = list_for_table(&table, &scene) {
+                    return Err(fail(format!("{key}: found a list, expected a table")));
+                }
+            }
             // A known key that is no switch: what it names is not there already.
             Err(e) if takes_away && e.message().starts_with("invalid type: boolean") => {
                 table = before;
