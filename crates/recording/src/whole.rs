@@ -42,6 +42,16 @@ fn forget(path: &Path) {
     }
 }
 
+/// What the system said, without the name of the unfinished file that the error may carry.
+pub(crate) fn plain(error: io::Error) -> io::Error {
+    use io::ErrorKind::{NotFound, PermissionDenied, StorageFull};
+    match error.kind() {
+        NotFound => io::Error::new(NotFound, "there is no such folder; make it first"),
+        kind @ (PermissionDenied | StorageFull) if error.get_ref().is_some() => kind.into(),
+        _ => error,
+    }
+}
+
 /// Where the bytes go.
 pub enum Sink {
     /// A file that is not complete.
@@ -97,7 +107,7 @@ impl Sink {
             // As any new file: the system takes away what the umask forbids.
             builder.permissions(fs::Permissions::from_mode(0o666));
         }
-        let file = builder.tempfile_in(folder)?;
+        let file = builder.tempfile_in(folder).map_err(plain)?;
         if let Ok(mut paths) = UNFINISHED.lock() {
             paths.push(file.path().to_owned());
         }
@@ -202,6 +212,14 @@ mod tests {
         );
         assert!(apart([&*y, &*round_about.join("y")], [&*x]).is_err());
         assert!(apart([Path::new("/dev/null"), Path::new("/dev/null")], []).is_ok());
+    }
+
+    #[test]
+    fn a_folder_that_is_not_there_is_said_without_the_temporary_name() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("none").join("x");
+        let error = write_whole::<Error>(&path, |_| Ok(())).unwrap_err();
+        assert_eq!(error.to_string(), "there is no such folder; make it first");
     }
 
     #[cfg(unix)]

@@ -19,23 +19,14 @@ use std::{
 
 use mcap::records::MessageHeader;
 
-use crate::{cdr, read::ChannelInfo, topics::MessageKind, whole::Sink};
+use crate::whole::{Sink, plain};
+use crate::{cdr, read::ChannelInfo, topics::MessageKind};
 use beside::{Batch, Beside};
 use container::Container;
 pub use options::WriterOptions;
 
 /// A message larger than this is refused.
 const MAX_MESSAGE_BYTES: usize = 256 << 20;
-
-/// What the system said, without the name of the unfinished file that the error may carry.
-fn plain(error: io::Error) -> io::Error {
-    use io::ErrorKind::{NotFound, PermissionDenied, StorageFull};
-    match error.kind() {
-        NotFound => io::Error::new(NotFound, "there is no such folder"),
-        kind @ (PermissionDenied | StorageFull) if error.get_ref().is_some() => kind.into(),
-        _ => error,
-    }
-}
 
 /// Why a recording could not be written. Nothing is left under the final name.
 #[derive(Debug, thiserror::Error)]

@@ -212,6 +212,35 @@ fn sensor_logger_signs_and_gravity() {
 }
 
 #[test]
+fn sensor_logger_rows_out_of_order_and_cut() {
+    let head = "time,seconds_elapsed,z,y,x\n";
+    let row = |k: u64| {
+        format!(
+            "{},{},{k},0,0\n",
+            1_700_000_000_000_000_000 + k * 10_000_000,
+            k
+        )
+    };
+    let rows = |order: &[u64]| head.to_owned() + &order.iter().map(|k| row(*k)).collect::<String>();
+    let order: Vec<u64> = (0..40).collect();
+    let mixed: Vec<u64> = (0..10).chain(20..30).chain(10..20).chain(30..40).collect();
+    let folder = folder();
+    let path = folder.path().join("walk");
+    file(&path, "TotalAcceleration.csv", &rows(&order));
+    // The last row ends inside its time.
+    file(&path, "Gyroscope.csv", &(rows(&mixed) + "17000000"));
+    let got = ingest(folder.path(), &[path], None).expect("ingests");
+    let expected: Vec<f64> = (0..40).map(f64::from).collect();
+    assert_eq!(got.values("/imu/walk.angular_velocity.z"), expected);
+    assert_eq!(got.times("/imu/walk")[0], 1_700_000_000_000_000_000);
+    let notes = got.ingested.notes.join("; ");
+    assert!(
+        notes.contains("steps back once") && notes.contains("cut off"),
+        "{notes}"
+    );
+}
+
+#[test]
 fn movella_dot_wraps_and_turns_free_acceleration() {
     let folder = folder();
     // Upside down: a half turn about x; in free fall minus gravity, at rest, and moving up with 1 m/s².

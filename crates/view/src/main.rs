@@ -55,8 +55,9 @@ Exit codes: 0 done; 1 it could not; 2 wrong usage; 3 done, but the input was dam
 }
 
 fn main() -> ExitCode {
-    match run(&Arguments::parse()) {
-        Ok(findings) => report(&findings),
+    let arguments = Arguments::parse();
+    match run(&arguments) {
+        Ok(findings) => report(&name(&arguments.file), &findings),
         Err(error) => {
             recording::note!("view: {error:#}");
             ExitCode::FAILURE
@@ -65,10 +66,10 @@ fn main() -> ExitCode {
 }
 
 /// Says what was lost of the input.
-fn report(findings: &[Finding]) -> ExitCode {
+fn report(name: &str, findings: &[Finding]) -> ExitCode {
     let lost: Vec<&Finding> = findings.iter().filter(|f| f.kind.is_loss()).collect();
     for finding in &lost {
-        recording::note!("view: {finding}");
+        recording::note!("view: {name}: {finding}");
     }
     if lost.is_empty() {
         ExitCode::SUCCESS
@@ -79,6 +80,9 @@ fn report(findings: &[Finding]) -> ExitCode {
 
 fn run(arguments: &Arguments) -> anyhow::Result<Vec<Finding>> {
     if let Some(path) = &arguments.save {
+        if path.as_os_str() == "-" {
+            bail!("--save -: an .rrd is written to a file; give it a name");
+        }
         recording::whole::apart([path.as_path()], [arguments.file.as_path()])
             .map_err(anyhow::Error::msg)?;
         return save(&arguments.file, path);
@@ -148,7 +152,7 @@ fn source(file: &Path) -> anyhow::Result<Source> {
     }
     let recording = open(file)?;
     let (take, findings) = load(&name(file), &recording, Detail::Thinned)?;
-    check(file, &take)?;
+    check(file, &take, &findings)?;
     let id = view::recording_id(&take.name, recording.info());
     Ok(Source::Whole(Box::new(take), id, findings))
 }
@@ -162,14 +166,14 @@ fn send(file: &Path, source: Source, sink: &mut dyn Sink) -> anyhow::Result<Vec<
         }
         Source::Growing(input) => {
             let (take, findings) = view::live::follow(input, sink)?;
-            check(file, &take)?;
+            check(file, &take, &findings)?;
             Ok(findings)
         }
     }
 }
 
-/// A recording without any number has nothing to look at.
-fn check(file: &Path, take: &Take) -> anyhow::Result<()> {
+/// A recording without any number has nothing to look at; what was lost of it may be why.
+fn check(file: &Path, take: &Take, findings: &[Finding]) -> anyhow::Result<()> {
     let nothing = take.state_ns.is_empty()
         && take.force_ns.is_empty()
         && take.phase_ns.is_empty()
@@ -177,8 +181,10 @@ fn check(file: &Path, take: &Take) -> anyhow::Result<()> {
         && take.imus.is_empty()
         && take.topics.is_empty();
     if nothing {
+        let lost = findings.iter().find(|f| f.kind.is_loss());
+        let lost = lost.map_or(String::new(), |f| format!(". And {f}"));
         bail!(
-            "{}: has no signal that can be shown; expected numbers in protobuf, CDR, ROS 1 or JSON messages (`analyze` lists what is in it)",
+            "{}: has no signal that can be shown; expected numbers in protobuf, CDR, ROS 1 or JSON messages (`analyze` lists what is in it){lost}",
             name(file)
         );
     }
@@ -191,7 +197,7 @@ fn save(file: &Path, path: &Path) -> anyhow::Result<Vec<Finding>> {
         |error: &dyn std::fmt::Display| anyhow!("{}: cannot be written: {error}", path.display());
     let recording = open(file)?;
     let (take, findings) = load(&name(file), &recording, Detail::Thinned)?;
-    check(file, &take)?;
+    check(file, &take, &findings)?;
     write_whole(path, |file| {
         let mut encoded = Encoded::new(file)?;
         view::send(

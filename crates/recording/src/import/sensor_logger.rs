@@ -133,5 +133,16 @@ fn read_track(
         }
         track.push((t_ns, table.vector(row, [x, y, z])?));
     }
+    if !track.is_sorted_by_key(|(t_ns, _)| *t_ns) {
+        let late = track.windows(2).filter(|w| w[1].0 < w[0].0).count();
+        let often = match late {
+            1 => "once".to_owned(),
+            n => format!("{n} times"),
+        };
+        notes.push(format!(
+            "{name}: the clock steps back {often}; rows were put in the order of their times"
+        ));
+        track.sort_by_key(|(t_ns, _)| *t_ns);
+    }
     Ok(track)
 }
