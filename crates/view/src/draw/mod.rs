@@ -1,6 +1,7 @@
 //! Drawings, one file each. A drawing sends its entities and gives its view, or gives nothing where the recording has nothing for it.
 
 mod circle;
+mod course;
 mod events;
 mod sensors;
 mod series;

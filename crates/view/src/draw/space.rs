@@ -10,6 +10,7 @@ use re_sdk_types::components::FillMode;
 use re_sdk_types::datatypes::Quaternion;
 use recording::load::Load;
 
+use super::course;
 use crate::blueprint::View;
 use crate::palette;
 use crate::store::Store;
@@ -35,11 +36,12 @@ pub fn draw(store: &mut Store<'_>, take: &Take) -> anyhow::Result<Option<View>> 
     ground(store, take, pose)?;
     body(store, take, pose)?;
     trail(store, pose)?;
+    let headings = course::headings(pose);
     if let Some(carriers) = &take.carriers {
-        people(store, take, pose, carriers)?;
+        people(store, take, pose, &headings, carriers)?;
     }
     let forces = forces(store, take, pose)?;
-    let level_m = follow(store, pose)?;
+    let level_m = follow(store, pose, &headings)?;
 
     // Far enough to see the longest pole whole, a little from above and ahead.
     let reach_m = take
@@ -67,8 +69,8 @@ fn f32s(v: &[f64; 3]) -> [f32; 3] {
     v.map(|x| x as f32)
 }
 
-/// The frame that walks along at the mean height; gives that height.
-fn follow(store: &mut Store<'_>, pose: &Pose) -> anyhow::Result<f32> {
+/// The frame that walks along at the mean height and turns as the path does; gives that height.
+fn follow(store: &mut Store<'_>, pose: &Pose, headings: &[f64]) -> anyhow::Result<f32> {
     let heights: Vec<f64> = pose
         .position_m
         .iter()
@@ -82,9 +84,16 @@ fn follow(store: &mut Store<'_>, pose: &Pose) -> anyhow::Result<f32> {
         .map(|p| [p[0] as f32, p[1] as f32, level_m]);
     let columns = Transform3D::update_fields()
         .with_many_translation(places)
+        .with_many_quaternion(headings.iter().map(about_z))
         .columns_of_unit_batches()?;
     store.rows("/world/follow", &pose.times_ns, columns)?;
     Ok(level_m)
+}
+
+/// A turn about the vertical.
+fn about_z(angle_rad: &f64) -> Quaternion {
+    let (sin, cos) = (0.5 * angle_rad).sin_cos();
+    Quaternion::from_xyzw([0.0, 0.0, sin as f32, cos as f32])
 }
 
 /// A strip of ground under the whole path, with a line at every metre.
@@ -220,6 +229,7 @@ fn people(
     store: &mut Store<'_>,
     take: &Take,
     pose: &Pose,
+    headings: &[f64],
     carriers: &Carriers,
 ) -> anyhow::Result<()> {
     let (rows, count) = (carriers.times_ns.len(), carriers.points_m.len());
@@ -255,23 +265,17 @@ fn people(
             _ => vec![0.0; rows],
         })
         .collect();
+    // The heading in force at each moment of theirs: that of the last pose not after it.
+    let headings: Vec<f64> = carriers
+        .times_ns
+        .iter()
+        .map(|t| headings[pose.times_ns.partition_point(|p| p <= t).max(1) - 1])
+        .collect();
     let mut legs: Vec<Vec<[f32; 3]>> = Vec::with_capacity(rows * count);
-    for k in 0..rows {
+    for (k, heading) in headings.iter().enumerate() {
         for (points, phase) in carriers.points_m.iter().zip(&phase_at) {
-            let [x, y, z] = points[k];
-            let y = y + BESIDE_M;
-            let hip = [x, y, (z + shift_m - TORSO_M).max(0.2)];
-            // A gait cycle of the model is one step; the same foot swings every other.
-            let (sin, cos) = (0.5 * phase[k]).sin_cos();
-            let foot = |side: f64| {
-                let swing = (side * cos).max(0.0);
-                f32s(&[
-                    x + side * HALF_STRIDE_M * sin,
-                    y + side * 0.1,
-                    0.04 + FOOT_LIFT_M * swing,
-                ])
-            };
-            legs.push(vec![foot(1.0), f32s(&hip), foot(-1.0)]);
+            let shoulder = [points[k][0], points[k][1], points[k][2] + shift_m];
+            legs.push(legs_at(shoulder, *heading, phase[k]));
         }
     }
     let colors = || (0..count).map(|i| palette::carrier(i).0);
@@ -286,6 +290,7 @@ fn people(
         let places = points.iter().map(|p| f32s(&[p[0], p[1], p[2] + shift_m]));
         let columns = Transform3D::update_fields()
             .with_many_translation(places)
+            .with_many_quaternion(headings.iter().map(about_z))
             .columns_of_unit_batches()?;
         store.rows(&path, &carriers.times_ns, columns)?;
         let color = palette::carrier(i).0;
@@ -304,6 +309,29 @@ fn people(
         store.fixed(&format!("{path}/head"), &head)?;
     }
     Ok(())
+}
+
+/// Foot, hip and foot of a figure that walks towards `heading_rad` beside its shoulder's point.
+fn legs_at(shoulder: [f64; 3], heading_rad: f64, phase_rad: f64) -> Vec<[f32; 3]> {
+    let (sin, cos) = heading_rad.sin_cos();
+    let at = |ahead: f64, left: f64, z: f64| {
+        f32s(&[
+            shoulder[0] + ahead * cos - left * sin,
+            shoulder[1] + ahead * sin + left * cos,
+            z,
+        ])
+    };
+    // A gait cycle of the model is one step; the same foot swings every other.
+    let (stride, swing) = (0.5 * phase_rad).sin_cos();
+    let foot = |side: f64| {
+        at(
+            side * HALF_STRIDE_M * stride,
+            BESIDE_M + side * 0.1,
+            0.04 + FOOT_LIFT_M * (side * swing).max(0.0),
+        )
+    };
+    let hip = at(0.0, BESIDE_M, (shoulder[2] - TORSO_M).max(0.2));
+    vec![foot(1.0), hip, foot(-1.0)]
 }
 
 /// Arrows and handle marks; gives the name of what they are scaled by.
@@ -371,7 +399,7 @@ fn forces(store: &mut Store<'_>, take: &Take, pose: &Pose) -> anyhow::Result<Opt
 }
 
 /// A vector turned by a unit quaternion (x, y, z, w): v + 2w(u × v) + 2u × (u × v).
-fn rotate(q: &[f64; 4], v: &[f64; 3]) -> [f64; 3] {
+pub fn rotate(q: &[f64; 4], v: &[f64; 3]) -> [f64; 3] {
     let cross = |a: [f64; 3], b: [f64; 3]| {
         [
             a[1] * b[2] - a[2] * b[1],
@@ -387,6 +415,8 @@ fn rotate(q: &[f64; 4], v: &[f64; 3]) -> [f64; 3] {
 
 #[cfg(test)]
 mod tests {
+    use std::f64::consts::PI;
+
     use super::*;
 
     #[test]
@@ -396,6 +426,22 @@ mod tests {
         for (got, expected) in v.iter().zip([1.0, 0.0, 2.0]) {
             assert!((got - expected).abs() < 1e-12, "{v:?}");
         }
+    }
+
+    #[test]
+    fn legs_step_where_the_figure_walks() {
+        // The middle of a step: the feet are far apart, one ahead and one behind.
+        let [left, hip, right] = legs_at([3.0, 5.0, 1.3], 0.5 * PI, PI)[..] else {
+            panic!("two feet and a hip");
+        };
+        let close = |got: [f32; 3], x: f64, y: f64| {
+            assert!((f64::from(got[0]) - x).abs() < 1e-6, "{got:?}");
+            assert!((f64::from(got[1]) - y).abs() < 1e-6, "{got:?}");
+        };
+        // Towards y: left is towards −x.
+        close(hip, 3.0 - BESIDE_M, 5.0);
+        close(left, 3.0 - BESIDE_M - 0.1, 5.0 + HALF_STRIDE_M);
+        close(right, 3.0 - BESIDE_M + 0.1, 5.0 - HALF_STRIDE_M);
     }
 
     #[test]
