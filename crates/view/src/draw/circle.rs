@@ -63,11 +63,20 @@ pub fn draw(store: &mut Store<'_>, take: &Take) -> anyhow::Result<Option<View>> 
     let beat = &take.inputs.beat_phase_rad;
     let heard = beat.len() == rows && beat.iter().any(|psi| psi.is_finite());
     if heard {
-        let sounding: Vec<usize> = (0..rows).filter(|k| beat[*k].is_finite()).collect();
-        let times: Vec<i64> = sounding.iter().map(|k| take.phase_ns[*k]).collect();
-        let places = sounding.iter().map(|k| on_circle(beat[*k], BEAT_RADIUS));
-        let columns = Points2D::new(places).columns_of_unit_batches()?;
-        store.rows("/phases/beat", &times, columns)?;
+        // Where the beat falls silent an empty row takes its mark away: the viewer keeps the latest.
+        let sounds = |k: usize| beat[k].is_finite();
+        let told: Vec<usize> = (0..rows)
+            .filter(|k| sounds(*k) || (*k > 0 && sounds(k - 1)))
+            .collect();
+        let times: Vec<i64> = told.iter().map(|k| take.phase_ns[*k]).collect();
+        let sounding = told.iter().filter(|k| sounds(**k));
+        let places = sounding.map(|k| on_circle(beat[*k], BEAT_RADIUS));
+        let lengths = told.iter().map(|k| usize::from(sounds(*k)));
+        store.rows(
+            "/phases/beat",
+            &times,
+            Points2D::new(places).columns(lengths)?,
+        )?;
         let style = Points2D::update_fields()
             .with_radii([0.055f32])
             .with_colors([palette::WHITE])
@@ -88,4 +97,25 @@ pub fn draw(store: &mut Store<'_>, take: &Take) -> anyhow::Result<Option<View>> 
 fn on_circle(phase_rad: f64, radius: f64) -> [f32; 2] {
     let (sin, cos) = phase_rad.sin_cos();
     [(radius * cos) as f32, (-radius * sin) as f32]
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::draw::sent;
+
+    #[test]
+    fn the_beat_has_no_mark_while_it_is_silent() {
+        let mut take = Take {
+            phase_ns: (0..6).map(|k| k * 100_000_000).collect(),
+            ..Take::default()
+        };
+        take.inputs.phase_rad = vec![vec![0.0; 6]; 2];
+        take.inputs.beat_phase_rad = vec![f64::NAN, 0.1, 0.2, f64::NAN, f64::NAN, 0.3];
+        let sent = sent::by(|store| {
+            draw(store, &take).unwrap();
+        });
+        let marks = sent.lengths("/phases/beat", "Points2D:positions");
+        assert_eq!(marks, [1, 1, 0, 1]);
+    }
 }

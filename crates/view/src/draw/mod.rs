@@ -158,3 +158,51 @@ impl Panel {
         Node::Named(self.name, Box::new(node))
     }
 }
+
+/// What is sent, for tests.
+#[cfg(test)]
+pub mod sent {
+    use re_chunk::Chunk;
+    use re_log_types::{EntityPath, LogMsg};
+
+    use crate::store::{Sink, Store};
+
+    /// Keeps what it takes.
+    #[derive(Default)]
+    pub struct Kept(Vec<LogMsg>);
+
+    impl Sink for Kept {
+        fn send(&mut self, message: LogMsg) -> anyhow::Result<()> {
+            self.0.push(message);
+            Ok(())
+        }
+    }
+
+    impl Kept {
+        /// Of every row of a component of an entity, how many instances it has.
+        pub fn lengths(&self, entity: &str, component: &'static str) -> Vec<i32> {
+            let entity = EntityPath::parse_forgiving(entity);
+            let chunks = self.0.iter().filter_map(|message| match message {
+                LogMsg::ArrowMsg(_, message) => Some(Chunk::from_arrow_msg(message).unwrap()),
+                _ => None,
+            });
+            chunks
+                .filter(|chunk| *chunk.entity_path() == entity)
+                .flat_map(|chunk| {
+                    let column = chunk.components().get(component.into()).cloned();
+                    let lengths = |k| column.as_ref().map(|c| c.list_array.value_length(k));
+                    (0..chunk.num_rows())
+                        .filter_map(lengths)
+                        .collect::<Vec<i32>>()
+                })
+                .collect()
+        }
+    }
+
+    /// What is sent of a recording that begins at 0.
+    pub fn by(draw: impl FnOnce(&mut Store<'_>)) -> Kept {
+        let mut kept = Kept::default();
+        draw(&mut Store::recording(&mut kept, "id", "name", 0, None).unwrap());
+        kept
+    }
+}
