@@ -199,6 +199,9 @@ pub enum Play {
     Following,
 }
 
+/// Under this id the viewer keeps the time axis of all plots that are linked (its `GLOBAL_VIEW_ID`).
+const LINKED: Uuid = Uuid::from_u128(0x5C0D_CA6A_E63F_9CF7_F657_2602_5904_74CC);
+
 /// Sends the layout as the blueprint `id`.
 pub fn send(sink: &mut dyn Sink, id: &str, root: &Node, play: Play) -> anyhow::Result<()> {
     let mut out = Writer {
@@ -229,6 +232,10 @@ pub fn send(sink: &mut dyn Sink, id: &str, root: &Node, play: Play) -> anyhow::R
         .with_playback_speed(c::PlaybackSpeed(Float64(1.0)))
         .with_play_state(state);
     out.store.fixed("time_panel", &time)?;
+    // Left to itself the viewer shows half a minute before and after the cursor of what is longer than a minute.
+    let whole = a::TimeAxis::new().with_view_range(c::TimeRange(TimeRange::EVERYTHING));
+    out.store
+        .fixed(&format!("view/{LINKED}/TimeAxis"), &whole)?;
     out.store.activate()
 }
 
@@ -333,5 +340,20 @@ impl Writer<'_> {
                 .fixed(&place.to_string(), &a::VisibleTimeRanges::new([range]))?;
         }
         Ok((path, id))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::draw::sent::Kept;
+
+    #[test]
+    fn linked_plots_show_the_whole_recording() {
+        let mut kept = Kept::default();
+        let root = Node::View(View::plot("Height", "/plots/height"));
+        send(&mut kept, "id", &root, Play::Playing).unwrap();
+        let shared = "view/5c0dca6a-e63f-9cf7-f657-2602590474cc/TimeAxis";
+        assert_eq!(kept.lengths(shared, "TimeAxis:view_range"), [1]);
     }
 }
