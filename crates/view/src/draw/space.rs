@@ -41,7 +41,7 @@ pub fn draw(store: &mut Store<'_>, take: &Take) -> anyhow::Result<Option<View>> 
         people(store, take, pose, &headings, carriers)?;
     }
     let forces = forces(store, take, pose)?;
-    let level_m = follow(store, pose, &headings)?;
+    let look_m = follow(store, pose, &headings)?;
 
     // Far enough to see the longest pole whole, a little from above and ahead.
     let reach_m = take
@@ -51,7 +51,7 @@ pub fn draw(store: &mut Store<'_>, take: &Take) -> anyhow::Result<Option<View>> 
         .map(|h| h[0].abs().max(1.4 * h[1].abs()))
         .fold(1.2, f64::max) as f32;
     let eye = [0.5 * reach_m, -1.2 * reach_m - 0.6, 0.22 * reach_m + 0.4];
-    let target = [0.0, 0.0, 0.78 - level_m];
+    let target = [0.0, 0.0, look_m];
     let title = match forces {
         Some(unit) => format!(
             "Scene: {FAIR_SHARE_M} m of arrow = {unit}/{}; blue loaded, yellow nearly unloaded, vermilion slack",
@@ -69,25 +69,21 @@ fn f32s(v: &[f64; 3]) -> [f32; 3] {
     v.map(|x| x as f32)
 }
 
-/// The frame that walks along at the mean height and turns as the path does; gives that height.
+/// The frame that walks along and turns as the path does, at the mean height or, where the body climbs or falls, at its own; gives
+/// where to look in it, m above its origin.
 fn follow(store: &mut Store<'_>, pose: &Pose, headings: &[f64]) -> anyhow::Result<f32> {
-    let heights: Vec<f64> = pose
-        .position_m
-        .iter()
-        .map(|p| p[2])
-        .filter(|z| z.is_finite())
-        .collect();
-    let level_m = (heights.iter().sum::<f64>() / heights.len().max(1) as f64) as f32;
     let places = pose
         .position_m
         .iter()
-        .map(|p| [p[0] as f32, p[1] as f32, level_m]);
+        .zip(course::levels_m(pose))
+        .map(|(p, level_m)| f32s(&[p[0], p[1], level_m]));
     let columns = Transform3D::update_fields()
         .with_many_translation(places)
         .with_many_quaternion(headings.iter().map(about_z))
         .columns_of_unit_batches()?;
     store.rows("/world/follow", &pose.times_ns, columns)?;
-    Ok(level_m)
+    // Figures that stand on the ground are seen best from about their hips.
+    Ok(course::level_m(pose).map_or(0.0, |level_m| 0.78 - level_m as f32))
 }
 
 /// A turn about the vertical.
@@ -221,6 +217,8 @@ const FOOT_LIFT_M: f64 = 0.10;
 const HALF_STRIDE_M: f64 = 0.27;
 /// The pole lies on one shoulder: the figure stands so far beside it, m.
 const BESIDE_M: f64 = 0.17;
+/// So far from every handle a shoulder carries nothing, m: no figures are drawn then.
+const APART_M: f64 = 2.0;
 /// Shoulder to hip, m.
 const TORSO_M: f64 = 0.52;
 
@@ -247,10 +245,9 @@ fn people(
     let handle_m = mean(&mut pose.position_m.iter().map(|p| p[2]))
         + mean(&mut take.shape.handles_m.iter().map(|h| h[2]));
     let shoulder_m = mean(&mut carriers.points_m.iter().flatten().map(|p| p[2]));
-    let shift_m = if (shoulder_m - handle_m).abs() > 0.25 {
-        handle_m - shoulder_m
-    } else {
-        0.0
+    let shift_m = match handle_m - shoulder_m {
+        apart_m if (0.25..APART_M).contains(&apart_m.abs()) => apart_m,
+        _ => 0.0,
     };
     let hip_m = (handle_m - TORSO_M).max(0.3);
 
@@ -265,29 +262,48 @@ fn people(
             _ => vec![0.0; rows],
         })
         .collect();
-    // The heading in force at each moment of theirs: that of the last pose not after it.
-    let headings: Vec<f64> = carriers
+    // The pose in force at each moment of theirs: the last one not after it.
+    let moments: Vec<usize> = carriers
         .times_ns
         .iter()
-        .map(|t| headings[pose.times_ns.partition_point(|p| p <= t).max(1) - 1])
+        .map(|t| pose.times_ns.partition_point(|p| p <= t).max(1) - 1)
+        .collect();
+    let headings: Vec<f64> = moments.iter().map(|at| headings[*at]).collect();
+    let shoulder = |points: &[[f64; 3]], k: usize| {
+        let [x, y, z] = points[k];
+        [x, y, z + shift_m]
+    };
+    let shown: Vec<bool> = (0..rows)
+        .map(|k| {
+            let handles = handles_at(&take.shape.handles_m, pose, moments[k]);
+            let mut shoulders = carriers.points_m.iter().map(|points| shoulder(points, k));
+            handles.is_empty() || shoulders.all(|point| !is_apart(&point, &handles))
+        })
         .collect();
     let mut legs: Vec<Vec<[f32; 3]>> = Vec::with_capacity(rows * count);
-    for (k, heading) in headings.iter().enumerate() {
+    for k in (0..rows).filter(|k| shown[*k]) {
         for (points, phase) in carriers.points_m.iter().zip(&phase_at) {
-            let shoulder = [points[k][0], points[k][1], points[k][2] + shift_m];
-            legs.push(legs_at(shoulder, *heading, phase[k]));
+            legs.push(legs_at(shoulder(points, k), headings[k], phase[k]));
         }
     }
     let colors = || (0..count).map(|i| palette::carrier(i).0);
-    let columns = LineStrips3D::new(legs).columns(std::iter::repeat_n(count, rows))?;
+    let lengths = shown.iter().map(|shown| if *shown { count } else { 0 });
+    let columns = LineStrips3D::new(legs).columns(lengths)?;
     store.rows("/world/legs", &carriers.times_ns, columns)?;
     let style = LineStrips3D::update_fields()
         .with_radii([0.055f32])
         .with_colors(colors());
     store.fixed("/world/legs", &style)?;
+    // Torsos and heads stay as they are: they are said again only where they come or go.
+    let turns: Vec<usize> = (0..rows)
+        .filter(|k| *k == 0 || shown[*k] != shown[k - 1])
+        .collect();
+    let times: Vec<i64> = turns.iter().map(|k| carriers.times_ns[*k]).collect();
+    let lengths = || turns.iter().map(|k| usize::from(shown[*k]));
+    let each: usize = lengths().sum();
     for (i, points) in carriers.points_m.iter().enumerate() {
         let path = format!("/world/carrier_{}", i + 1);
-        let places = points.iter().map(|p| f32s(&[p[0], p[1], p[2] + shift_m]));
+        let places = (0..rows).map(|k| f32s(&shoulder(points, k)));
         let columns = Transform3D::update_fields()
             .with_many_translation(places)
             .with_many_quaternion(headings.iter().map(about_z))
@@ -295,20 +311,44 @@ fn people(
         store.rows(&path, &carriers.times_ns, columns)?;
         let color = palette::carrier(i).0;
         let length = (handle_m - hip_m - 0.12).max(0.1) as f32;
-        let torso = Capsules3D::from_lengths_and_radii([length], [0.13f32])
-            .with_translations([[0.0f32, BESIDE_M as f32, -(TORSO_M as f32) + 0.02]])
+        let torso = Capsules3D::from_lengths_and_radii(vec![length; each], vec![0.13f32; each])
+            .with_translations(vec![[0.0f32, BESIDE_M as f32, 0.02 - TORSO_M as f32]; each]);
+        let style = Capsules3D::update_fields()
             .with_colors([color])
             .with_fill_mode(FillMode::Solid);
-        store.fixed(&format!("{path}/torso"), &torso)?;
+        let path_of = |part: &str| format!("{path}/{part}");
+        store.rows(&path_of("torso"), &times, torso.columns(lengths())?)?;
+        store.fixed(&path_of("torso"), &style)?;
         let head = Ellipsoids3D::from_centers_and_half_sizes(
-            [[0.0f32, BESIDE_M as f32, 0.2]],
-            [[0.1f32, 0.09, 0.13]],
-        )
-        .with_colors([color])
-        .with_fill_mode(FillMode::Solid);
-        store.fixed(&format!("{path}/head"), &head)?;
+            vec![[0.0f32, BESIDE_M as f32, 0.2]; each],
+            vec![[0.1f32, 0.09, 0.13]; each],
+        );
+        let style = Ellipsoids3D::update_fields()
+            .with_colors([color])
+            .with_fill_mode(FillMode::Solid);
+        store.rows(&path_of("head"), &times, head.columns(lengths())?)?;
+        store.fixed(&path_of("head"), &style)?;
     }
     Ok(())
+}
+
+/// Where the handles are in the world at one moment of the pose.
+fn handles_at(handles_m: &[[f64; 3]], pose: &Pose, at: usize) -> Vec<[f64; 3]> {
+    let place = pose.position_m[at];
+    let turned = handles_m
+        .iter()
+        .map(|handle| rotate(&pose.orientation[at], handle));
+    turned
+        .map(|[x, y, z]| [place[0] + x, place[1] + y, place[2] + z])
+        .collect()
+}
+
+/// Whether a shoulder is far from all handles.
+fn is_apart(shoulder: &[f64; 3], handles: &[[f64; 3]]) -> bool {
+    handles.iter().all(|handle| {
+        let squares = (0..3).map(|i| (shoulder[i] - handle[i]).powi(2));
+        squares.sum::<f64>() > APART_M * APART_M
+    })
 }
 
 /// Foot, hip and foot of a figure that walks towards `heading_rad` beside its shoulder's point.
@@ -357,7 +397,8 @@ fn forces(store: &mut Store<'_>, take: &Take, pose: &Pose) -> anyhow::Result<Opt
         while at + 1 < pose.times_ns.len() && pose.times_ns[at + 1] <= take.force_ns[k] {
             at += 1;
         }
-        for (handle, force) in take.shape.handles_m.iter().zip(normal_n) {
+        let places = handles_at(&take.shape.handles_m, pose, at);
+        for (place, force) in places.iter().zip(normal_n) {
             let load = Load::of(force[k], scale_n, handles);
             let (color, radius) = match load {
                 Load::Loaded => (palette::DEEP, 0.06f32),
@@ -372,13 +413,7 @@ fn forces(store: &mut Store<'_>, take: &Take, pose: &Pose) -> anyhow::Result<Opt
                 0.0
             };
             vectors.push([0.0f32, 0.0, length as f32]);
-            let turned = rotate(&pose.orientation[at], handle);
-            let place = pose.position_m[at];
-            origins.push(f32s(&[
-                place[0] + turned[0],
-                place[1] + turned[1],
-                place[2] + turned[2],
-            ]));
+            origins.push(f32s(place));
         }
     }
     let marks = Points3D::new(origins.iter().copied())
@@ -418,6 +453,7 @@ mod tests {
     use std::f64::consts::PI;
 
     use super::*;
+    use crate::draw::sent;
 
     #[test]
     fn a_quarter_turn_about_x_takes_y_to_z() {
@@ -442,6 +478,32 @@ mod tests {
         close(hip, 3.0 - BESIDE_M, 5.0);
         close(left, 3.0 - BESIDE_M - 0.1, 5.0 + HALF_STRIDE_M);
         close(right, 3.0 - BESIDE_M + 0.1, 5.0 - HALF_STRIDE_M);
+    }
+
+    #[test]
+    fn figures_stand_only_where_they_can_carry() {
+        let pose = Pose {
+            times_ns: vec![0, 1, 2],
+            position_m: vec![[0.0, 0.0, 0.8], [0.0, 0.0, 0.5], [0.0, 0.0, 9.0]],
+            orientation: vec![[0.0, 0.0, 0.0, 1.0]; 3],
+        };
+        let points_m = [2.45, -2.45].map(|x| vec![[x, 0.0, 0.9]; 3]).to_vec();
+        let mut take = Take {
+            carriers: Some(Carriers {
+                times_ns: vec![0, 1, 2],
+                points_m,
+            }),
+            pose: Some(pose),
+            ..Take::default()
+        };
+        take.shape.handles_m = vec![[2.45, 0.0, 0.1], [-2.45, 0.0, 0.1]];
+        let sent = sent::by(|store| {
+            draw(store, &take).unwrap();
+        });
+        let legs = sent.lengths("/world/legs", "LineStrips3D:strips");
+        assert_eq!(legs, [2, 2, 0]);
+        let head = sent.lengths("/world/carrier_1/head", "Ellipsoids3D:half_sizes");
+        assert_eq!(head, [1, 0]);
     }
 
     #[test]
