@@ -1,5 +1,7 @@
 //! Colours, as 0xRRGGBBAA: those of Okabe and Ito, which colour-blind people tell apart, on a dark ground.
 
+use recording::load::Load;
+
 /// Behind scenes and drawings.
 pub const BACKGROUND: u32 = 0x16181C_FF;
 /// The ground.
@@ -47,6 +49,15 @@ pub fn carrier(number: usize) -> (u32, &'static str) {
         (GREY, "grey"),
     ];
     CARRIERS[number % CARRIERS.len()]
+}
+
+/// A handle by what it carries.
+pub fn load(load: Load) -> u32 {
+    match load {
+        Load::Loaded => DEEP,
+        Load::NearlyUnloaded => YELLOW,
+        Load::Slack => VERMILION,
+    }
 }
 
 /// Axes x, y, z of a sensor and the names of their colours.

@@ -402,13 +402,12 @@ fn forces(store: &mut Store<'_>, take: &Take, pose: &Pose) -> anyhow::Result<Opt
         let places = handles_at(&take.shape.handles_m, pose, at);
         for (place, force) in places.iter().zip(normal_n) {
             let load = Load::of(force[k], scale_n, handles);
-            let (color, radius) = match load {
-                Load::Loaded => (palette::DEEP, 0.06f32),
-                Load::NearlyUnloaded => (palette::YELLOW, 0.085),
-                Load::Slack => (palette::VERMILION, 0.12),
-            };
-            colors.push(color);
-            radii.push(radius);
+            colors.push(palette::load(load));
+            radii.push(match load {
+                Load::Loaded => 0.06f32,
+                Load::NearlyUnloaded => 0.085,
+                Load::Slack => 0.12,
+            });
             let length = if force[k].is_finite() {
                 force[k].max(0.0) * metres_per_newton
             } else {

@@ -5,6 +5,7 @@ use std::fmt::Write;
 use analyze::metrics::{Datum, METRICS, Metric, Value};
 use re_sdk_types::archetypes::TextDocument;
 
+use super::events;
 use crate::blueprint::View;
 use crate::store::Store;
 use crate::take::Take;
@@ -44,14 +45,29 @@ fn page(take: &Take) -> String {
             let _ = writeln!(text, "| {} | {shown} |", metric.label.replace('|', "/"));
         }
     }
-    for note in &take.notes {
-        let _ = write!(text, "\n\n{note}");
-    }
-    for (t_s, remark) in &take.remarks {
-        let when = t_s.map(|t_s| format!("{t_s:.2} s: ")).unwrap_or_default();
-        let _ = write!(text, "\n\n{when}{remark}");
+    for line in words(take) {
+        let _ = write!(text, "\n\n{line}");
     }
     text
+}
+
+/// Notes, the reader's remarks and what the log of events cuts short, each once.
+fn words(take: &Take) -> Vec<String> {
+    let mut out = take.notes.clone();
+    let remarks = take.remarks.iter().map(|(t_s, remark)| {
+        let when = t_s.map(|t_s| format!("{t_s:.2} s  ")).unwrap_or_default();
+        format!("{when}{}", events::once(remark))
+    });
+    for line in remarks.chain(events::cut(take)) {
+        // Notes say the reader's remarks too, some with their topic and some without.
+        if !out
+            .iter()
+            .any(|said| said.ends_with(&line) || line.ends_with(said.as_str()))
+        {
+            out.push(line);
+        }
+    }
+    out
 }
 
 /// Four significant digits and the unit.
@@ -83,5 +99,31 @@ mod tests {
         ] {
             assert_eq!(number(x, unit), shown);
         }
+    }
+
+    #[test]
+    fn what_the_log_cuts_stands_here_in_full_and_once() {
+        let gap =
+            "/imu/data: 3 gaps in the log times (usual interval 0.010 s), the longest 5.010 s";
+        let ends = "the file ends inside a chunk";
+        let take = Take {
+            events: vec![
+                analyze::events::Event {
+                    t_s: 30.0,
+                    kind: "gap",
+                    what: gap.into(),
+                },
+                analyze::events::Event {
+                    t_s: 31.0,
+                    kind: "beat_end",
+                    what: "the beat ends".into(),
+                },
+            ],
+            notes: vec![ends.into()],
+            remarks: vec![(None, ends.into()), (None, "/a: /a: odd".into())],
+            ..Take::default()
+        };
+        let gap = format!("30.00 s  gap: {gap}");
+        assert_eq!(words(&take), [ends, "/a: odd", gap.as_str()]);
     }
 }
