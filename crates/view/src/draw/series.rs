@@ -97,12 +97,20 @@ pub fn plot(
     })
 }
 
-/// How far an axis is stretched for a second number, as a share of its length.
-const FAR: f64 = 0.35;
+/// Room above and below the values, as a share of their range; less where numbers need it.
+const ROOM: [f64; 2] = [0.06, 0.02];
+/// The viewer writes numbers at multiples of a power of ten, where no more than so many fit into the axis of a plot among others.
+const MOST_NUMBERS: f64 = 7.5;
+/// A number that is written whole stands so far from the end of the axis, as a share of it.
+const WHOLE: f64 = 0.045;
 
-/// All values with a little room, and two numbers on the axis where it can be: the viewer writes them at multiples of powers of ten.
-/// `None` where there is nothing to choose, or where more values may come.
+/// All values with a little room, and two numbers on the axis. `None` where there is nothing to choose, or where more values may come.
 pub fn spread(curves: &[Line<'_>], growing: bool) -> Option<(f64, f64)> {
+    spread_over(curves, growing, 0.0)
+}
+
+/// The same over no less than `least`: what differs by less is level.
+fn spread_over(curves: &[Line<'_>], growing: bool, least: f64) -> Option<(f64, f64)> {
     let values = curves.iter().flat_map(|line| line.values.iter());
     let (low, high) = values
         .filter(|x| x.is_finite())
@@ -112,20 +120,41 @@ pub fn spread(curves: &[Line<'_>], growing: bool) -> Option<(f64, f64)> {
     if growing || !(low < high) {
         return None;
     }
-    let room = 0.06 * (high - low);
-    let (low, high) = (low - room, high + room);
-    let step = 10f64.powf((high - low).log10().floor());
-    let (first, last) = ((low / step).ceil() * step, (high / step).floor() * step);
-    // None or one: the next multiple on the nearer side makes two, where it is not far.
-    let (below, above) = (low - (first - step), last + step - high);
-    if last > first || below.min(above) > FAR * (high - low) {
-        return Some((low, high));
+    // The viewer's numbers have few digits: less than a millionth of the value would be none of them.
+    let least = least.max(1e-6 * low.abs().max(high.abs()));
+    let more = 0.5 * (least - (high - low)).max(0.0);
+    let (low, high) = (low - more, high + more);
+    let widened = |share: f64| (low - share * (high - low), high + share * (high - low));
+    let has_two = |&(low, high): &(f64, f64)| {
+        let (_, first, last) = numbers(low, high);
+        first < last
+    };
+    let range = ROOM.into_iter().map(widened).find(has_two);
+    let (low, high) = range.unwrap_or_else(|| widened(ROOM[1]));
+    let (step, mut first, mut last) = numbers(low, high);
+    if first > last {
+        // None: those on both sides.
+        (first, last) = (last, first);
+    } else if first == last {
+        // One: the next on the nearer side as well.
+        if low - (first - step) < last + step - high {
+            first -= step;
+        } else {
+            last += step;
+        }
     }
-    Some(if below < above {
-        (first - step - 0.5 * room, high)
-    } else {
-        (low, last + step + 0.5 * room)
-    })
+    let margin = WHOLE * (high.max(last) - low.min(first));
+    Some((low.min(first - margin), high.max(last + margin)))
+}
+
+/// Distance of the numbers on an axis, the first and the last of them; the first after the last where there are none.
+fn numbers(low: f64, high: f64) -> (f64, f64, f64) {
+    let step = 10f64.powf(((high - low) / MOST_NUMBERS).log10().ceil());
+    (
+        step,
+        (low / step).ceil() * step,
+        (high / step).floor() * step,
+    )
 }
 
 /// A plot: where its curves are, and what makes them and the title.
@@ -133,6 +162,10 @@ struct Plot {
     origin: &'static str,
     make: for<'a> fn(&'a Take) -> Option<(String, Vec<Line<'a>>)>,
     range: Option<(f64, f64)>,
+    /// Least range of values.
+    least: f64,
+    /// Beyond these there are none: a range ends there.
+    ends: (f64, f64),
     /// Seconds before and after the cursor that are shown, where all would be too many cycles to tell apart.
     near_s: Option<f64>,
 }
@@ -140,42 +173,57 @@ struct Plot {
 /// Seconds before and after the cursor in the plot of forces: some ten strides.
 const NEAR_S: f64 = 5.0;
 
+/// Values of any size.
+const EVERYWHERE: (f64, f64) = (f64::NEG_INFINITY, f64::INFINITY);
+
 /// The plots, from top to bottom.
 const PLOTS: &[Plot] = &[
     Plot {
         origin: "/plots/height",
         make: height,
         range: None,
+        least: 1e-3,
+        ends: EVERYWHERE,
         near_s: None,
     },
     Plot {
         origin: "/plots/angles",
         make: angles,
         range: None,
+        least: 0.01,
+        ends: (-190.0, 190.0),
         near_s: None,
     },
     Plot {
         origin: "/plots/forces",
         make: forces,
         range: None,
+        least: 0.0,
+        ends: EVERYWHERE,
         near_s: Some(NEAR_S),
     },
     Plot {
         origin: "/plots/synchrony",
         make: synchrony,
         range: Some((-0.05, 1.06)),
+        least: 0.0,
+        ends: EVERYWHERE,
         near_s: None,
     },
     Plot {
         origin: "/plots/energy",
         make: stored,
         range: None,
+        least: 0.0,
+        ends: EVERYWHERE,
         near_s: None,
     },
     Plot {
         origin: "/plots/ledger",
         make: ledger,
         range: None,
+        least: 0.0,
+        ends: EVERYWHERE,
         near_s: None,
     },
 ];
@@ -187,7 +235,12 @@ pub fn draw(store: &mut Store<'_>, take: &Take) -> anyhow::Result<Vec<View>> {
         let Some((title, curves)) = (plot.make)(take) else {
             continue;
         };
-        let range = plot.range.or_else(|| spread(&curves, take.growing));
+        let chosen = || spread_over(&curves, take.growing, plot.least);
+        let (lowest, highest) = plot.ends;
+        let range = plot
+            .range
+            .or_else(chosen)
+            .map(|(low, high)| (low.max(lowest), high.min(highest)));
         let view = self::plot(store, title, plot.origin, curves, range)?;
         views.push(match plot.near_s {
             Some(seconds) => view.near(seconds),
@@ -225,7 +278,8 @@ fn angles(take: &Take) -> Option<(String, Vec<Line<'_>>)> {
         palette::VERMILION,
         &take.state_ns,
         deg(roll),
-    );
+    )
+    .map(broken);
     let tilt = Line::new(
         "tilt",
         "tilt of the pole",
@@ -244,6 +298,31 @@ fn angles(take: &Take) -> Option<(String, Vec<Line<'_>>)> {
         format!("{title}{from}"),
         roll.into_iter().chain(tilt).collect(),
     ))
+}
+
+/// An angle that changes by more from one sample to the next, deg, has wrapped: nothing that is carried turns so fast.
+const WRAPPED_DEG: f64 = 150.0;
+
+/// The curve of an angle in degrees without strokes across the plot where it wraps.
+fn broken(line: Line<'_>) -> Line<'_> {
+    let wraps = |k: usize| k > 0 && (line.values[k] - line.values[k - 1]).abs() > WRAPPED_DEG;
+    if !(0..line.values.len()).any(wraps) {
+        return line;
+    }
+    let (mut times_ns, mut values) = (Vec::new(), Vec::new());
+    for (k, (t, x)) in line.times_ns.iter().zip(line.values.iter()).enumerate() {
+        if wraps(k) {
+            times_ns.push(i64::midpoint(line.times_ns[k - 1], *t));
+            values.push(f64::NAN);
+        }
+        times_ns.push(*t);
+        values.push(*x);
+    }
+    Line {
+        times_ns: times_ns.into(),
+        values: values.into(),
+        ..line
+    }
 }
 
 fn forces(take: &Take) -> Option<(String, Vec<Line<'_>>)> {
@@ -420,9 +499,17 @@ fn energies<'a>(
 mod tests {
     use super::*;
 
+    /// The range chosen for a curve between two values, and how many numbers the viewer writes whole on it.
+    fn chosen(low: f64, high: f64, least: f64) -> ((f64, f64), usize) {
+        let line = Line::new("x", "x", 0, &[0, 1], vec![low, high]).unwrap();
+        let (from, to) = spread_over(&[line], false, least).unwrap();
+        let (edge, step) = (0.04 * (to - from), numbers(from, to).0);
+        let (first, last) = (((from + edge) / step).ceil(), ((to - edge) / step).floor());
+        ((from, to), (last - first + 1.0).max(0.0) as usize)
+    }
+
     #[test]
     fn a_range_has_two_numbers_on_its_axis() {
-        let times = [0, 1];
         for (low, high) in [
             (0.81, 0.89),
             (-29.3, 29.4),
@@ -431,20 +518,38 @@ mod tests {
             (-0.001, 250.0),
             (0.96, 1.04),
             (0.72, 0.88),
+            (-6.6, 2.2),
+            (-52.0, 46.0),
+            (1.2, 8.8),
+            (-3.6, 3.6),
+            (-3.9, 3.9),
         ] {
-            let line = Line::new("x", "x", 0, &times, vec![low, high]).unwrap();
-            let (from, to) = spread(&[line], false).unwrap();
+            let ((from, to), numbers) = chosen(low, high, 0.0);
             assert!(from < low && to > high, "{low} {high}: {from} {to}");
-            assert!(to - from < 1.6 * (high - low), "{low} {high}: {from} {to}");
-            let step = 10f64.powf((1.12f64 * (high - low)).log10().floor());
-            let numbers = (to / step).floor() - (from / step).ceil();
-            assert!(numbers >= 1.0, "{low} {high}: {from} {to}");
+            assert!(to - from < 1.9 * (high - low), "{low} {high}: {from} {to}");
+            assert!(numbers >= 2, "{low} {high}: {from} {to}");
         }
-        // A second number would be as far away as the curve is high.
-        let wide = Line::new("x", "x", 0, &times, vec![-52.0, 46.0]).unwrap();
-        let (from, to) = spread(&[wide], false).unwrap();
-        assert!(from > -60.0 && to < 55.0, "{from} {to}");
-        let flat = Line::new("x", "x", 0, &times, vec![1.0, 1.0]).unwrap();
+        let flat = Line::new("x", "x", 0, &[0, 1], vec![1.0, 1.0]).unwrap();
         assert_eq!(spread(&[flat], false), None);
+    }
+
+    #[test]
+    fn what_is_level_but_for_rounding_is_drawn_level() {
+        let (low, high) = (0.775, 0.775 + 3e-16);
+        let ((from, to), numbers) = chosen(low, high, 1e-3);
+        assert!(to - from > 1e-3 && numbers >= 2, "{from} {to}");
+        let ((from, to), numbers) = chosen(low, high, 0.0);
+        assert!(to - from > 7e-7 && numbers >= 2, "{from} {to}");
+    }
+
+    #[test]
+    fn an_angle_that_wraps_breaks_off() {
+        let deg = vec![170.0, 178.0, -174.0, -166.0];
+        let line = Line::new("roll", "roll", 0, &[0, 10, 20, 30], deg).unwrap();
+        let line = broken(line);
+        assert_eq!(line.times_ns[..], [0, 10, 15, 20, 30]);
+        assert!(line.values[2].is_nan() && line.values[3] == -174.0);
+        let tilt = Line::new("tilt", "tilt", 0, &[0, 10], vec![-60.0, 70.0]).unwrap();
+        assert_eq!(broken(tilt).values.len(), 2);
     }
 }
