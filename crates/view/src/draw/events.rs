@@ -8,9 +8,9 @@ use crate::palette;
 use crate::store::Store;
 use crate::take::Take;
 
-/// Characters of a line: the log does not wrap, and its panel is narrow beside drawings of the scene.
+/// Characters of a line: the log does not wrap, and its panel is narrow beside two drawings below the scene.
 const NARROW: usize = 46;
-/// The same where there is no scene.
+/// The same elsewhere.
 const WIDE: usize = 62;
 
 /// The beginning of a line that is longer than `most`, cut after a word; the summary has it in full.
@@ -79,7 +79,12 @@ fn lines(take: &Take) -> Vec<Line> {
 
 /// Characters that a line of the log has room for.
 fn room(take: &Take) -> usize {
-    if take.pose.is_some() { NARROW } else { WIDE }
+    // The circle of phases stands beside it then.
+    if take.pose.is_some() && !take.inputs.phase_rad.is_empty() {
+        NARROW
+    } else {
+        WIDE
+    }
 }
 
 /// The lines that the log cuts, in full.
