@@ -2,7 +2,9 @@
 
 use std::f32::consts::TAU;
 
+use analyze::phase;
 use re_sdk_types::archetypes::{Arrows2D, LineStrips2D, Points2D};
+use re_sdk_types::components::Radius;
 
 use crate::blueprint::View;
 use crate::palette;
@@ -10,7 +12,13 @@ use crate::store::Store;
 use crate::take::Take;
 
 /// Radius at which the beat runs.
-const BEAT_RADIUS: f64 = 1.18;
+const BEAT_RADIUS: f64 = 1.13;
+/// Radius at which the carriers' numbers run.
+const NUMBER_RADIUS: f64 = 1.36;
+/// Angle between two numbers that do not cover each other, rad.
+const APART_RAD: f64 = 0.3;
+/// The viewer writes below the place: so far above it the place has to be.
+const ABOVE: f32 = 0.15;
 
 /// Draws the circle where there are phases.
 pub fn draw(store: &mut Store<'_>, take: &Take) -> anyhow::Result<Option<View>> {
@@ -54,11 +62,20 @@ pub fn draw(store: &mut Store<'_>, take: &Take) -> anyhow::Result<Option<View>> 
     store.rows("/phases/carriers", &take.phase_ns, columns)?;
     let style = Points2D::update_fields()
         .with_radii([0.075f32])
-        .with_colors((0..carriers).map(|i| palette::carrier(i).0))
-        .with_labels((1..=carriers).map(|i| i.to_string()))
-        // Of many that walk together the numbers would lie on each other; the colours are those of the figures.
-        .with_show_labels(carriers <= 2);
+        .with_colors((0..carriers).map(|i| palette::carrier(i).0));
     store.fixed("/phases/carriers", &style)?;
+    // Of more that walk together the numbers would lie on each other; the colours are those of the figures.
+    if let [first, second] = &phases[..] {
+        let places = (0..rows).flat_map(|k| numbers(first[k], second[k]));
+        let columns = Points2D::new(places).columns(std::iter::repeat_n(2, rows))?;
+        store.rows("/phases/numbers", &take.phase_ns, columns)?;
+        let style = Points2D::update_fields()
+            .with_radii([Radius::new_ui_points(0.0)])
+            .with_colors([palette::carrier(0).0, palette::carrier(1).0])
+            .with_labels(["1", "2"])
+            .with_show_labels(true);
+        store.fixed("/phases/numbers", &style)?;
+    }
 
     let beat = &take.inputs.beat_phase_rad;
     let heard = beat.len() == rows && beat.iter().any(|psi| psi.is_finite());
@@ -79,18 +96,27 @@ pub fn draw(store: &mut Store<'_>, take: &Take) -> anyhow::Result<Option<View>> 
         )?;
         let style = Points2D::update_fields()
             .with_radii([0.055f32])
-            .with_colors([palette::WHITE])
-            .with_labels(["beat"])
-            .with_show_labels(true);
+            .with_colors([palette::WHITE]);
         store.fixed("/phases/beat", &style)?;
     }
-    let title = if heard { "Phases and beat" } else { "Phases" };
-    Ok(Some(View::plane(
-        title,
-        "/phases",
-        [-1.4, 1.4],
-        [-1.4, 1.4],
-    )))
+    let title = if heard {
+        "Phases, beat (white)"
+    } else {
+        "Phases"
+    };
+    let reach = [-1.5, 1.5];
+    Ok(Some(View::plane(title, "/phases", reach, reach)))
+}
+
+/// Where two carriers' numbers stand: outside, where neither the arrow nor the other number covers them.
+fn numbers(first_rad: f64, second_rad: f64) -> [[f32; 2]; 2] {
+    let ahead_rad = phase::wrap(second_rad - first_rad);
+    let side = if ahead_rad < 0.0 { -0.5 } else { 0.5 };
+    let more_rad = side * (APART_RAD - ahead_rad.abs()).max(0.0);
+    [first_rad - more_rad, second_rad + more_rad].map(|angle_rad| {
+        let [x, y] = on_circle(angle_rad, NUMBER_RADIUS);
+        [x, y - ABOVE]
+    })
 }
 
 /// Where a phase stands; y points down in a drawing, and phases turn counter-clockwise.
@@ -117,5 +143,21 @@ mod tests {
         });
         let marks = sent.lengths("/phases/beat", "Points2D:positions");
         assert_eq!(marks, [1, 1, 0, 1]);
+    }
+
+    #[test]
+    fn numbers_of_carriers_in_step_stand_side_by_side() {
+        let distance = |[a, b]: [[f32; 2]; 2]| (a[0] - b[0]).hypot(a[1] - b[1]);
+        for (first, second) in [(0.4, 0.4), (0.4, 0.45), (3.1, -3.1), (0.3, 0.2)] {
+            let places = numbers(first, second);
+            assert!(distance(places) > 0.35, "{first} {second}: {places:?}");
+            // Counter-clockwise, which is upwards on the right, in the order of the phases.
+            let turn =
+                places[0][0] * (places[1][1] + ABOVE) - places[1][0] * (places[0][1] + ABOVE);
+            let ahead = phase::wrap(second - first) >= 0.0;
+            assert_eq!(turn < 0.0, ahead, "{first} {second}: {places:?}");
+        }
+        let [first, _] = numbers(0.0, 2.0);
+        assert!((first[0] - 1.36).abs() < 1e-6 && (first[1] + ABOVE).abs() < 1e-6);
     }
 }

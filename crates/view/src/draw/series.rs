@@ -426,7 +426,7 @@ fn synchrony(take: &Take) -> Option<(String, Vec<Line<'_>>)> {
             false => "95 % of chance",
         };
         for (entity, value) in ["band_low", "band_high"].into_iter().zip(band) {
-            lines.extend(Line::level(entity, what, palette::GRID, times, *value));
+            lines.extend(Line::level(entity, what, palette::ORANGE, times, *value));
         }
         lines.extend(Line::level(
             "chance",
@@ -436,6 +436,9 @@ fn synchrony(take: &Take) -> Option<(String, Vec<Line<'_>>)> {
             mean,
         ));
         title += &format!("; by chance {mean:.3} (grey)");
+        if let [low, high] = band {
+            title += &format!(", 95 % {low:.3} … {high:.3} (orange)");
+        }
     }
     lines.push(Line::new("r", "r", palette::GREEN, times, r)?);
     title += estimated(&take.inputs.sources.phases);
@@ -540,6 +543,24 @@ mod tests {
         assert!(to - from > 1e-3 && numbers >= 2, "{from} {to}");
         let ((from, to), numbers) = chosen(low, high, 0.0);
         assert!(to - from > 7e-7 && numbers >= 2, "{from} {to}");
+    }
+
+    #[test]
+    fn the_band_of_chance_is_named() {
+        let mut take = Take {
+            phase_ns: vec![0, 1],
+            ..Take::default()
+        };
+        take.inputs.phase_rad = vec![vec![0.0, 0.1]; 8];
+        let value = analyze::metrics::Value {
+            per: vec![0.057, 0.679],
+            ..analyze::metrics::Value::number(0.316)
+        };
+        take.metrics.0.push(("synchrony_chance", value));
+        let (title, lines) = synchrony(&take).unwrap();
+        assert!(title.ends_with(", 95 % 0.057 … 0.679 (orange)"), "{title}");
+        let band = lines.iter().filter(|line| line.color == palette::ORANGE);
+        assert_eq!(band.count(), 2);
     }
 
     #[test]
