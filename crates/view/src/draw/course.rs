@@ -5,8 +5,8 @@ use crate::take::Pose;
 
 /// Half the time that a heading is averaged over, s: several steps.
 const HEADING_S: f64 = 1.0;
-/// Half the time that a level is averaged over, s: what falls freely leaves it by less than half a metre.
-const LEVEL_S: f64 = 0.5;
+/// Half the time that a level is averaged over, s: a step takes about all of it, what falls freely leaves it by a tenth of a metre.
+const LEVEL_S: f64 = 0.25;
 /// Heights that differ by no more than this share one level, m.
 const LEVEL_M: f64 = 2.0;
 /// Below this share of its length the averaged axis of the body points nowhere.
@@ -134,7 +134,7 @@ mod tests {
         assert!(walking.iter().all(|z| (z - 0.8).abs() < 1e-3));
         let falling = pose(|_| 0.0, |t_s| 2e4 - 4.9 * t_s * t_s);
         for (level, p) in levels_m(&falling).iter().zip(&falling.position_m) {
-            assert!((level - p[2]).abs() < 0.5, "{level} {}", p[2]);
+            assert!((level - p[2]).abs() < 0.15, "{level} {}", p[2]);
         }
     }
 }

@@ -11,7 +11,7 @@ use crate::take::Take;
 /// Characters of a line: the log does not wrap, and its panel is narrow beside two drawings below the scene.
 const NARROW: usize = 46;
 /// The same elsewhere.
-const WIDE: usize = 62;
+const WIDE: usize = 64;
 
 /// The beginning of a line that is longer than `most`, cut after a word; the summary has it in full.
 fn shortened(line: &str, most: usize) -> String {

@@ -51,7 +51,7 @@ pub fn draw(store: &mut Store<'_>, take: &Take) -> anyhow::Result<Option<View>> 
         .map(|h| h[0].abs().max(1.4 * h[1].abs()))
         .fold(1.2, f64::max) as f32;
     // What falls turns as it likes: its pole has to fit in upright too.
-    let back = course::level_m(pose).map_or(1.5, |_| 1.0);
+    let back = course::level_m(pose).map_or(1.6, |_| 1.0);
     let eye = [0.5 * reach_m, -1.2 * reach_m - 0.6, 0.22 * reach_m + 0.4].map(|x| back * x);
     let target = [0.0, 0.0, look_m];
     let title = match forces {
