@@ -20,6 +20,8 @@ pub struct Take {
     pub state_ns: Vec<i64>,
     /// Log times of the forces, ns.
     pub force_ns: Vec<i64>,
+    /// How far each handle is pressed into its shoulder, m, at the times of the forces; empty where that is not recorded.
+    pub compression_m: Vec<Vec<f64>>,
     /// Log times of the phases, ns.
     pub phase_ns: Vec<i64>,
     /// The window that the metrics are computed in.
@@ -161,6 +163,7 @@ impl Default for Take {
             inputs: Inputs::default(),
             state_ns: Vec::new(),
             force_ns: Vec::new(),
+            compression_m: Vec::new(),
             phase_ns: Vec::new(),
             window: Window::ALL,
             metrics: Metrics(Vec::new()),

@@ -34,13 +34,14 @@ pub fn draw(store: &mut Store<'_>, take: &Take) -> anyhow::Result<Option<View>> 
         store.fixed(entity, &ViewCoordinates::FLU())?;
     }
     ground(store, take, pose)?;
-    body(store, take, pose)?;
+    let bent = bent(take, pose);
+    body(store, take, pose, bent.as_deref())?;
     trail(store, pose)?;
     let headings = course::headings(pose);
     if let Some(carriers) = &take.carriers {
         people(store, take, pose, &headings, carriers)?;
     }
-    let forces = forces(store, take, pose)?;
+    let forces = forces(store, take, pose, bent.as_deref())?;
     let look_m = follow(store, pose, &headings)?;
 
     // Far enough to see the longest pole whole, a little from above and ahead.
@@ -150,7 +151,12 @@ fn ground(store: &mut Store<'_>, take: &Take, pose: &Pose) -> anyhow::Result<()>
 }
 
 /// The body with its poles, moving as the state says.
-fn body(store: &mut Store<'_>, take: &Take, pose: &Pose) -> anyhow::Result<()> {
+fn body(
+    store: &mut Store<'_>,
+    take: &Take,
+    pose: &Pose,
+    bent: Option<&[Vec<[f64; 3]>]>,
+) -> anyhow::Result<()> {
     let turns = pose
         .orientation
         .iter()
@@ -170,14 +176,104 @@ fn body(store: &mut Store<'_>, take: &Take, pose: &Pose) -> anyhow::Result<()> {
         .with_radii([0.008f32]);
     store.fixed("/world/rath/edges", &edges)?;
     let poles = poles(&take.shape.handles_m);
-    if !poles.is_empty() {
-        let strips = poles.into_iter().map(|ends| ends.to_vec());
-        let poles = LineStrips3D::new(strips)
-            .with_radii([0.04f32])
-            .with_colors([palette::POLE]);
-        store.fixed("/world/rath/poles", &poles)?;
+    if poles.is_empty() {
+        return Ok(());
     }
-    Ok(())
+    let style = LineStrips3D::update_fields()
+        .with_radii([0.04f32])
+        .with_colors([palette::POLE]);
+    if let Some(bent) = bent {
+        let count = poles.len();
+        let strips = bent.iter().zip(&take.force_ns).flat_map(|(places, t)| {
+            let at = moment(pose, *t);
+            let middles = poles.iter().map(move |ends| {
+                let [x, y, z] = [0, 1, 2].map(|i| f64::from(0.5 * (ends[0][i] + ends[1][i])));
+                handles_at(&[[x, y, z]], pose, at)[0]
+            });
+            let handles = &take.shape.handles_m;
+            middles
+                .zip(&poles)
+                .map(|(middle, ends)| strip(handles, places, ends, middle))
+                .collect::<Vec<_>>()
+        });
+        let columns = LineStrips3D::new(strips).columns(std::iter::repeat_n(count, bent.len()))?;
+        store.rows("/world/poles", &take.force_ns, columns)?;
+        return store.fixed("/world/poles", &style);
+    }
+    let strips = poles.into_iter().map(|ends| ends.to_vec());
+    store.fixed("/world/rath/poles", &style.with_strips(strips))
+}
+
+/// The pose in force at a time: the last one not after it.
+fn moment(pose: &Pose, t_ns: i64) -> usize {
+    pose.times_ns.partition_point(|p| *p <= t_ns).max(1) - 1
+}
+
+/// A pole that bends by less is drawn straight, m.
+const STRAIGHT_M: f64 = 0.01;
+
+/// Where the handles of poles that bend are at every time of the forces: below the shoulders, by as much as they press into them.
+/// `None` where that is not known, or where the poles are straight.
+fn bent(take: &Take, pose: &Pose) -> Option<Vec<Vec<[f64; 3]>>> {
+    let carriers = take.carriers.as_ref()?;
+    let (handles, rows) = (&take.shape.handles_m, take.force_ns.len());
+    let fits = carriers.times_ns == take.force_ns
+        && carriers.points_m.len() == handles.len()
+        && take.compression_m.len() == handles.len()
+        && take.compression_m.iter().all(|x| x.len() == rows);
+    if !fits {
+        return None;
+    }
+    let mut most_m = 0.0f64;
+    let places = (0..rows).map(|k| {
+        let mut places = handles_at(handles, pose, moment(pose, take.force_ns[k]));
+        for (i, place) in places.iter_mut().enumerate() {
+            let z = carriers.points_m[i][k][2] - take.compression_m[i][k];
+            if z.is_finite() {
+                most_m = most_m.max((z - place[2]).abs());
+                place[2] = z;
+            }
+        }
+        places
+    });
+    let places: Vec<Vec<[f64; 3]>> = places.collect();
+    (STRAIGHT_M..APART_M).contains(&most_m).then_some(places)
+}
+
+/// A pole through its middle, where the body holds it, and through the places of its handles, a little longer than they need.
+fn strip(
+    handles_m: &[[f64; 3]],
+    places: &[[f64; 3]],
+    ends: &[[f32; 3]; 2],
+    middle: [f64; 3],
+) -> Vec<[f32; 3]> {
+    let (low, high) = (f64::from(ends[0][0]), f64::from(ends[1][0]));
+    let mut points: Vec<(f64, [f64; 3])> = handles_m
+        .iter()
+        .zip(places)
+        .filter(|(h, _)| {
+            [1, 2]
+                .iter()
+                .all(|&i| (h[i] - f64::from(ends[0][i])).abs() < 0.01)
+        })
+        .map(|(h, place)| (h[0], *place))
+        .collect();
+    points.push((0.5 * (low + high), middle));
+    points.sort_by(|a, b| a.0.total_cmp(&b.0));
+    let beyond = |(x0, p0): (f64, [f64; 3]), (x1, p1): (f64, [f64; 3]), x: f64| {
+        let share = (x - x0) / (x1 - x0);
+        f32s(&[0, 1, 2].map(|i| p0[i] + share * (p1[i] - p0[i])))
+    };
+    let n = points.len();
+    if n < 2 || points[0].0 == points[1].0 || points[n - 2].0 == points[n - 1].0 {
+        return points.iter().map(|(_, p)| f32s(p)).collect();
+    }
+    let first = beyond(points[0], points[1], low);
+    let last = beyond(points[n - 2], points[n - 1], high);
+    std::iter::once(first)
+        .chain(points.iter().map(|(_, p)| f32s(p)))
+        .chain([last])
+        .collect()
 }
 
 /// One pole along x for every (y, z) at which there are handles, a little longer than they need.
@@ -264,12 +360,7 @@ fn people(
             _ => vec![0.0; rows],
         })
         .collect();
-    // The pose in force at each moment of theirs: the last one not after it.
-    let moments: Vec<usize> = carriers
-        .times_ns
-        .iter()
-        .map(|t| pose.times_ns.partition_point(|p| p <= t).max(1) - 1)
-        .collect();
+    let moments: Vec<usize> = carriers.times_ns.iter().map(|t| moment(pose, *t)).collect();
     let headings: Vec<f64> = moments.iter().map(|at| headings[*at]).collect();
     let shoulder = |points: &[[f64; 3]], k: usize| {
         let [x, y, z] = points[k];
@@ -377,7 +468,12 @@ fn legs_at(shoulder: [f64; 3], heading_rad: f64, phase_rad: f64) -> Vec<[f32; 3]
 }
 
 /// Arrows and handle marks; gives the name of what they are scaled by.
-fn forces(store: &mut Store<'_>, take: &Take, pose: &Pose) -> anyhow::Result<Option<&'static str>> {
+fn forces(
+    store: &mut Store<'_>,
+    take: &Take,
+    pose: &Pose,
+    bent: Option<&[Vec<[f64; 3]>]>,
+) -> anyhow::Result<Option<&'static str>> {
     let handles = take.shape.handles_m.len();
     let normal_n = &take.inputs.normal_n;
     let Some((scale_n, unit)) = take.force_scale() else {
@@ -393,13 +489,9 @@ fn forces(store: &mut Store<'_>, take: &Take, pose: &Pose) -> anyhow::Result<Opt
     let mut radii = Vec::with_capacity(rows * handles);
     let mut vectors = Vec::with_capacity(rows * handles);
     let mut origins = Vec::with_capacity(rows * handles);
-    let mut at = 0;
     for k in 0..rows {
-        // The pose in force at this moment: the last one not after it.
-        while at + 1 < pose.times_ns.len() && pose.times_ns[at + 1] <= take.force_ns[k] {
-            at += 1;
-        }
-        let places = handles_at(&take.shape.handles_m, pose, at);
+        let straight = || handles_at(&take.shape.handles_m, pose, moment(pose, take.force_ns[k]));
+        let places = bent.map_or_else(straight, |bent| bent[k].clone());
         for (place, force) in places.iter().zip(normal_n) {
             let load = Load::of(force[k], scale_n, handles);
             colors.push(palette::load(load));
@@ -505,6 +597,36 @@ mod tests {
         assert_eq!(legs, [2, 2, 0]);
         let head = sent.lengths("/world/carrier_1/head", "Ellipsoids3D:half_sizes");
         assert_eq!(head, [1, 0]);
+    }
+
+    #[test]
+    fn a_pole_bends_where_the_handles_are() {
+        let pose = Pose {
+            times_ns: vec![0],
+            position_m: vec![[0.0, 0.0, 0.7]],
+            orientation: vec![[0.0, 0.0, 0.0, 1.0]],
+        };
+        let mut take = Take {
+            force_ns: vec![0],
+            carriers: Some(Carriers {
+                times_ns: vec![0],
+                points_m: [4.0, -4.0].map(|x| vec![[x, 0.0, 1.02]]).to_vec(),
+            }),
+            compression_m: vec![vec![0.1]; 2],
+            ..Take::default()
+        };
+        take.shape.handles_m = vec![[4.0, 0.0, 0.1], [-4.0, 0.0, 0.1]];
+        let places = bent(&take, &pose).unwrap();
+        assert!(places[0].iter().all(|p| (p[2] - 0.92).abs() < 1e-12));
+        let ends = poles(&take.shape.handles_m)[0];
+        let strip = strip(&take.shape.handles_m, &places[0], &ends, [0.0, 0.0, 0.8]);
+        let heights: Vec<f32> = strip.iter().map(|p| p[2]).collect();
+        for (got, expected) in heights.iter().zip([0.929, 0.92, 0.8, 0.92, 0.929]) {
+            assert!((got - expected).abs() < 1e-5, "{heights:?}");
+        }
+        // As far below the shoulder as the body holds it: a straight pole.
+        take.compression_m = vec![vec![0.22]; 2];
+        assert_eq!(bent(&take, &pose), None);
     }
 
     #[test]

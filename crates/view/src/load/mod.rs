@@ -62,6 +62,7 @@ pub fn load(
         take.pose = scene::pose(&signals);
         take.carriers = scene::carriers(&signals);
         take.energy = scene::energy(&signals);
+        take.compression_m = scene::compressions(&signals, &take);
         take.shape = scene::shape(recording, &take);
     }
     stream::others(&mut take, recording, &plan, detail, &mut findings)?;
@@ -161,12 +162,13 @@ impl<'a> Plan<'a> {
         self.ours.contains(&topic)
     }
 
-    /// Collected whole: the pose, the carriers' frames and the ledger.
+    /// Collected whole: the pose, the carriers' frames, the handles' compressions and the ledger.
     fn is_whole(&self, path: &str) -> bool {
         let pose = ["position_m", "orientation"]
             .iter()
             .any(|f| within(path, topics::STATE, f));
         pose || within(path, topics::ENERGY, "")
+            || within(path, topics::FORCES, "compression_m")
             || (within(path, topics::TF, "") && path.contains(".transform.translation."))
     }
 

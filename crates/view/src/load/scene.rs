@@ -82,6 +82,18 @@ pub fn carriers(signals: &BTreeMap<&str, &Signal>) -> Option<Carriers> {
     Some(Carriers { times_ns, points_m })
 }
 
+/// How far the handles are pressed into the shoulders, at the times of the forces.
+pub fn compressions(signals: &BTreeMap<&str, &Signal>, take: &Take) -> Vec<Vec<f64>> {
+    let found = numbered(signals, &format!("{}.compression_m[*]", topics::FORCES));
+    if found
+        .iter()
+        .any(|signal| signal.times_ns[..] != take.force_ns[..])
+    {
+        return Vec::new();
+    }
+    found.iter().map(|signal| signal.values.to_vec()).collect()
+}
+
 /// Handles as the attached scene gives them; otherwise where the carriers are beside the body, at the middle of what they do.
 pub fn shape(recording: &Recording, take: &Take) -> Shape {
     let from_scene = || -> Option<Vec<[f64; 3]>> {
