@@ -53,7 +53,7 @@ fn a_run_of_two_shows_everything() {
     assert_eq!(sent.timelines().into_iter().collect::<Vec<_>>(), ["time"]);
     for word in [
         "Scene",
-        "Phases and beat",
+        "Phases, beat",
         "Spectra",
         "Height",
         "Roll",
@@ -130,7 +130,7 @@ fn sensors_alone_show_sensors_alone() {
     assert!(
         !titles
             .iter()
-            .any(|t| t.starts_with("Scene") || t.starts_with("Phases and beat")),
+            .any(|t| t.starts_with("Scene") || t.starts_with("Phases, beat")),
         "{titles:?}"
     );
     assert_eq!(

@@ -45,6 +45,29 @@ impl<'a> Line<'a> {
         })
     }
 
+    /// Nothing is drawn through a hole in the times: a value that is none breaks the curve in each.
+    fn parted(mut self) -> Self {
+        let Some(first_ns) = self.times_ns.first().copied() else {
+            return self;
+        };
+        let t_s = recording::signal::seconds_since(&self.times_ns, first_ns);
+        let parts = analyze::inputs::stretches(&t_s, 0.0);
+        if parts.len() < 2 {
+            return self;
+        }
+        let (mut times_ns, mut values) = (Vec::new(), Vec::new());
+        for part in parts {
+            if part.start > 0 {
+                times_ns.push(self.times_ns[part.start].saturating_sub(1));
+                values.push(f64::NAN);
+            }
+            times_ns.extend_from_slice(&self.times_ns[part.clone()]);
+            values.extend_from_slice(&self.values[part]);
+        }
+        (self.times_ns, self.values) = (times_ns.into(), values.into());
+        self
+    }
+
     /// A level from the first to the last of `times_ns`.
     pub fn level(
         entity: impl Into<String>,
@@ -261,7 +284,7 @@ fn estimated(source: &str) -> &'static str {
 
 fn height(take: &Take) -> Option<(String, Vec<Line<'_>>)> {
     let height = &take.inputs.height_m;
-    let line = Line::new("z", "height", palette::BLUE, &take.state_ns, &height[..])?;
+    let line = Line::new("z", "height", palette::BLUE, &take.state_ns, &height[..])?.parted();
     let title = match estimated(&take.inputs.sources.height) {
         "" => "Height of the centre of mass [m]".to_owned(),
         from => format!("Height about its mean [m]{from}"),
@@ -279,14 +302,15 @@ fn angles(take: &Take) -> Option<(String, Vec<Line<'_>>)> {
         &take.state_ns,
         deg(roll),
     )
-    .map(broken);
+    .map(|line| broken(line).parted());
     let tilt = Line::new(
         "tilt",
         "tilt of the pole",
         palette::BLUE,
         &take.state_ns,
         deg(tilt),
-    );
+    )
+    .map(Line::parted);
     let title = match (&roll, &tilt) {
         (Some(_), Some(_)) => "Roll (vermilion) and tilt (blue) [deg]",
         (Some(_), None) => "Roll [deg]",
@@ -335,24 +359,30 @@ fn forces(take: &Take) -> Option<(String, Vec<Line<'_>>)> {
     // The viewer draws in the order of the names: the handles lie above the sum.
     let total = take.inputs.total_force_n();
     let mut lines = Vec::new();
-    lines.extend(Line::new(
-        "all",
-        format!("N_tot/{unit}"),
-        palette::WHITE,
-        times,
-        share(&total),
-    ));
+    lines.extend(
+        Line::new(
+            "all",
+            format!("N_tot/{unit}"),
+            palette::WHITE,
+            times,
+            share(&total),
+        )
+        .map(Line::parted),
+    );
     let handles = take.inputs.normal_n.len();
     for (i, normal_n) in take.inputs.normal_n.iter().enumerate() {
         let (color, _) = palette::carrier(i);
         let name = format!("N_{}/{unit}", i + 1);
-        lines.extend(Line::new(
-            format!("handle_{}", i + 1),
-            name,
-            color,
-            times,
-            share(normal_n),
-        ));
+        lines.extend(
+            Line::new(
+                format!("handle_{}", i + 1),
+                name,
+                color,
+                times,
+                share(normal_n),
+            )
+            .map(Line::parted),
+        );
     }
     let floating = analyze::metrics::FLOAT_SHARE;
     let limit = Line::level(
@@ -386,7 +416,8 @@ fn support(take: &Take) -> Option<(String, Vec<Line<'_>>)> {
         palette::WHITE,
         &take.state_ns,
         &ratio[..],
-    )?;
+    )?
+    .parted();
     let limit = Line::level(
         "unloaded",
         format!("{floating}"),
@@ -440,7 +471,7 @@ fn synchrony(take: &Take) -> Option<(String, Vec<Line<'_>>)> {
             title += &format!(", 95 % {low:.3} … {high:.3} (orange)");
         }
     }
-    lines.push(Line::new("r", "r", palette::GREEN, times, r)?);
+    lines.push(Line::new("r", "r", palette::GREEN, times, r)?.parted());
     title += estimated(&take.inputs.sources.phases);
     Some((title, lines))
 }
@@ -561,6 +592,17 @@ mod tests {
         assert!(title.ends_with(", 95 % 0.057 … 0.679 (orange)"), "{title}");
         let band = lines.iter().filter(|line| line.color == palette::ORANGE);
         assert_eq!(band.count(), 2);
+    }
+
+    #[test]
+    fn nothing_is_drawn_through_a_hole() {
+        let times: Vec<i64> = (0..100).chain(600..700).map(|k| k * 10_000_000).collect();
+        let values = vec![1.0; 200];
+        let line = Line::new("z", "z", 0, &times, values).unwrap().parted();
+        assert_eq!(line.values.iter().filter(|x| x.is_nan()).count(), 1);
+        assert!(line.values[100].is_nan() && line.times_ns.is_sorted());
+        let whole = Line::new("z", "z", 0, &times[..100], vec![1.0; 100]).unwrap();
+        assert_eq!(whole.parted().values.len(), 100);
     }
 
     #[test]
