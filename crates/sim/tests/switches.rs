@@ -10,43 +10,14 @@ use sim::scene::Scene;
 /// A scene with every effect.
 fn everything() -> Scene {
     scene(
-        r#"
-        name = "everything"
-        [carriers]
-        handles_m = [[2.4, 0.3, 0.1], [2.3, -0.3, 0.1], [-2.4, 0.3, 0.1]]
-        initial_phase_rad = [0.3, 1.1, 2.0]
-        [start]
-        height_m = 0.85
-        roll_pitch_yaw_deg = [3.0, 1.0, 2.0]
-        angular_velocity_rad_per_s = [0.3, 0.2, -0.1]
-        [effects.contact]
-        [effects.hold]
-        [effects.sling]
-        [effects.friction]
-        [effects.pole_friction]
-        [effects.gait]
-        sway_m = 0.01
-        harmonics = [{ order = 2, amplitude_m = [0.001, 0.002, 0.003] }]
-        [effects.lift]
-        [effects.frequency_spread]
-        [effects.coupling]
-        graph = "chain"
-        [effects.music]
-        onset_s = 0.0
-        build_up_s = 0.0
-        [effects.noise]
-        [effects.feedback]
+        &(include_str!("everything.toml").to_owned()
+            + r#"
         [effects.measured]
         t_s = [0.0, 20.0, 40.0, 60.0]
         phase_rad = [[0.3, 251.0, 502.0, 753.0], [1.1, 250.0, 503.0, 754.0], [2.0, 252.0, 500.0, 750.0]]
-        [effects.path]
-        turn_deg = 90.0
-        turn_start_s = 0.0
-        slope_deg = 5.0
-        [effects.flexure]
         [effects.imu]
         [effects.drum]
-        "#,
+        "#),
     )
 }
 

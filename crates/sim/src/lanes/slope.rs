@@ -38,6 +38,19 @@ impl Slope {
             along: std::array::from_fn(|k| of(self.along[k], other.along[k])),
         }
     }
+
+    /// (xy)′ = x′y + y′x
+    #[inline(always)]
+    fn times(self, b: Self) -> Self {
+        self.with(b, self.here * b.here, |x, y| x * b.here + y * self.here)
+    }
+
+    /// (x/y)′ = (x′ − y′ x/y)/y
+    #[inline(always)]
+    fn over(self, b: Self) -> Self {
+        let ratio = self.here / b.here;
+        self.with(b, ratio, |x, y| (x - y * ratio) / b.here)
+    }
 }
 
 derived!(Slope);
@@ -62,7 +75,7 @@ impl Mul for Slope {
     type Output = Self;
     #[inline(always)]
     fn mul(self, b: Self) -> Self {
-        self.with(b, self.here * b.here, |x, y| x * b.here + y * self.here)
+        self.times(b)
     }
 }
 
@@ -70,8 +83,7 @@ impl Div for Slope {
     type Output = Self;
     #[inline(always)]
     fn div(self, b: Self) -> Self {
-        let ratio = self.here / b.here;
-        self.with(b, ratio, |x, y| (x - y * ratio) / b.here)
+        self.over(b)
     }
 }
 

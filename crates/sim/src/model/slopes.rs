@@ -102,37 +102,7 @@ mod tests {
     use crate::scene::{BUILTIN, parse};
 
     /// Every effect that has a say in the motion, but for what was measured, which has the last word.
-    const EVERYTHING: &str = r#"
-        name = "everything"
-        [carriers]
-        handles_m = [[2.4, 0.3, 0.1], [2.3, -0.3, 0.1], [-2.4, 0.3, 0.1]]
-        initial_phase_rad = [0.3, 1.1, 2.0]
-        [start]
-        height_m = 0.8
-        roll_pitch_yaw_deg = [3.0, 1.0, 2.0]
-        angular_velocity_rad_per_s = [0.3, 0.2, -0.1]
-        [effects.contact]
-        [effects.hold]
-        [effects.sling]
-        [effects.friction]
-        [effects.pole_friction]
-        [effects.gait]
-        sway_m = 0.01
-        harmonics = [{ order = 2, amplitude_m = [0.001, 0.002, 0.003] }]
-        [effects.lift]
-        [effects.frequency_spread]
-        [effects.coupling]
-        graph = "chain"
-        [effects.music]
-        onset_s = 0.0
-        [effects.noise]
-        [effects.feedback]
-        [effects.path]
-        turn_deg = 90.0
-        turn_start_s = 0.0
-        slope_deg = 5.0
-        [effects.flexure]
-        "#;
+    const EVERYTHING: &str = include_str!("../../tests/everything.toml");
 
     /// The largest difference between the Jacobian and central differences with one step of extrapolation, in parts of the largest number of
     /// each column.
