@@ -184,7 +184,7 @@ fn check(file: &Path, take: &Take, findings: &[Finding]) -> anyhow::Result<()> {
         let lost = findings.iter().find(|f| f.kind.is_loss());
         let lost = lost.map_or(String::new(), |f| format!(". And {f}"));
         bail!(
-            "{}: has no signal that can be shown; expected numbers in protobuf, CDR, ROS 1 or JSON messages (`analyze` lists what is in it){lost}",
+            "{}: has no signal that can be shown; expected numbers in protobuf, CDR, ROS 1 or JSON messages, more than one of a topic (`analyze` lists what is in it){lost}",
             name(file)
         );
     }

@@ -99,6 +99,17 @@ pub struct Curve {
     pub values: Vec<f64>,
 }
 
+impl Curve {
+    /// Whether there is more than one point: one makes no curve.
+    pub fn has_two(&self) -> bool {
+        self.values
+            .iter()
+            .filter(|x| x.is_finite())
+            .nth(1)
+            .is_some()
+    }
+}
+
 /// An inertial sensor.
 #[derive(Clone, Debug, Default)]
 pub struct Sensor {

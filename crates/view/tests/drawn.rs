@@ -3,6 +3,9 @@
 mod common;
 
 use common::{ROWS, imus, run, taken};
+use recording::cdr::Imu;
+use recording::topics::MessageKind;
+use recording::write::{RecordingWriter, WriterOptions};
 
 #[test]
 fn a_run_of_two_shows_everything() {
@@ -137,6 +140,31 @@ fn sensors_alone_show_sensors_alone() {
         sent.timelines().into_iter().collect::<Vec<_>>(),
         ["time", "utc"]
     );
+}
+
+/// A sensor without a rate has no attitude and no spectra; what it measured may still be drawn.
+#[test]
+fn a_sensor_of_one_moment_is_no_sensor() {
+    let folder = tempfile::tempdir().unwrap();
+    for (messages, rows) in [(1, None), (300, Some(&300))] {
+        let path = folder.path().join("imu.mcap");
+        let mut writer = RecordingWriter::create(&path, &WriterOptions::default()).unwrap();
+        let channel = writer.channel("/imu/s0", MessageKind::Imu).unwrap();
+        for k in 0..messages {
+            let imu = Imu::raw(7, "imu", [0.01 * f64::from(k), 0.0, 0.0], [0.0, 0.0, 9.81]);
+            writer.message(channel, 7, &imu).unwrap();
+        }
+        writer.finish().unwrap();
+        let (sent, _) = taken(&path);
+        let entities = sent.entities();
+        assert!(
+            !entities.iter().any(|e| e.contains("attitude")),
+            "{entities:?}"
+        );
+        let drawn = sent.rows();
+        let curve = drawn.iter().find(|(e, _)| e.starts_with("/topics/imu/s0/"));
+        assert_eq!(curve.map(|(_, rows)| rows), rows, "{drawn:?}");
+    }
 }
 
 #[test]

@@ -144,8 +144,7 @@ impl Stream {
 impl Sensor {
     /// Whether anything was measured more than once.
     pub fn has_any(&self) -> bool {
-        let two = |c: &Curve| c.values.iter().filter(|x| x.is_finite()).nth(1).is_some();
-        self.gyro.iter().chain(&self.accel).any(two)
+        self.gyro.iter().chain(&self.accel).any(Curve::has_two)
     }
 }
 

@@ -76,15 +76,14 @@ pub fn others(
         };
         times.push(batch.times_ns);
         if let Some(topic) = plan.imus.iter().find(|topic| **topic == batch.topic) {
-            let sensor = sensors.entry(topic).or_insert_with(|| {
-                let count = messages.get(topic).copied().unwrap_or(0);
-                // A topic need not last as long as the file.
-                let rough_hz = (count.max(2) - 1) as f64 / span_s;
-                let rate_hz = times.hz_between_gaps().unwrap_or(rough_hz);
-                sensor::Stream::new(rate_hz, count, |name| thin(name, topic))
-            });
-            sensor.push(batch, times);
-            return;
+            let count = messages.get(topic).copied().unwrap_or(0);
+            // A topic need not last as long as the file; one without a rate is no sensor, but may have curves.
+            let rough_hz = (count > 1 && span_s > 0.0).then(|| (count - 1) as f64 / span_s);
+            if let Some(rate_hz) = times.hz_between_gaps().or(rough_hz) {
+                let new = || sensor::Stream::new(rate_hz, count, |name| thin(name, topic));
+                sensors.entry(topic).or_insert_with(new).push(batch, times);
+                return;
+            }
         }
         let known = plain.len();
         let Some(topic) = (match plain.contains_key(batch.topic) {
@@ -92,9 +91,7 @@ pub fn others(
             false if known < MAX_TOPICS => Some(plain.entry(batch.topic.to_owned()).or_default()),
             false => None,
         }) else {
-            if !left_out.contains(batch.topic) {
-                left_out.insert(batch.topic.to_owned());
-            }
+            left_out.insert(batch.topic.to_owned());
             return;
         };
         for column in batch.columns {
@@ -194,14 +191,7 @@ fn topic(name: String, curves: Vec<(String, String, Thin)>) -> Topic {
     let mut plots: Vec<(String, Vec<Curve>)> = Vec::new();
     for (_, unit, thin) in curves {
         let curve = thin.finish();
-        // One point makes no curve.
-        if curve
-            .values
-            .iter()
-            .filter(|x| x.is_finite())
-            .nth(1)
-            .is_none()
-        {
+        if !curve.has_two() {
             continue;
         }
         match plots.iter_mut().find(|(u, _)| *u == unit) {
