@@ -7,6 +7,7 @@
 //! effect are states of their own, integrated by the same method as the motion, so the rest measures that method: it is
 //! zero but for integration error. Nothing is renormalised or clipped to make it small.
 
+use crate::lanes::sum;
 use crate::model::{Model, Workspace};
 use crate::scene::Scene;
 use crate::solve::{Method, Settings};
@@ -71,12 +72,32 @@ pub(crate) fn unit_j(scene: &Scene) -> f64 {
 /// ```
 /// A run whose unexplained rest exceeds that is an artefact of its method, and stops; one whose method promises a tolerance stops at a
 /// hundred times that part of it, and a thousandth at least. The floor is rounding, and what the tolerance allows in units of [`unit_j`].
+///
+/// A law may give back what it has taken, and one that is used beyond its range (straps that swing wider than they are long) may
+/// give more, for ever. What springs hold and laws have taken is never less than nothing but for what springs held at first: a run in which
+///
+/// ```text
+/// S + ∫ dissipation < S₀ − supplied
+/// ```
+/// stops too. Once over is far more than any law within its range lends: the built-in scenes stay within 1e-4 of it.
 #[derive(Debug)]
 pub(crate) struct Belief {
     part: f64,
     floor_j: f64,
+    unit_j: f64,
     start: Option<Energy>,
+    /// What straps may give back though no account calls it stored, J.
+    lent_j: f64,
     most_work_j: f64,
+}
+
+/// What is wrong with a run.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) enum Doubt {
+    /// The ledger does not explain so much.
+    Unexplained { nowhere_j: f64, supplied_j: f64 },
+    /// Laws gave so much more than they took.
+    Given { given_j: f64, supplied_j: f64 },
 }
 
 /// Below this part of all energies a rest is rounding, or a matter of taste.
@@ -90,22 +111,46 @@ impl Belief {
         } else {
             (1.0, 0.0)
         };
+        let unit_j = unit_j(scene);
         Self {
             part,
-            floor_j: allowed * unit_j(scene),
+            floor_j: allowed * unit_j,
+            unit_j,
             start: None,
+            lent_j: 0.0,
             most_work_j: 0.0,
         }
     }
 
-    /// What came from nowhere and what was supplied, J, where the first is more.
-    pub(crate) fn betrayed(&mut self, e: &Energy) -> Option<(f64, f64)> {
-        let start = *self.start.get_or_insert(*e);
+    /// What speaks against the run so far, if anything does.
+    pub(crate) fn doubt(&mut self, e: &Energy, w: &Workspace) -> Option<Doubt> {
+        let start = *self.start.get_or_insert_with(|| {
+            self.lent_j = stretched_j(w);
+            *e
+        });
         self.most_work_j = self.most_work_j.max(e.work_in_j.abs());
         let fallen = (start.potential_j - e.potential_j).max(0.0);
-        let supplied = start.kinetic_j + start.elastic_j.abs() + fallen + self.most_work_j;
-        let all = supplied + e.kinetic_j + e.potential_j.abs() + start.potential_j.abs();
-        let nowhere = e.unexplained_j.abs();
-        (nowhere > self.part * supplied + FLOOR * all + self.floor_j).then_some((nowhere, supplied))
+        let supplied_j = start.kinetic_j + start.elastic_j.abs() + fallen + self.most_work_j;
+        let all = supplied_j + e.kinetic_j + e.potential_j.abs() + start.potential_j.abs();
+        let floor = FLOOR * all + self.floor_j;
+        let nowhere_j = e.unexplained_j.abs();
+        if nowhere_j > self.part * supplied_j + floor {
+            return Some(Doubt::Unexplained {
+                nowhere_j,
+                supplied_j,
+            });
+        }
+        let given_j = start.elastic_j - e.elastic_j - e.dissipated_j;
+        (given_j > supplied_j + self.lent_j + self.unit_j).then_some(Doubt::Given {
+            given_j,
+            supplied_j,
+        })
     }
+}
+
+/// ½ Σ |T_i·d_i| sideways, J.
+fn stretched_j(w: &Workspace) -> f64 {
+    let pairs = w.pair.iter();
+    let twice = pairs.map(|p| sum(p.tangential[0] * p.gap[0] + p.tangential[1] * p.gap[1]).abs());
+    0.5 * twice.sum::<f64>()
 }

@@ -1,6 +1,6 @@
 //! Model + method → samples, in the units and frames of a recording.
 
-use crate::energy::{Belief, Energy};
+use crate::energy::{Belief, Doubt, Energy};
 use crate::freedoms::Pose;
 use crate::model::{Model, Workspace};
 use crate::scene::Scene;
@@ -125,15 +125,28 @@ pub fn run_model(
 ) -> (Stats, Result<(), Stopped>) {
     let mut bridge = Bridge::new(model, method, settings, listener);
     let (stats, outcome) = (method.run)(model, settings, &mut bridge);
-    let outcome = match (outcome, bridge.betrayed) {
-        (Err(Stopped::ByObserver { t_s }), Some((nowhere_j, supplied_j))) => {
-            Err(Stopped::FromNowhere {
-                method: method.name,
+    let method = method.name;
+    let outcome = match (outcome, bridge.doubt) {
+        (Err(Stopped::ByObserver { t_s }), Some(doubt)) => Err(match doubt {
+            Doubt::Unexplained {
+                nowhere_j,
+                supplied_j,
+            } => Stopped::FromNowhere {
+                method,
                 t_s,
                 nowhere_j,
                 supplied_j,
-            })
-        }
+            },
+            Doubt::Given {
+                given_j,
+                supplied_j,
+            } => Stopped::FedByEffect {
+                effect: bridge.giver(),
+                t_s,
+                given_j,
+                supplied_j,
+            },
+        }),
         (outcome, _) => outcome,
     };
     (stats, outcome)
@@ -165,8 +178,7 @@ struct Bridge<'a> {
     looks_at_forces: bool,
     at_start_j: Option<f64>,
     belief: Belief,
-    /// Energy from nowhere and energy supplied, J, once the first was more.
-    betrayed: Option<(f64, f64)>,
+    doubt: Option<Doubt>,
     sensors: Sensors<'a>,
 }
 
@@ -185,9 +197,16 @@ impl<'a> Bridge<'a> {
             looks_at_forces,
             at_start_j: None,
             belief: Belief::new(&model.scene, method, settings),
-            betrayed: None,
+            doubt: None,
             sensors: Sensors::new(model),
         }
+    }
+
+    /// The effect that has taken least.
+    fn giver(&self) -> &'static str {
+        let taken = self.model.accounts().zip(&self.sample.shares_j);
+        let least = taken.min_by(|(_, a), (_, b)| a[1].total_cmp(&b[1]));
+        least.map_or("", |(name, _)| name)
     }
 }
 
@@ -245,9 +264,9 @@ impl Observer for Bridge<'_> {
             share.copy_from_slice(page);
         }
         if let Some(energy) = &s.energy {
-            self.betrayed = self.belief.betrayed(energy);
+            self.doubt = self.belief.doubt(energy, w);
         }
-        if self.betrayed.is_some() {
+        if self.doubt.is_some() {
             return false;
         }
         for a in 0..3 {

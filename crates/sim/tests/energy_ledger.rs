@@ -51,3 +51,32 @@ fn the_shares_of_the_effects_are_all_that_is_booked() {
     // Shoulders that move a body up and down dissipate in every damper.
     assert!(last.iter().all(|[_, lost]| *lost > 0.1), "{last:?}");
 }
+
+/// Straps that hardly damp are fed by a load that bounces, without bound: such a run ends with its cause; one that merely swings goes on.
+#[test]
+fn a_law_that_feeds_a_run_ends_it() {
+    for (damping_s, damping_n_s_per_m) in [(0.0, 400.0), (0.0, 10.0), (0.01, 100.0)] {
+        let set = [
+            format!("effects.sling.damping_s={damping_s}"),
+            format!("effects.contact.damping_n_s_per_m={damping_n_s_per_m:?}"),
+        ];
+        let (mut largest_j, mut supplied_j) = (0.0f64, 0.0f64);
+        let outcome = run(&load("music", &set).unwrap(), &mut |s: &Sample| {
+            let e = s.energy.expect("the default keeps a ledger");
+            largest_j = largest_j.max(e.kinetic_j);
+            supplied_j = supplied_j.max(e.work_in_j.abs());
+            true
+        });
+        let text = outcome.unwrap_err().to_string();
+        assert!(text.contains("effects.sling gave"), "{text}");
+        assert!(
+            largest_j < 2.0 * supplied_j + 2e3,
+            "{largest_j:e} {supplied_j:e}"
+        );
+    }
+    // 0.3 m aside in straps of 0.7 m lends 38 J for ever, without anything supplied.
+    let text = "name = \"swing\"\nduration_s = 100.0\nfreedom = [\"y\"]\n[start]\nposition_m = [0.0, 0.3]\n\
+                [effects.contact]\n[effects.sling]\ndamping_s = 0.0";
+    let scene = sim::scene::parse("swing", text, &[]).unwrap();
+    run(&scene, &mut |_: &Sample| true).unwrap();
+}

@@ -123,6 +123,36 @@ fn phases(path: &Path, carriers: usize, phase: impl Fn(usize, f64) -> Option<f64
     writer.finish().unwrap();
 }
 
+/// A setting that the recording overrules is named; one that does something is not.
+#[test]
+fn a_setting_without_consequence_is_named() {
+    let folder = tempfile::tempdir().unwrap();
+    let file = record(folder.path(), "music", &["--duration", "3"]);
+    let sets = [
+        "duration_s=20",
+        "start.height_m=3",
+        "effects.noise.grid_hz=10",
+        "body.mass_kg=61",
+        "effects.gait.sway_m=0.028",
+    ];
+    let out = file.with_extension("replay.mcap");
+    let mut args = vec![
+        "replay",
+        file.to_str().unwrap(),
+        "--out",
+        out.to_str().unwrap(),
+    ];
+    sets.iter().for_each(|set| args.extend(["--set", set]));
+    let done = sim(&args);
+    let text = String::from_utf8(done.stderr).unwrap();
+    assert!(done.status.success(), "{text}");
+    let named: Vec<&str> = sets
+        .into_iter()
+        .filter(|set| text.contains(&format!("--set {set} changes nothing")))
+        .collect();
+    assert_eq!(named, &sets[..3], "{text}");
+}
+
 #[test]
 fn what_cannot_be_replayed_ends_in_one_sentence() {
     let folder = tempfile::tempdir().unwrap();

@@ -2,8 +2,8 @@
 
 mod common;
 
-use common::scene;
-use sim::effects::{Entry, TABLE};
+use common::{samples, scene};
+use sim::effects::{Entry, TABLE, idle};
 use sim::model::{Model, Workspace};
 use sim::scene::Scene;
 
@@ -164,6 +164,83 @@ fn what_a_segment_fixes_depends_on_no_other_effect() {
             assert!(all[i] != steady[i] && all[i] != even[i]);
         }
     }
+}
+
+/// What is said to do nothing does nothing, and nothing else is.
+#[test]
+fn an_idle_effect_changes_no_motion() {
+    let full = everything();
+    let entry = |name: &str| TABLE.iter().find(|e| e.name == name).unwrap();
+    let driven = full.effects.measured.clone().unwrap();
+    let shoulders = sim::effects::measured::Measured {
+        phase_rad: Vec::new(),
+        shoulder_m: (0..3)
+            .map(|i| {
+                (0..4)
+                    .map(|k| [0.1 * f64::from(i), 0.0, 1.0 + 0.01 * f64::from(k)])
+                    .collect()
+            })
+            .collect(),
+        ..driven
+    };
+    let mut cases = vec![full.clone(); 4];
+    (entry("measured").switch_off)(&mut cases[0].effects);
+    (entry("measured").switch_off)(&mut cases[1].effects);
+    (entry("contact").switch_off)(&mut cases[1].effects);
+    cases[3].effects.measured = Some(shoulders);
+    if let Some(path) = &mut cases[3].effects.path {
+        path.turn_deg = 0.0;
+    }
+    let mut seen = std::collections::BTreeSet::new();
+    for case in &mut cases {
+        (entry("imu").switch_off)(&mut case.effects);
+        case.duration_s = 1.5;
+        let names: Vec<&str> = idle(&case.effects).map(|(name, _)| name).collect();
+        seen.extend(names.iter().copied());
+        let with = samples(case);
+        for effect in TABLE
+            .iter()
+            .filter(|e| (e.is_on)(&case.effects) && e.name != "measured")
+        {
+            let other = samples(&without(case, effect));
+            let apart = with.iter().zip(&other).fold(0.0_f64, |most, (a, b)| {
+                let body = (0..3).map(|i| (a.pose.position_m[i] - b.pose.position_m[i]).abs());
+                let turned = (0..4).map(|i| (a.pose.orientation[i] - b.pose.orientation[i]).abs());
+                let phases = a
+                    .phase_rad
+                    .iter()
+                    .zip(&b.phase_rad)
+                    .map(|(a, b)| (a - b).abs());
+                let shoulders = a.shoulder_m.iter().zip(&b.shoulder_m);
+                let moved = shoulders.flat_map(|(a, b)| (0..3).map(|i| (a[i] - b[i]).abs()));
+                body.chain(turned)
+                    .chain(phases)
+                    .chain(moved)
+                    .fold(most, f64::max)
+            });
+            let watches = ["drum", "music"].contains(&effect.name);
+            let expected = names.contains(&effect.name) || (watches && apart < 1e-6);
+            assert_eq!(
+                apart < 1e-6,
+                expected,
+                "{} moves by {apart:e}; idle: {names:?}",
+                effect.name
+            );
+        }
+    }
+    let all = [
+        "coupling",
+        "feedback",
+        "flexure",
+        "frequency_spread",
+        "gait",
+        "hold",
+        "lift",
+        "noise",
+        "pole_friction",
+        "sling",
+    ];
+    assert_eq!(seen.into_iter().collect::<Vec<_>>(), all);
 }
 
 /// An effect that is off adds no state, no account and no sensor.

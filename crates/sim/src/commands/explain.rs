@@ -40,6 +40,7 @@ struct Effect {
     name: &'static str,
     about: &'static str,
     on: bool,
+    idle: Option<&'static str>,
     adds_state: usize,
     cost_ns: Option<f64>,
     /// Cost of a simulated second of the scene without it, ms.
@@ -95,6 +96,7 @@ fn explore(scene: Scene) -> Findings {
                 name: e.name,
                 about: e.about,
                 on: (e.is_on)(&scene.effects),
+                idle: (e.idle)(&scene.effects),
                 adds_state: 0,
                 cost_ns: None,
                 without_ms: None,
@@ -257,6 +259,7 @@ fn as_json(found: &Findings) -> Value {
         "effects": found.effects.iter().map(|e| json!({
             "name": e.name,
             "on": e.on,
+            "idle": e.idle,
             "adds_state": e.adds_state,
             "cost_ns": e.cost_ns.map_or(Value::Null, number),
             "share": e.cost_ns.map_or(Value::Null, |c| number(c / found.rhs_ns)),
@@ -299,8 +302,12 @@ fn write_effects(out: &mut String, found: &Findings) -> std::fmt::Result {
         let without = e.without_ms.map_or(String::new(), |ms| format!("{ms:.3}"));
         writeln!(
             out,
-            "{:<17} on  {:>6} {cost:>8} {share:>6} {without:>11}  {}",
-            e.name, e.adds_state, e.about
+            "{:<17} on  {:>6} {cost:>8} {share:>6} {without:>11}  {}{}",
+            e.name,
+            e.adds_state,
+            e.about,
+            e.idle
+                .map_or(String::new(), |why| format!("; does nothing here: {why}"))
         )?;
     }
     for e in found.effects.iter().filter(|e| !e.on) {
@@ -318,8 +325,15 @@ fn write_effects(out: &mut String, found: &Findings) -> std::fmt::Result {
             "the sound of the drum is made when a recording is written, beside the run: it is in none of these times"
         )?;
     }
-    let names = found.model.state_names();
-    writeln!(out, "state, {}: {}", names.len(), shortened(&names))
+    let (names, layout) = (found.model.state_names(), found.model.layout());
+    writeln!(
+        out,
+        "state, {}, of which {} are the body's and {} phases, which effects share: {}",
+        names.len(),
+        layout.body,
+        layout.phases,
+        shortened(&names)
+    )
 }
 
 fn write_freedoms(out: &mut String, found: &Findings) -> std::fmt::Result {

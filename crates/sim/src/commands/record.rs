@@ -178,6 +178,9 @@ pub fn run(args: &Args) -> Result<()> {
         stats.steps,
         stats.events
     );
+    for (name, why) in sim::effects::idle(&scene.effects) {
+        recording::note!("effects.{name} does nothing: {why}");
+    }
     if let Some((handle, beside_m, t_s)) = watch.astray {
         let advice = match &scene.effects.sling {
             Some(sling) if beside_m > sling.length_m => {

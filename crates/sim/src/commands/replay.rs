@@ -109,6 +109,20 @@ pub fn run(args: &Args) -> Result<Input> {
     let replay = take
         .scene(&scene, &options)
         .map_err(|why| anyhow!("{name}: {why}"))?;
+    for (k, set) in args.set.iter().enumerate() {
+        let mut others = args.set.clone();
+        others.remove(k);
+        // A setting may ask for others, and then it does something.
+        let Ok(without) = load(&args.scene, &others) else {
+            continue;
+        };
+        let same = |other: Replay| other.scene == replay.scene;
+        if without != scene && take.scene(&without, &options).is_ok_and(same) {
+            recording::note!(
+                "sim: --set {set} changes nothing: in a replay the recording decides it"
+            );
+        }
+    }
     let settle_s = args.settle.unwrap_or(if replay.starts_as_measured {
         0.0
     } else {

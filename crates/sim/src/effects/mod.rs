@@ -59,6 +59,8 @@ pub struct Entry {
     pub about: &'static str,
     /// Whether a scene has it.
     pub is_on: fn(&Effects) -> bool,
+    /// Why it does nothing though it is on, if it does nothing.
+    pub idle: fn(&Effects) -> Option<&'static str>,
     /// Takes it out of a scene.
     pub switch_off: fn(&mut Effects),
     /// Checks its parameters.
@@ -69,10 +71,14 @@ pub struct Entry {
 
 macro_rules! entry {
     ($name:ident, $about:literal) => {
+        entry!($name, $about, |_| None)
+    };
+    ($name:ident, $about:literal, $idle:expr) => {
         Entry {
             name: stringify!($name),
             about: $about,
             is_on: |e| e.$name.is_some(),
+            idle: |e| e.$name.as_ref().and_then(|_| $idle(e)),
             switch_off: |e| e.$name = None,
             check: |s| s.effects.$name.as_ref().map_or(Ok(()), |p| p.check(s)),
             build: |s, m| {
@@ -84,44 +90,94 @@ macro_rules! entry {
     };
 }
 
+/// For what acts through the load on a shoulder.
+fn without_contact(e: &Effects) -> Option<&'static str> {
+    let why = "there is no `effects.contact` that would load a shoulder";
+    e.contact.is_none().then_some(why)
+}
+
+/// For what acts on the phases alone.
+fn phases_measured(e: &Effects) -> Option<&'static str> {
+    let measured = e.measured.as_ref().filter(|m| !m.phase_rad.is_empty());
+    measured.map(|_| "the phases are those of `effects.measured`")
+}
+
+/// For what moves shoulders.
+fn shoulders_measured(e: &Effects) -> Option<&'static str> {
+    let measured = e.measured.as_ref().filter(|m| !m.shoulder_m.is_empty());
+    measured.map(|_| "the shoulders move as `effects.measured` says")
+}
+
 /// Every effect, in the order in which terms of the same kind are applied.
 pub const TABLE: &[Entry] = &[
     // Before who asks where gravity points.
     entry!(path, "the way slopes and turns"),
     entry!(
         frequency_spread,
-        "natural gait frequencies differ from carrier to carrier"
+        "natural gait frequencies differ from carrier to carrier",
+        phases_measured
     ),
-    entry!(coupling, "carriers adjust to each other (Kuramoto)"),
+    entry!(
+        coupling,
+        "carriers adjust to each other (Kuramoto)",
+        phases_measured
+    ),
     entry!(music, "carriers are entrained by a beat (Adler)"),
-    entry!(noise, "gait phases wander (white phase noise)"),
-    entry!(gait, "shoulders move with the gait phase"),
-    entry!(lift, "shoulders lift harder or softer than the gait alone"),
+    entry!(
+        noise,
+        "gait phases wander (white phase noise)",
+        phases_measured
+    ),
+    entry!(
+        gait,
+        "shoulders move with the gait phase",
+        shoulders_measured
+    ),
+    entry!(
+        lift,
+        "shoulders lift harder or softer than the gait alone",
+        shoulders_measured
+    ),
     entry!(contact, "handles rest on shoulders: spring and damper"),
-    entry!(hold, "hands hold the handles sideways: spring and damper"),
+    entry!(
+        hold,
+        "hands hold the handles sideways: spring and damper",
+        // Friction holds what the load presses, which is nothing.
+        |e: &Effects| without_contact(e).filter(|_| e.friction.is_some())
+    ),
     entry!(
         sling,
-        "straps pull a handle back sideways, in proportion to the load"
+        "straps pull a handle back sideways, in proportion to the load",
+        without_contact
     ),
     // After what it limits.
     entry!(
         friction,
-        "sideways force at a handle is limited by Coulomb friction"
+        "sideways force at a handle is limited by Coulomb friction",
+        |e: &Effects| without_contact(e).filter(|_| e.hold.is_none())
     ),
     entry!(
         pole_friction,
-        "turning about the pole rubs on the shoulders, saturating"
+        "turning about the pole rubs on the shoulders, saturating",
+        without_contact
     ),
     entry!(
         feedback,
-        "the load that a carrier feels shifts the gait's phase"
+        "the load that a carrier feels shifts the gait's phase",
+        phases_measured
     ),
     // After everything that has a say in phase rates.
     entry!(measured, "carriers move as somebody measured"),
-    entry!(flexure, "poles bend: their first mode"),
+    entry!(flexure, "poles bend: their first mode", without_contact),
     entry!(imu, "virtual inertial sensors on body and carriers"),
     entry!(drum, "the sound of the drum, as a microphone hears it"),
 ];
+
+/// The effects that are on and do nothing, and why.
+pub fn idle(effects: &Effects) -> impl Iterator<Item = (&'static str, &'static str)> {
+    let idle = |e: &Entry| Some((e.name, (e.idle)(effects)?));
+    TABLE.iter().filter_map(idle)
+}
 
 /// Checks the parameters of every effect that is on.
 pub(crate) fn check(scene: &Scene) -> Result<(), crate::scene::Problem> {

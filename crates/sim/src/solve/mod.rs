@@ -132,6 +132,20 @@ pub enum Stopped {
         /// What was there at the start, and came from gravity and from the shoulders, J.
         supplied_j: f64,
     },
+    /// An effect gave more energy than everything else supplied: its law is used beyond its range.
+    #[error(
+        "the run was given up at t = {t_s} s: effects.{effect} gave {given_j:.1e} J where {supplied_j:.1e} J were supplied, which its law does beyond the range it is valid in; give it, or the contact, more damping"
+    )]
+    FedByEffect {
+        /// Its name.
+        effect: &'static str,
+        /// When, s.
+        t_s: f64,
+        /// What laws gave more than they took, J.
+        given_j: f64,
+        /// What was there at the start, and came from gravity and from the shoulders, J.
+        supplied_j: f64,
+    },
     /// The observer asked to stop.
     #[error("stopped at t = {t_s} s")]
     ByObserver {
