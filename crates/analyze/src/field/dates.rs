@@ -16,11 +16,15 @@ const MORE_EVEN: f64 = 0.8;
 const EVEN_S: f64 = 2e-5;
 /// Samples whose usual step is below this share of their mean step came in packets.
 const PACKETS: f64 = 0.6;
+/// A clock is set back once or twice; what goes back more often are messages that overtake each other.
+const SET_BACK: usize = 3;
 
 /// Times of the samples, s, ascending or not; and what was done, where that is worth a word.
 pub struct Dated {
     /// When.
     pub t_s: Vec<f64>,
+    /// Whether the samples have overtaken each other and belong in the order of these times.
+    pub overtaken: bool,
     /// Kind and text of a remark.
     pub remark: Option<(&'static str, String)>,
 }
@@ -32,10 +36,19 @@ pub fn dated(log_s: Vec<f64>, stamp_s: Option<Vec<f64>>) -> Dated {
         && of_log > EVEN_S
         && stamp_s.len() == log_s.len()
     {
-        let of_stamps = scatter_s(&stamp_s);
+        let back = stamp_s.windows(2).filter(|w| w[1] < w[0]).count();
+        let overtaken = back > SET_BACK;
+        let of_stamps = if overtaken {
+            let mut sorted = stamp_s.clone();
+            sorted.sort_by(f64::total_cmp);
+            scatter_s(&sorted)
+        } else {
+            scatter_s(&stamp_s)
+        };
         if of_stamps < MORE_EVEN * of_log {
             return Dated {
                 t_s: on_the_logs_clock(&log_s, &stamp_s),
+                overtaken,
                 remark: Some((
                     "by_stamps",
                     format!(
@@ -50,6 +63,7 @@ pub fn dated(log_s: Vec<f64>, stamp_s: Option<Vec<f64>>) -> Dated {
     match unpacked(&log_s) {
         Some((t_s, usual, mean)) => Dated {
             t_s,
+            overtaken: false,
             remark: Some((
                 "packets",
                 format!(
@@ -61,6 +75,7 @@ pub fn dated(log_s: Vec<f64>, stamp_s: Option<Vec<f64>>) -> Dated {
         },
         None => Dated {
             t_s: log_s,
+            overtaken: false,
             remark: None,
         },
     }
@@ -143,6 +158,26 @@ mod tests {
         // What is as even as its stamps is left alone.
         assert_eq!(dated(taken.clone(), Some(stamps)).t_s, taken);
         assert!(dated(log, None).remark.is_none());
+    }
+
+    #[test]
+    fn messages_that_overtake_each_other_are_dated_by_their_stamps() {
+        let mut random = Random(5);
+        let taken: Vec<f64> = (0..6000).map(|k| f64::from(k) * 0.005).collect();
+        let mut both: Vec<(f64, f64)> = taken
+            .iter()
+            .map(|t| (t - 0.005 * (1.0 - random.uniform()).ln(), *t))
+            .collect();
+        both.sort_by(|a, b| a.0.total_cmp(&b.0));
+        let (log, stamps): (Vec<f64>, Vec<f64>) = both.into_iter().unzip();
+        let found = dated(log.clone(), Some(stamps.clone()));
+        assert!(found.overtaken && found.remark.unwrap().0 == "by_stamps");
+        let off = worst(&found.t_s, stamps.iter().copied());
+        assert!(off < 5e-5, "{off}");
+        // A clock that is set back half a second is another matter: nothing is to be shuffled.
+        let set_back = |k: usize, t: f64| if k < 3000 { t } else { t - 0.5 };
+        let stamps = taken.iter().enumerate().map(|(k, t)| set_back(k, *t));
+        assert!(!dated(log, Some(stamps.collect())).overtaken);
     }
 
     #[test]

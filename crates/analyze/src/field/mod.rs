@@ -479,7 +479,11 @@ impl Columns {
             let since = |(s, ns): (&f64, &f64)| (s - sec[0]) + (ns - nanosec[0]) / 1e9;
             sec.iter().zip(nanosec).map(since).collect()
         });
-        let Dated { mut t_s, remark } = dated(signal.times_s(self.start_ns), stamp_s);
+        let Dated {
+            mut t_s,
+            overtaken,
+            remark,
+        } = dated(signal.times_s(self.start_ns), stamp_s);
         let mut remarks: Vec<_> = remark.into_iter().collect();
         let gyro = self.values(topic, GYRO);
         // Samples without a rate among others that have one are holes; a sensor that never gives one still tells steps.
@@ -501,7 +505,22 @@ impl Columns {
         }
         let still = vec![0.0; n];
         let gyro = gyro.filter(|_| turns).unwrap_or([&still, &still, &still]);
-        let track = Track::from_columns(&t_s, gyro, accel);
+        let mut order: Vec<usize> = (0..n).collect();
+        if overtaken {
+            // What has no time comes last and is left out.
+            order.sort_by(|a, b| t_s[*a].total_cmp(&t_s[*b]));
+        }
+        let [t_s, g @ .., x, y, z] = [
+            &t_s[..],
+            gyro[0],
+            gyro[1],
+            gyro[2],
+            accel[0],
+            accel[1],
+            accel[2],
+        ]
+        .map(|column| order.iter().map(|k| column[*k]).collect::<Vec<f64>>());
+        let track = Track::from_columns(&t_s, g.each_ref().map(|c| &c[..]), [&x, &y, &z]);
         let dropped = track.dropped - if turns { without } else { 0 };
         if dropped as f64 > MANY * n as f64 {
             remarks.push((

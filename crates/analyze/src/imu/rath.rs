@@ -18,7 +18,7 @@ use super::track::Track;
 use super::vertical;
 use crate::filter::{Band, butter, sosfiltfilt};
 use crate::inputs::{Inputs, Window, interpolate, mean_step_in};
-use nalgebra::{UnitQuaternion, Vector3};
+use nalgebra::{Matrix3, Rotation3, UnitQuaternion, Vector3};
 use std::ops::Range;
 
 /// How the sensor's axes lie on the body (x forward along the pole, y left, z up).
@@ -181,7 +181,10 @@ pub fn motion(track: &Track, settings: &Settings) -> Result<Motion, MotionError>
             .iter()
             .map(|a| Vector3::from(*a).norm());
         let norm = norms.sum::<f64>() / track.len() as f64;
-        if is_gravity(norm) {
+        // What jumps feels more than gravity on average, but the sensor keeps its attitude on average.
+        let felt = track.accel_m_per_s2.iter();
+        let felt: Vector3<f64> = felt.map(|a| Vector3::from(*a)).sum();
+        if is_gravity(norm) || is_gravity(felt.norm() / track.len() as f64) {
             return Err(MotionError::Turning {
                 found_m_per_s2: found,
                 norm_m_per_s2: norm,
@@ -363,18 +366,29 @@ fn mean_specific_force(track: &Track, estimate: &Estimate) -> f64 {
     sum.norm() / track.len() as f64
 }
 
-/// The shortest turn that takes the mean upward direction, as the sensor sees it over some samples (all where these are none), to z.
+/// Body from sensor: z is the mean upward direction as the sensor sees it over some samples (all where these are none), x what is level of the
+/// sensor's own x. The shortest turn where that x stands nearly upright: it says little of forward then.
 fn level(estimate: &Estimate, over: Range<usize>) -> UnitQuaternion<f64> {
+    /// Least level part of the sensor's x, 1: about 17° from upright.
+    const LEVEL: f64 = 0.3;
     let mut up = Vector3::zeros();
     let all = &estimate.earth_from_sensor[..];
     let some = if over.is_empty() { all } else { &all[over] };
     for q in some {
         up += q.inverse() * Vector3::z();
     }
-    // On its head: half a turn about x; there is no shortest turn.
-    UnitQuaternion::rotation_between(&up, &Vector3::z()).unwrap_or_else(|| {
-        UnitQuaternion::from_axis_angle(&Vector3::x_axis(), std::f64::consts::PI)
-    })
+    let Some(up) = up.try_normalize(0.0) else {
+        return UnitQuaternion::identity();
+    };
+    let x = Vector3::x() - up * up.x;
+    if x.norm() < LEVEL {
+        // OK because up is far from -z there.
+        return UnitQuaternion::rotation_between(&up, &Vector3::z()).unwrap_or_default();
+    }
+    let x = x.normalize();
+    let axes = [x, up.cross(&x), up].map(|axis| axis.transpose());
+    let rows = Rotation3::from_matrix_unchecked(Matrix3::from_rows(&axes));
+    UnitQuaternion::from_rotation_matrix(&rows)
 }
 
 /// The turn about z that takes the direction of the first walking to x: the mean horizontal acceleration over the two seconds after the
@@ -503,6 +517,47 @@ mod tests {
     fn rms(x: impl Iterator<Item = f64>) -> f64 {
         let v: Vec<f64> = x.collect();
         (v.iter().map(|x| x * x).sum::<f64>() / v.len() as f64).sqrt()
+    }
+
+    #[test]
+    fn x_along_the_pole_is_forward_however_the_sensor_is_rolled() {
+        for roll_deg in [0.0, 45.0, 90.0, 160.0, 175.0, 180.0, -178.0] {
+            for pitch_deg in [0.0, 5.0, -20.0] {
+                let [roll, pitch] = [roll_deg, pitch_deg].map(f64::to_radians);
+                let mount = UnitQuaternion::from_euler_angles(0.0, pitch, 0.0)
+                    * UnitQuaternion::from_euler_angles(roll, 0.0, 0.0);
+                let (track, truth, ..) = twin([0.0; 3], mount);
+                let found = motion(&track, &Settings::default()).unwrap().inputs;
+                let [roll, pitch] = [&found.roll_rad, &found.pitch_rad]
+                    .map(|x| rms(x[2000..6000].iter().copied()).to_degrees());
+                let truth = rms(truth[2000..6000].iter().copied()).to_degrees();
+                assert!(
+                    (roll - truth).abs() < 0.02 * truth && pitch < 0.02 * truth,
+                    "{roll_deg} {pitch_deg}: {roll} {pitch} {truth}"
+                );
+            }
+        }
+    }
+
+    /// What jumps feels more than gravity on average: the accelerometer is not to blame for a gyroscope in degrees all the same.
+    #[test]
+    fn jumping_hides_no_gyroscope_in_degrees() {
+        let (mut track, ..) = twin([0.0; 3], UnitQuaternion::identity());
+        let samples = track
+            .gyro_rad_per_s
+            .iter_mut()
+            .zip(&mut track.accel_m_per_s2);
+        for ((rate, accel), k) in samples.zip(0..) {
+            *rate = rate.map(f64::to_degrees);
+            accel[1] += if k % 2 == 0 { 15.0 } else { -15.0 };
+        }
+        let error = motion(&track, &Settings::default()).unwrap_err();
+        assert!(matches!(error, MotionError::Turning { .. }), "{error}");
+        for accel in &mut track.accel_m_per_s2 {
+            accel[2] -= 9.81;
+        }
+        let error = motion(&track, &Settings::default()).unwrap_err();
+        assert!(matches!(error, MotionError::NoGravity { .. }), "{error}");
     }
 
     #[test]
