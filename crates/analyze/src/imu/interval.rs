@@ -62,6 +62,7 @@ pub fn metrics(motion: &Motion, window: Window) -> Metrics {
         .collect();
     let range = window.range(&motion.inputs.t_s);
     let support_ratio = &motion.inputs.support_ratio[range];
+    let rate_hz = super::track::period_s(&motion.inputs.t_s).map_or(f64::INFINITY, |s| 1.0 / s);
     for (name, value) in &mut out.0 {
         if let Some((_, why)) = BEYOND.iter().find(|(n, _)| n == name) {
             *value = Value {
@@ -101,9 +102,20 @@ pub fn metrics(motion: &Motion, window: Window) -> Metrics {
             f64::INFINITY
         };
         value.ci95 = Some([(x - half).max(0.0), (x + half).min(most)]);
-        if OF_PLACE.contains(name) && !motion.settings.lever_is_known {
-            value.reason = Some("as if the sensor sat at the centre of mass, and the interval knows no better, for nobody says where it sits; give imu_place_m in a roles file".into());
-        }
+        let of_height = OF_COURSE.contains(name).then(|| {
+            let corner_hz = motion.settings.height_corner_hz;
+            format!("of what heaves faster than {corner_hz} Hz: an inertial sensor loses a slower course of the height")
+        });
+        let of_place = (OF_PLACE.contains(name) && !motion.settings.lever_is_known).then(|| "as if the sensor sat at the centre of mass, and the interval knows no better, for nobody says where it sits; give imu_place_m in a roles file".to_owned());
+        let of_rate = (OF_EDGES.contains(name) && rate_hz < ENOUGH_HZ).then(|| {
+            format!("at {rate_hz:.0} Hz touch-downs fall between samples, of which the interval knows a part only; 100 Hz or more are wanted")
+        });
+        let reasons: Vec<String> = of_height
+            .into_iter()
+            .chain(of_place)
+            .chain(of_rate)
+            .collect();
+        value.reason = (!reasons.is_empty()).then(|| reasons.join("; "));
     }
     let budget = &motion.settings.budget;
     let below = |name: &str, least: f64| out.number(name).is_some_and(|x| x < least);
@@ -131,6 +143,13 @@ pub fn metrics(motion: &Motion, window: Window) -> Metrics {
 
 /// What a sensor off the centre of mass feels otherwise, by its lever.
 const OF_PLACE: &[&str] = &["dz_pp_m", "rms_z_m", "t_float"];
+
+/// What the moments of touch-down decide, and the rate from which samples tell them: at 50 Hz intervals of Δz miss the truth by millimetres.
+const OF_EDGES: &[&str] = &["dz_pp_m", "t_float"];
+const ENOUGH_HZ: f64 = 90.0;
+
+/// What a slow course of the height is part of.
+const OF_COURSE: &[&str] = &["dz_pp_m", "rms_z_m"];
 
 /// Roots of mean squares, to which noise adds and from which it never takes.
 const MEAN_SQUARES: &[&str] = &["rms_roll_deg", "rms_pitch_deg"];
@@ -199,8 +218,8 @@ const OF_HEAVE: &[&str] = &[
 const SEEN: f64 = 5.0;
 
 /// How far an edge of the support is moved by what smooths it, samples: 0.14 on twelve twins at 100 Hz, 0.28 in the worked example of
-/// docs/field.md.
-const EDGE_SAMPLES: f64 = 0.2;
+/// docs/field.md, 0.2 to 0.5 on four at 50 Hz.
+const EDGE_SAMPLES: f64 = 0.3;
 
 /// So much of its SD has a wandering of [`WANDER_S`] between 0.2 and 0.4 Hz, as [`slow_course_m`] sees it: ∫ of its spectrum times the difference
 /// of the two gains 1/(1 + (f₀/f)⁴), squared.
@@ -235,13 +254,8 @@ fn beyond_the_budget(name: &str, motion: &Motion, window: Window) -> f64 {
         }
         // The definition counts samples at 30 Hz; others of the same motion come up to one of them later, evenly spread.
         "onset_time_s" => (1.0 / 30.0) / 3f64.sqrt(),
-        // What is slower than the corner is lost, and what lies just above it is as much the sensor's: more of that than the budget's own wandering
-        // has there speaks of a course below that is as large, whose largest minus smallest is missing or too much.
-        "dz_pp_m" => {
-            let excess = |seen: f64, of_budget: f64| (seen.powi(2) - of_budget.powi(2)).max(0.0);
-            let of_budget = ABOVE_CORNER * motion.settings.budget.height_wander_m;
-            RANGE_OF_WANDER * excess(slow_course_m(motion, range), of_budget).sqrt()
-        }
+        // What is slower than the corner is missing or too much.
+        "dz_pp_m" => lost_course_m(motion, range),
         // The weights 1, 2, 1 move a touch-down by a part of a sample, all of them to the same side (docs/field.md: twins at 100 and 200 Hz).
         "t_float" if motion.settings.lever_m != [0.0; 3] => {
             let (t_s, ratio) = (&inputs.t_s[range.clone()], &inputs.support_ratio[range]);
@@ -265,25 +279,38 @@ fn beyond_the_budget(name: &str, motion: &Motion, window: Window) -> f64 {
                 .flat_map(|cut_s| [[cut_s, 0.0], [0.0, cut_s]]);
             farthest(name, inputs, window, cuts) / 1.96
         }
-        // The ends have no height. Stretches of their length swing so much more or less than the whole.
+        // The ends have no height. Stretches of their length swing so much more or less than the whole. And a slow course is missing from it.
         "rms_z_m" => {
+            let course_m = lost_course_m(motion, range.clone());
             let lost = range.len() - seen.len();
             let mean = seen.iter().sum::<f64>() / seen.len().max(1) as f64;
             let power = |z: &[f64]| {
                 z.iter().map(|z| (z - mean).powi(2)).sum::<f64>() / z.len().max(1) as f64
             };
             let whole = power(&seen);
-            if lost < 2 || whole <= 0.0 {
+            if whole <= 0.0 {
                 return 0.0;
             }
-            let parts: Vec<f64> = seen.chunks_exact(lost.min(seen.len())).map(power).collect();
+            let parts: Vec<f64> = seen
+                .chunks_exact(lost.clamp(2, seen.len()))
+                .map(power)
+                .collect();
             let spread = (parts.iter().map(|p| (p - whole).powi(2)).sum::<f64>()
                 / parts.len().max(1) as f64)
                 .sqrt();
-            lost as f64 / range.len() as f64 * spread / (2.0 * whole.sqrt())
+            let ends = lost as f64 / range.len() as f64 * spread / (2.0 * whole.sqrt());
+            ends.hypot((whole + course_m.powi(2)).sqrt() - whole.sqrt())
         }
         _ => 0.0,
     }
+}
+
+/// Largest minus smallest of a course below the corner that is as large as what [`slow_course_m`] finds above it beyond the budget's own
+/// wandering, m.
+fn lost_course_m(motion: &Motion, range: Range<usize>) -> f64 {
+    let of_budget = ABOVE_CORNER * motion.settings.budget.height_wander_m;
+    let excess = slow_course_m(motion, range).powi(2) - of_budget.powi(2);
+    RANGE_OF_WANDER * excess.max(0.0).sqrt()
 }
 
 /// SD of the height between its corner f₀ and 2f₀, m: of what the window knows of it.

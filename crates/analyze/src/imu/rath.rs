@@ -233,6 +233,12 @@ pub fn motion(track: &Track, settings: &Settings) -> Result<Motion, MotionError>
     }
     let mean = accel_up.iter().sum::<f64>() / n as f64;
     accel_up.iter_mut().for_each(|a| *a -= mean);
+    if settings.lever_m != [0.0; 3] {
+        accel_up = stretches
+            .iter()
+            .flat_map(|r| sharpened(&accel_up[r.clone()]))
+            .collect();
+    }
     let corner_hz = settings.height_corner_hz;
     let mut height_m = stretchwise_height(&accel_up, &stretches, period_s, corner_hz);
     // At its free ends the height shows the accelerometer's bias; that fades by e every 1/(√2 π f₀).
@@ -450,6 +456,15 @@ fn at_centre_of_mass(
         .collect()
 }
 
+/// What [`at_centre_of_mass`] weighted 1, 2, 1, with what that took from slow swings: a part (ω h)²/4 at the step h, 2 % of a heave at 2.15 Hz
+/// sampled at 50 Hz; what is left of it is (ω h)⁴/16. Not for the support ratio, whose edges it would overshoot.
+/// Source: twicing, Tukey, Exploratory Data Analysis (1977), ch. 16.
+fn sharpened(x: &[f64]) -> Vec<f64> {
+    let last = x.len().saturating_sub(1);
+    let weighted = |i: usize| (x[i.saturating_sub(1)] + 2.0 * x[i] + x[(i + 1).min(last)]) / 4.0;
+    (0..x.len()).map(|i| 2.0 * x[i] - weighted(i)).collect()
+}
+
 /// Fast sensors: without what lies above [`ACCELERATION_HZ`], where a derivative is noise only. Others as they are: the weights see to it.
 fn below(v: &[Vector3<f64>], period_s: f64) -> Vec<Vector3<f64>> {
     if 1.0 / period_s < 5.0 * ACCELERATION_HZ {
@@ -537,6 +552,42 @@ mod tests {
                 );
             }
         }
+    }
+
+    /// A slow sensor off the centre loses nothing of the heave: to 3e-4 at 2.14 Hz and 50 Hz.
+    #[test]
+    fn weights_take_nothing_from_the_height() {
+        let lever = [0.4, 0.05, 0.25];
+        let (fast, _, height, _) = twin(lever, UnitQuaternion::identity());
+        let slow = |x: &[[f64; 3]]| x.iter().copied().step_by(4).collect();
+        let track = Track {
+            t_s: fast.t_s.iter().copied().step_by(4).collect(),
+            gyro_rad_per_s: slow(&fast.gyro_rad_per_s),
+            accel_m_per_s2: slow(&fast.accel_m_per_s2),
+            dropped: 0,
+        };
+        let settings = |lever_m| Settings {
+            lever_m,
+            orientation: Options::without_latency(),
+            ..Settings::default()
+        };
+        let rms_of = |track: &Track, lever| {
+            let found = motion(track, &settings(lever)).unwrap().inputs.height_m;
+            rms(found[500..1500].iter().copied())
+        };
+        // What the double integral itself makes of so few samples is not the weights' doing.
+        let central = {
+            let (fast, ..) = twin([0.0; 3], UnitQuaternion::identity());
+            Track {
+                t_s: track.t_s.clone(),
+                gyro_rad_per_s: slow(&fast.gyro_rad_per_s),
+                accel_m_per_s2: slow(&fast.accel_m_per_s2),
+                dropped: 0,
+            }
+        };
+        let (off, at) = (rms_of(&track, lever), rms_of(&central, [0.0; 3]));
+        println!("{off} {at} {}", rms(height[2000..6000].iter().copied()));
+        assert!((off / at - 1.0).abs() < 1e-3, "{off} {at}");
     }
 
     /// What jumps feels more than gravity on average: the accelerometer is not to blame for a gyroscope in degrees all the same.
