@@ -295,6 +295,14 @@ fn settings_are_checked_like_the_scene() {
     for (setting, words) in [
         ("effects.music.beat_hs=2", "Did you mean `beat_hz`?"),
         ("effects.musik=false", "Did you mean `music`?"),
+        (
+            "effects.music.strength=2",
+            "Did you mean `strength_rad_per_s`?",
+        ),
+        (
+            "effects.imu.sensors.0.on=\"rath\"",
+            "there is no list `sensors` yet",
+        ),
         ("effects.music.beat_hz=fast", "expected a number"),
         ("effects.music.beat_hz=-2", "at least 0"),
         ("duration_s", "KEY=VALUE"),

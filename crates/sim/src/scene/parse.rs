@@ -143,13 +143,18 @@ pub fn json_schema() -> serde_json::Value {
     schemars::schema_for!(Scene).to_value()
 }
 
-/// The name nearest to `word` when it is near enough to be a slip.
+/// The name nearest to `word` when it is near enough to be a slip, or else the only one that goes on from it, as with a unit.
 pub fn nearest<'a>(word: &str, names: impl Iterator<Item = &'a str>) -> Option<&'a str> {
-    names
-        .map(|n| (strsim::damerau_levenshtein(word, n), n))
-        .min()
-        .filter(|(d, n)| *d <= 1 + n.len().max(word.len()) / 3)
-        .map(|(_, n)| n)
+    let names: Vec<&str> = names.collect();
+    let near = |n: &&'a str| (strsim::damerau_levenshtein(word, n), *n);
+    let slip = names.iter().map(near).min();
+    let slip = slip.filter(|(d, n)| *d <= 1 + n.len().max(word.len()) / 3);
+    let mut longer = names.iter().filter(|n| n.starts_with(&format!("{word}_")));
+    match (slip, longer.next(), longer.next()) {
+        (Some((_, name)), ..) => Some(name),
+        (None, Some(name), None) => Some(name),
+        _ => None,
+    }
 }
 
 /// A scene that is about to be changed many times: its keys are looked up in a table that is made once.
@@ -291,6 +296,11 @@ fn set_key(table: &mut toml::Table, path: &[&str], value: toml::Value) -> Result
         };
         table.insert(first.into(), value);
         return Ok(());
+    }
+    if !table.contains_key(first) && rest[0].parse::<usize>().is_ok() {
+        return Err(format!(
+            "there is no list `{first}` yet; give all of it, {first}=[…]"
+        ));
     }
     match table
         .entry(first)
