@@ -559,15 +559,41 @@ impl Columns {
             let values = self.get(topic, field).map(|s| &s.values[..]);
             values.filter(|v| v.len() == any.values.len() && v.iter().all(|v| v.is_finite()))
         });
-        let own_s = own_s.map(|own_s| own_s.iter().map(|t| t - own_s[0]).collect());
         let log_s = seconds_since(&any.times_ns, self.start_ns);
-        let Dated { t_s, remark } = dated(log_s, own_s);
+        let (t_s, remark) = match own_s {
+            Some(own_s) => (never_early(own_s, &log_s), None),
+            None => {
+                let Dated { t_s, remark } = dated(log_s, None);
+                (t_s, remark)
+            }
+        };
         let mut beats: Vec<(f64, usize)> = t_s.into_iter().zip(0..).collect();
         beats.sort_by(|a, b| a.0.total_cmp(&b.0));
         beats.dedup_by(|b, a| b.0 <= a.0);
         let number = number.map(|number| beats.iter().map(|(_, k)| number[*k]).collect());
         (beats.into_iter().map(|b| b.0).collect(), number, remark)
     }
+}
+
+/// Beats' own times on the log's clock: moved so that none lies behind its log time, and stretched where the delays surely grow or fall. Beats are
+/// few: the clocks' drift from the earliest of them alone would bend how carriers come to the beat.
+fn never_early(own_s: &[f64], log_s: &[f64]) -> Vec<f64> {
+    let n = own_s.len() as f64;
+    let delay_s: Vec<f64> = log_s.iter().zip(own_s).map(|(l, s)| l - s).collect();
+    let mean = |x: &[f64]| x.iter().sum::<f64>() / n;
+    let (middle_s, usual_s) = (mean(own_s), mean(&delay_s));
+    let (mut tt, mut td, mut dd) = (0.0, 0.0, 0.0);
+    for (s, d) in own_s.iter().zip(&delay_s) {
+        let (t, d) = (s - middle_s, d - usual_s);
+        (tt, td, dd) = (tt + t * t, td + t * d, dd + d * d);
+    }
+    // Squares of the slope and of three of its standard errors.
+    let sure = td * td * (n - 2.0) > 9.0 * (dd * tt - td * td);
+    let slope = if sure { td / tt } else { 0.0 };
+    let late = |(d, s): (&f64, &f64)| d - slope * (s - middle_s);
+    let least_s = delay_s.iter().zip(own_s).map(late).fold(f64::MAX, f64::min);
+    let moved = |s: &f64| s + least_s + slope * (s - middle_s);
+    own_s.iter().map(moved).collect()
 }
 
 /// Metadata records by name, as a reader gives them.
@@ -611,5 +637,35 @@ mod tests {
         // A pedometer has none at all, and its steps still count.
         let never = read(|_| false);
         assert!(!never.turns && never.track.len() == 100);
+    }
+
+    #[test]
+    fn beats_that_come_late_or_together_keep_their_own_times_and_numbers() {
+        let mut random = crate::random::Random(3);
+        let mut loose = || 2e7 - 3e6 * random.normal();
+        let late_ns: Vec<f64> = (0..120).map(|_| loose()).collect();
+        let together = |k: usize| f64::from(u8::try_from(4 - k % 5).unwrap()) * 4.65e8;
+        for packets in [false, true] {
+            let kept = |k: &usize| k % 11 != 3 && !(50..70).contains(k);
+            let number: Vec<usize> = (0..120).filter(kept).collect();
+            let came = |k: &usize| {
+                let late_ns = if packets { together(*k) } else { late_ns[*k] };
+                (*k as f64 * 4.65e8 + late_ns) as i64
+            };
+            let times_ns: std::sync::Arc<[i64]> = number.iter().map(came).collect();
+            let column = |field: &str, scale: f64| Signal {
+                path: format!("/beat.{field}"),
+                unit: String::new(),
+                times_ns: times_ns.clone(),
+                values: number.iter().map(|k| scale * *k as f64).collect(),
+            };
+            let signals = vec![column("number", 1.0), column("time_s", 0.465)];
+            let start_ns = 0;
+            let (t_s, numbers, _) = Columns { signals, start_ns }.beats("/beat");
+            let course = Course::of(&t_s, numbers.as_deref());
+            let (hz, _) = course.tempo(Window::ALL).unwrap();
+            assert!((hz * 0.465 - 1.0).abs() < 1e-9, "{hz}");
+            assert!(course.phase(&[30.0])[0].is_finite());
+        }
     }
 }

@@ -220,6 +220,28 @@ fn a_beat_that_began_before_the_record_gives_a_bound() {
 }
 
 #[test]
+fn messages_that_come_late_do_not_look_like_a_strong_pull() {
+    let (omega, pull, noise, dt) = (TAU * 2.0, 1.2, 0.05, 1.0 / 30.0);
+    for seed in 1..=5 {
+        let mut random = Random(seed);
+        let mut behind = [0.0; 2];
+        let (mut t_s, mut beat, mut phase) = (vec![], vec![], [vec![], vec![]]);
+        for k in 0..2700 {
+            let t = f64::from(k) * dt;
+            t_s.push(t - 0.002 * random.uniform().ln());
+            beat.push(omega * t);
+            for (x, seen) in behind.iter_mut().zip(&mut phase) {
+                seen.push(omega * t + *x);
+                *x += -dt * pull * x.sin() + noise * dt.sqrt() * random.normal();
+            }
+        }
+        let found = adler(&t_s, &[&phase[0], &phase[1]], &beat, false).unwrap();
+        let [low, high] = found.pull_ci95_rad_per_s;
+        assert!(low < pull && high.is_infinite(), "{low} {high}");
+    }
+}
+
+#[test]
 fn a_pull_at_the_limit_of_the_search_is_a_bound() {
     let stiff = Case {
         pull: 12.0,

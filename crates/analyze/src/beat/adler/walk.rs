@@ -1,6 +1,7 @@
 //! Phases and beat about the first beat, on the grid of Adler's equation.
 
 use super::unknowns::{BUILD_UP, ERROR, NOISE, OFFSET, OWN, PULL, SHARED, place};
+use crate::beat::smooth::smooth;
 use crate::imu::track::period_s;
 use crate::inputs::placed;
 use crate::median::median;
@@ -104,7 +105,10 @@ impl Walk {
                 false => pick(&whole),
             }
         };
-        let phase: Vec<Vec<f64>> = phase_rad.iter().map(observed).collect();
+        let mut phase: Vec<Vec<f64>> = phase_rad.iter().map(observed).collect();
+        if !measured {
+            dated_by_the_beat(&t, &mut beat, &mut phase);
+        }
         let (mut sounds_s, mut turned) = (0.0, 0.0);
         for (t, b) in t.windows(2).zip(beat.windows(2)) {
             if b[0].is_finite() && b[1].is_finite() {
@@ -221,6 +225,24 @@ fn onset(t_s: &[f64], beat_rad: &[f64]) -> Result<usize, &'static str> {
         }
     }
     Err("no beat that lasts for 4 s")
+}
+
+/// Recorded phases and the beat's share a message, and what it comes late by: the beat's phase off its slow course tells that.
+fn dated_by_the_beat(t_s: &[f64], beat: &mut [f64], phase: &mut [Vec<f64>]) {
+    let mut start = 0;
+    for end in 1..=beat.len() {
+        if end < beat.len() && beat[end].is_finite() == beat[start].is_finite() {
+            continue;
+        }
+        if beat[start].is_finite() {
+            let (course, _) = smooth(&t_s[start..end], &beat[start..end]);
+            for (k, psi) in (start..end).zip(course) {
+                phase.iter_mut().for_each(|y| y[k] += psi - beat[k]);
+                beat[k] = psi;
+            }
+        }
+        start = end;
+    }
 }
 
 /// The beat's phase on an even axis, rad: through messages that were lost between two of a beat it goes on at its usual rate, to the nearest
