@@ -19,6 +19,8 @@ pub struct Event {
 const LOCKED: f64 = 0.95;
 /// Length of a stretch judged for locking (s).
 const LOCK_STRETCH_S: f64 = 5.0;
+/// A beat has ended when none comes for so many beats.
+const AWAITED: f64 = 1.5;
 /// The support below this share of the weight is a jump's flight.
 const FLIGHT: f64 = crate::metrics::FLOAT_SHARE;
 
@@ -120,6 +122,13 @@ fn beat(inputs: &Inputs, out: &mut Vec<Event>) {
         (next < t_s.len() && t_s[next] > t_s[k])
             .then(|| step / std::f64::consts::TAU / (t_s[next] - t_s[k]))
     };
+    // Where the recording ends before another beat was due, the beat may go on.
+    let ends_s = t_s.last().copied().unwrap_or_default();
+    let last_beat_s = |k: usize| {
+        k.checked_sub(2)
+            .and_then(tempo_hz)
+            .map_or(0.0, |hz| 1.0 / hz)
+    };
     for k in 0..sounding.len().min(t_s.len()) {
         let before = k > 0 && sounding[k - 1];
         if sounding[k] && !before {
@@ -131,7 +140,7 @@ fn beat(inputs: &Inputs, out: &mut Vec<Event>) {
                 kind: "beat_start",
                 what,
             });
-        } else if before && !sounding[k] {
+        } else if before && !sounding[k] && !(ends_s - t_s[k] < AWAITED * last_beat_s(k)) {
             out.push(Event {
                 t_s: t_s[k],
                 kind: "beat_end",

@@ -7,15 +7,18 @@
 //! | [`track`] | the beats themselves, by dynamic programming |
 //! | [`mod@adler`] | Adler's test: detuning, pull, capture range |
 //! | [`lock`] | the beat's phase, p:q locking |
+//! | [`mod@smooth`] | a slow course through points that err |
 
 pub mod adler;
 pub mod lock;
 pub mod onset;
+pub mod smooth;
 #[cfg(test)]
 pub(crate) mod synth;
 pub mod tempo;
 pub mod track;
 
+use crate::inputs::Window;
 use onset::Onsets;
 
 /// Why there are no beats.
@@ -43,9 +46,9 @@ pub enum BeatError {
 pub struct Beats {
     /// Time of each beat since the first sample, s.
     pub beat_s: Vec<f64>,
-    /// Beats per second: slope of beat number over time, Hz.
+    /// Beats per second over the time in which they sound, Hz.
     pub tempo_hz: f64,
-    /// Half the 95 % interval of the tempo, Hz; it grows when the tempo drifts.
+    /// Half the 95 % interval of the tempo, Hz.
     pub tempo_ci95_hz: f64,
 }
 
@@ -81,49 +84,13 @@ pub fn onsets(sound: &[f32], rate_hz: f64) -> Result<Onsets, BeatError> {
 /// When nothing is periodic.
 pub fn beats_among(onsets: &Onsets) -> Result<Beats, BeatError> {
     let beat_s = track::beats(onsets).ok_or(BeatError::NoBeat)?;
-    let (tempo_hz, tempo_ci95_hz) = tempo_of(&beat_s).ok_or(BeatError::NoBeat)?;
+    let course = lock::Course::of(&beat_s, None);
+    let (tempo_hz, tempo_ci95_hz) = course.tempo(Window::ALL).ok_or(BeatError::NoBeat)?;
     Ok(Beats {
         beat_s,
         tempo_hz,
         tempo_ci95_hz,
     })
-}
-
-/// Beats per second while they sound and half its 95 % interval, from beat times: least squares of time on number, with one slope for all runs
-/// between pauses and an offset for each. A beat that is missing among others is counted.
-///
-/// `None` below three beats. The interval takes the residuals as independent from beat to beat.
-pub fn tempo_of(beat_s: &[f64]) -> Option<(f64, f64)> {
-    if beat_s.len() < 3 {
-        return None;
-    }
-    let mut runs: Vec<Vec<(f64, f64)>> = vec![vec![(0.0, beat_s[0])]];
-    for (beats, t) in lock::beats_between(beat_s).iter().zip(&beat_s[1..]) {
-        match (beats, runs.last_mut()) {
-            (Some(beats), Some(run)) => {
-                let number = run[run.len() - 1].0 + f64::from(*beats);
-                run.push((number, *t));
-            }
-            _ => runs.push(vec![(0.0, *t)]),
-        }
-    }
-    // Each about its own middle.
-    for run in &mut runs {
-        let n = run.len() as f64;
-        let (k, t) = run.iter().fold((0.0, 0.0), |(a, b), (k, t)| (a + k, b + t));
-        for beat in run {
-            *beat = (beat.0 - k / n, beat.1 - t / n);
-        }
-    }
-    let sum = |of: &dyn Fn(f64, f64) -> f64| -> f64 {
-        runs.iter().flatten().map(|(k, t)| of(*k, *t)).sum()
-    };
-    let kk = sum(&|k, _| k * k);
-    let period_s = sum(&|k, t| k * t) / kk;
-    let residual = sum(&|k, t| (t - period_s * k).powi(2));
-    let free = beat_s.len() as f64 - 1.0 - runs.len() as f64;
-    let sigma_s = (residual / free.max(1.0) / kk).sqrt();
-    (period_s > 0.0).then(|| (1.0 / period_s, 1.96 * sigma_s / (period_s * period_s)))
 }
 
 #[cfg(test)]
@@ -169,13 +136,14 @@ mod tests {
     #[test]
     fn a_steady_series_has_its_tempo() {
         let t: Vec<f64> = (0..100).map(|k| 3.0 + f64::from(k) / 2.15).collect();
-        let (hz, ci) = tempo_of(&t).unwrap();
+        let tempo = |t: &[f64]| lock::Course::of(t, None).tempo(Window::ALL).unwrap();
+        let (hz, ci) = tempo(&t);
         assert!((hz - 2.15).abs() < 1e-12 && ci < 1e-12);
         // A beat that was lost and a pause change nothing.
         let paused = |k: &usize| *k != 30 && !(60..80).contains(k);
         let late = |k: usize| t[k] + if k < 60 { 0.0 } else { 0.2 };
         let some: Vec<f64> = (0..100).filter(paused).map(late).collect();
-        let (hz, ci) = tempo_of(&some).unwrap();
+        let (hz, ci) = tempo(&some);
         assert!((hz - 2.15).abs() < 1e-12 && ci < 1e-12, "{hz} {ci}");
     }
 }

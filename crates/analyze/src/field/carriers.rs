@@ -81,7 +81,11 @@ fn alike(
 
 /// All worn sensors.
 #[derive(Default)]
-pub struct Carriers(Vec<Worn>);
+pub struct Carriers {
+    worn: Vec<Worn>,
+    /// Whether their clocks could not be held against each other.
+    apart: bool,
+}
 
 /// Whether a metric rests on the carriers' phases.
 pub fn gives(name: &str) -> bool {
@@ -119,7 +123,7 @@ impl Carriers {
                 .collect()
         };
         let steps = steps_in(&track.t_s, &heave);
-        self.0.push(Worn {
+        self.worn.push(Worn {
             topic: topic.to_owned(),
             heave,
             upright: turns,
@@ -141,9 +145,21 @@ impl Carriers {
     /// where carriers fall in and out of step: the heave grows and fades, the tilt fades and grows. What all clocks have in common goes
     /// into γ and κ and stays; so does a whole number of steps, which changes no phase: each o_j lies within half a step.
     pub fn align(&mut self, motion: &Motion) -> Vec<Quality> {
-        let Some((offsets_s, least_s, error_s)) = self.offsets(motion) else {
+        let Some((told, offsets_s, least_s, error_s)) = self.offsets(motion) else {
             return Vec::new();
         };
+        if told < -(1.0 - MATCH).ln() {
+            self.apart = true;
+            let topics: Vec<&str> = self.worn.iter().map(|w| &w.topic[..]).collect();
+            return vec![Quality::remark(
+                "",
+                "clocks_apart",
+                format!(
+                    "the clocks of {} could not be held against each other: their heaves, put together within half a step, are not the load's; a synchrony of theirs has no interval, tap the sensors together or say --one-clock",
+                    topics.join(", ")
+                ),
+            )];
+        }
         let (low, high) = offsets_s
             .iter()
             .flatten()
@@ -152,7 +168,7 @@ impl Carriers {
             return Vec::new();
         }
         let mut out = Vec::new();
-        for (worn, offset_s) in self.0.iter_mut().zip(offsets_s) {
+        for (worn, offset_s) in self.worn.iter_mut().zip(offsets_s) {
             let Some(offset_s) = offset_s else { continue };
             worn.ahead_s = offset_s;
             out.push(Quality::remark(
@@ -169,17 +185,17 @@ impl Carriers {
     }
 
     /// o_j of everyone who walks, with mean zero; how far they have to part to be believed; half their 95 % interval (s). `None` for fewer
-    /// than two, or when the rath does not move as the carriers do.
-    fn offsets(&self, motion: &Motion) -> Option<(Vec<Option<f64>>, f64, f64)> {
+    /// than two, or where the clocks do as they are. First how well the load moves as the carriers do, −ln(1 − J).
+    fn offsets(&self, motion: &Motion) -> Option<(f64, Vec<Option<f64>>, f64, f64)> {
         let seen = &motion.inputs;
         let walks = |w: &&Worn| w.steps.is_ok();
         let ends = |t: &[f64]| Some((*t.first()?, *t.last()?));
         let (mut start, mut end) = ends(&seen.t_s)?;
-        for worn in self.0.iter().filter(walks) {
+        for worn in self.worn.iter().filter(walks) {
             let (a, b) = ends(&worn.t_s)?;
             (start, end) = (start.max(a), end.min(b));
         }
-        if self.0.iter().filter(walks).count() < 2 || end - start < 10.0 {
+        if self.worn.iter().filter(walks).count() < 2 || end - start < 10.0 {
             return None;
         }
         let n = ((end - start) * ALIGN_HZ) as usize;
@@ -189,7 +205,7 @@ impl Carriers {
             Some(hilbert(&interpolate(t_s, &band, &grid)))
         };
         let mut riders = Vec::new();
-        for (k, worn) in self.0.iter().enumerate() {
+        for (k, worn) in self.worn.iter().enumerate() {
             if let Ok(steps) = &worn.steps {
                 riders.push(Rider {
                     number: k,
@@ -246,22 +262,22 @@ impl Carriers {
                 break;
             }
         }
-        if best < -(1.0 - MATCH).ln() || best - as_they_are < -BETTER.ln() {
+        if best >= -(1.0 - MATCH).ln() && best - as_they_are < -BETTER.ln() {
             return None;
         }
         let mean = found.iter().sum::<f64>() / found.len() as f64;
-        let mut out = vec![None; self.0.len()];
+        let mut out = vec![None; self.worn.len()];
         for (rider, o) in riders.iter().zip(found) {
             out[rider.number] = Some(o - mean);
         }
         let (least_s, error_s) = if two { TWO_S } else { MANY_S };
-        Some((out, least_s, error_s))
+        Some((best, out, least_s, error_s))
     }
 
     /// Phases on one time axis, rad, for those who walk; `None` for fewer than two.
     pub fn phases(&self) -> Option<(Vec<f64>, Vec<Vec<f64>>)> {
         let walking: Vec<(&Worn, &Steps)> = self
-            .0
+            .worn
             .iter()
             .filter_map(|w| Some((w, w.steps.as_ref().ok()?)))
             .collect();
@@ -321,7 +337,7 @@ impl Carriers {
             }
             Some(out)
         };
-        self.0
+        self.worn
             .iter()
             .map(of)
             .collect::<Option<_>>()
@@ -330,7 +346,7 @@ impl Carriers {
 
     /// 95 % interval of the synchrony: the phases' own error, and that of clocks that were put on each other by motion, as twins show them.
     pub fn interval(&self, metrics: &mut Metrics) {
-        let moved = self.0.iter().any(|worn| worn.ahead_s != 0.0);
+        let moved = self.worn.iter().any(|worn| worn.ahead_s != 0.0);
         let half = if moved {
             PHASE_ERROR.hypot(MOVED_ERROR)
         } else {
@@ -338,6 +354,11 @@ impl Carriers {
         };
         for (name, value) in &mut metrics.0 {
             if let ("synchrony", Datum::Number(x)) = (*name, &value.datum) {
+                if self.apart {
+                    value.reason =
+                        Some("if the carriers' clocks agree, which nothing tells".into());
+                    continue;
+                }
                 value.ci95 = Some([(x - half).max(0.0), (x + half).min(1.0)]);
             }
         }
@@ -346,7 +367,7 @@ impl Carriers {
     /// Steps of each who walks, on the carriers' common clock, s.
     pub fn step_s(&self) -> Vec<Vec<f64>> {
         let walking = self
-            .0
+            .worn
             .iter()
             .filter_map(|w| Some((w, w.steps.as_ref().ok()?)));
         walking
@@ -356,7 +377,7 @@ impl Carriers {
 
     /// Steps of the first who walks, s.
     pub fn first_steps(&self) -> Option<&[f64]> {
-        self.0
+        self.worn
             .iter()
             .find_map(|w| w.steps.as_ref().ok())
             .map(|s| &s.step_s[..])
@@ -378,7 +399,7 @@ impl Carriers {
                 })
                 .collect()
         };
-        self.0.iter().flat_map(of).collect()
+        self.worn.iter().flat_map(of).collect()
     }
 
     /// Who does not walk, and why.
@@ -390,7 +411,7 @@ impl Carriers {
                 w.steps.as_ref().err()?.to_string(),
             ))
         };
-        self.0.iter().filter_map(silent).collect()
+        self.worn.iter().filter_map(silent).collect()
     }
 }
 

@@ -17,8 +17,7 @@ use std::f64::consts::FRAC_PI_2;
 use recording::read::{ReadError, Recording};
 use recording::signal::{Signal, seconds_since};
 
-use crate::beat::lock::beat_phase;
-use crate::beat::tempo_of;
+use crate::beat::lock::Course;
 use crate::events::Event;
 use crate::imu::Track;
 use crate::imu::interval;
@@ -51,6 +50,8 @@ const GYRO_MARK: &str = "angular_velocity_covariance[0]";
 
 /// Seconds and nanoseconds of a header's stamp.
 const STAMP: [&str; 2] = ["header.stamp.sec", "header.stamp.nanosec"];
+/// Fields of a beat: its number and its own time.
+const BEAT: [&str; 2] = ["number", "time_s"];
 /// More samples than this share left out are worth a word.
 const MANY: f64 = 0.01;
 
@@ -62,6 +63,8 @@ pub struct Field {
     no_motion: Option<String>,
     carriers: Carriers,
     beat_s: Vec<f64>,
+    /// Their numbers, where they have some.
+    beat_number: Option<Vec<f64>>,
     beat_source: &'static str,
     judge: Option<Judge>,
     filled: Filled,
@@ -73,6 +76,7 @@ pub struct Field {
 struct Filled {
     motion: bool,
     phases: bool,
+    beat: bool,
 }
 
 impl Field {
@@ -101,7 +105,8 @@ impl Field {
             .chain(roles.patterns(Role::Carriers));
         let mut field = Self::default();
         let sound = field.listen(recording)?;
-        if topics.is_empty() || (imus.clone().next().is_none() && !truth) {
+        let senses = imus.clone().next().is_some() || roles.topic(Role::Beats).is_some();
+        if topics.is_empty() || !(senses || truth) {
             return Ok(field);
         }
         let factors = match thin::factors(recording, roles) {
@@ -125,7 +130,7 @@ impl Field {
                     || field == GYRO_MARK
                     || STAMP.contains(&field)
                     || judge::wants(field)
-                    || field == "number"
+                    || BEAT.contains(&field)
             }) || (truth && path.starts_with(judge::STEP_TOPIC))
         };
         let (mut signals, _) = recording.signals(&wanted)?;
@@ -191,9 +196,12 @@ impl Field {
             }
         }
         if let Some(topic) = roles.topic(Role::Beats) {
-            let told = columns.times(topic);
+            let (told, number, remark) = columns.beats(topic);
             if told.len() >= 3 {
                 (field.beat_s, field.beat_source) = (told, "beat");
+                field.beat_number = number;
+                let said = remark.map(|(kind, text)| Quality::remark(topic, kind, text));
+                field.quality.extend(said);
             }
         }
         if let Some((topic, onset_s)) = sound
@@ -296,6 +304,17 @@ impl Field {
             self.filled.phases = true;
             self.fill_phases(inputs, t_s, phases);
         }
+        // Without anybody's phases it still beats.
+        if inputs.phase_rad.is_empty() && inputs.beat_phase_rad.is_empty() && self.beat_s.len() >= 3
+        {
+            self.filled.beat = true;
+            inputs.beat_phase_rad = self.course().phase(&inputs.t_s);
+            inputs.sources.beat = self.beat_source.into();
+        }
+    }
+
+    fn course(&self) -> Course {
+        Course::of(&self.beat_s, self.beat_number.as_deref())
     }
 
     fn fill_phases(&self, inputs: &mut Inputs, t_s: Vec<f64>, phases: Vec<Vec<f64>>) {
@@ -305,7 +324,7 @@ impl Field {
         inputs.phases_are_measured = true;
         inputs.sources.phases = "imu".into();
         if self.beat_s.len() >= 3 {
-            inputs.beat_phase_rad = beat_phase(&self.beat_s, &t_s);
+            inputs.beat_phase_rad = self.course().phase(&t_s);
             inputs.sources.beat = self.beat_source.into();
         }
         inputs.phase_t_s = t_s;
@@ -316,7 +335,7 @@ impl Field {
         let asked = self.filled.motion
             || self.filled.phases
             || self.judge.is_some()
-            || self.beat_source == "sound";
+            || !self.beat_s.is_empty();
         let estimated = if asked {
             self.estimated(window)
         } else {
@@ -340,12 +359,10 @@ impl Field {
                 value.reason = Some(why.clone());
             }
         }
-        if self.beat_source == "sound"
-            && let Some(v) = estimated.get("beat_hz")
-            && let Some((_, value)) = metrics
-                .0
-                .iter_mut()
-                .find(|(name, value)| *name == "beat_hz" && value.as_f64().is_none())
+        if let Some(v) = estimated.get("beat_hz")
+            && let Some((_, value)) = metrics.0.iter_mut().find(|(name, value)| {
+                *name == "beat_hz" && (self.filled.beat || value.as_f64().is_none())
+            })
         {
             *value = v.clone();
         }
@@ -376,8 +393,7 @@ impl Field {
             out.0.extend(together.0);
         }
         // Taps and talk before and behind the music are heard too.
-        let inside = &self.beat_s[window.range(&self.beat_s)];
-        if let Some((hz, half)) = tempo_of(inside) {
+        if let Some((hz, half)) = self.course().tempo(window) {
             out.0.retain(|(name, _)| *name != "beat_hz");
             out.0.push((
                 "beat_hz",
@@ -535,22 +551,68 @@ impl Columns {
         })
     }
 
-    /// Times of a topic's messages, s.
-    fn times(&self, topic: &str) -> Vec<f64> {
+    fn any(&self, topic: &str) -> Option<&Signal> {
         let of = |s: &&Signal| {
             s.path
                 .strip_prefix(topic)
                 .is_some_and(|p| p.starts_with('.'))
         };
-        let mut t_s = self
-            .signals
-            .iter()
-            .find(of)
-            .map(|s| seconds_since(&s.times_ns, self.start_ns))
-            .unwrap_or_default();
+        self.signals.iter().find(of)
+    }
+
+    /// Times of a topic's messages, s.
+    fn times(&self, topic: &str) -> Vec<f64> {
+        let of = |s: &Signal| seconds_since(&s.times_ns, self.start_ns);
+        let mut t_s = self.any(topic).map(of).unwrap_or_default();
         t_s.dedup();
         t_s
     }
+
+    /// When a topic's beats are (s), their numbers where each has one, and what there is to say. Messages may come late, in packets, or not at all:
+    /// a beat's own time and number know better.
+    fn beats(&self, topic: &str) -> (Vec<f64>, Option<Vec<f64>>, Option<(&'static str, String)>) {
+        let Some(any) = self.any(topic) else {
+            return Default::default();
+        };
+        let [number, own_s] = BEAT.map(|field| {
+            let values = self.get(topic, field).map(|s| &s.values[..]);
+            values.filter(|v| v.len() == any.values.len() && v.iter().all(|v| v.is_finite()))
+        });
+        let log_s = seconds_since(&any.times_ns, self.start_ns);
+        let (t_s, remark) = match own_s {
+            Some(own_s) => (never_early(own_s, &log_s), None),
+            None => {
+                let Dated { t_s, remark } = dated(log_s, None);
+                (t_s, remark)
+            }
+        };
+        let mut beats: Vec<(f64, usize)> = t_s.into_iter().zip(0..).collect();
+        beats.sort_by(|a, b| a.0.total_cmp(&b.0));
+        beats.dedup_by(|b, a| b.0 <= a.0);
+        let number = number.map(|number| beats.iter().map(|(_, k)| number[*k]).collect());
+        (beats.into_iter().map(|b| b.0).collect(), number, remark)
+    }
+}
+
+/// Beats' own times on the log's clock: moved so that none lies behind its log time, and stretched where the delays surely grow or fall. Beats are
+/// few: the clocks' drift from the earliest of them alone would bend how carriers come to the beat.
+fn never_early(own_s: &[f64], log_s: &[f64]) -> Vec<f64> {
+    let n = own_s.len() as f64;
+    let delay_s: Vec<f64> = log_s.iter().zip(own_s).map(|(l, s)| l - s).collect();
+    let mean = |x: &[f64]| x.iter().sum::<f64>() / n;
+    let (middle_s, usual_s) = (mean(own_s), mean(&delay_s));
+    let (mut tt, mut td, mut dd) = (0.0, 0.0, 0.0);
+    for (s, d) in own_s.iter().zip(&delay_s) {
+        let (t, d) = (s - middle_s, d - usual_s);
+        (tt, td, dd) = (tt + t * t, td + t * d, dd + d * d);
+    }
+    // Squares of the slope and of three of its standard errors.
+    let sure = td * td * (n - 2.0) > 9.0 * (dd * tt - td * td);
+    let slope = if sure { td / tt } else { 0.0 };
+    let late = |(d, s): (&f64, &f64)| d - slope * (s - middle_s);
+    let least_s = delay_s.iter().zip(own_s).map(late).fold(f64::MAX, f64::min);
+    let moved = |s: &f64| s + least_s + slope * (s - middle_s);
+    own_s.iter().map(moved).collect()
 }
 
 /// Metadata records by name, as a reader gives them.
@@ -594,5 +656,35 @@ mod tests {
         // A pedometer has none at all, and its steps still count.
         let never = read(|_| false);
         assert!(!never.turns && never.track.len() == 100);
+    }
+
+    #[test]
+    fn beats_that_come_late_or_together_keep_their_own_times_and_numbers() {
+        let mut random = crate::random::Random(3);
+        let mut loose = || 2e7 - 3e6 * random.normal();
+        let late_ns: Vec<f64> = (0..120).map(|_| loose()).collect();
+        let together = |k: usize| f64::from(u8::try_from(4 - k % 5).unwrap()) * 4.65e8;
+        for packets in [false, true] {
+            let kept = |k: &usize| k % 11 != 3 && !(50..70).contains(k);
+            let number: Vec<usize> = (0..120).filter(kept).collect();
+            let came = |k: &usize| {
+                let late_ns = if packets { together(*k) } else { late_ns[*k] };
+                (*k as f64 * 4.65e8 + late_ns) as i64
+            };
+            let times_ns: std::sync::Arc<[i64]> = number.iter().map(came).collect();
+            let column = |field: &str, scale: f64| Signal {
+                path: format!("/beat.{field}"),
+                unit: String::new(),
+                times_ns: times_ns.clone(),
+                values: number.iter().map(|k| scale * *k as f64).collect(),
+            };
+            let signals = vec![column("number", 1.0), column("time_s", 0.465)];
+            let start_ns = 0;
+            let (t_s, numbers, _) = Columns { signals, start_ns }.beats("/beat");
+            let course = Course::of(&t_s, numbers.as_deref());
+            let (hz, _) = course.tempo(Window::ALL).unwrap();
+            assert!((hz * 0.465 - 1.0).abs() < 1e-9, "{hz}");
+            assert!(course.phase(&[30.0])[0].is_finite());
+        }
     }
 }

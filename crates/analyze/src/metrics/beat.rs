@@ -42,7 +42,7 @@ pub fn detuning_rad_per_s(c: &Context) -> Value {
     let (each, halves) = (&found.detuning_rad_per_s, &found.detuning_half_rad_per_s);
     if halves.iter().any(|half| !(*half <= VAGUE_RAD_PER_S)) {
         return Value::missing(
-            "carriers who are with the beat all the time do not show what they would do alone",
+            "nobody saw how the carriers came to the beat: who is with it does not show what they would do alone",
         );
     }
     Value {
@@ -68,9 +68,12 @@ pub fn pull_rad_per_s(c: &Context) -> Value {
     };
     let [low, high] = found.pull_ci95_rad_per_s;
     if high.is_infinite() {
-        return Value::missing(format!(
-            "at least {low:.2} rad/s (95 %): a stronger pull would show the same phases"
-        ));
+        return Value::missing(match low > 0.0 {
+            true => format!(
+                "at least {low:.2} rad/s (95 %): a stronger pull would show the same phases"
+            ),
+            false => "the phases go with no pull as with any".to_owned(),
+        });
     }
     Value {
         reason: Some(format!(

@@ -289,7 +289,7 @@ pub const METRICS: &[Metric] = &[
         needs: &[Need::Beat],
         compute: together::beat_hz,
         origin: "docs/metrics.md",
-        definition: "Advance of the beat's phase over 2π and the time, over the part of W in which a beat sounds: pauses and lost messages are neither in the one nor in the other. From beats as such: least squares of time on number, a beat that is missing among others counted, each run between pauses with an offset of its own.",
+        definition: "Advance of the beat's phase over 2π and the time, over the part of W in which a beat sounds: pauses and lost messages are neither in the one nor in the other. From beats as such: along their slow course, without each beat's own error; a beat that is missing among others is counted.",
     },
     Metric {
         name: "beat_lead_deg",

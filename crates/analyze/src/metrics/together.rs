@@ -3,7 +3,8 @@
 use super::beat::carriers;
 use super::contact::mean;
 use super::{Context, Value};
-use crate::inputs::mean_step_s;
+use crate::inputs::stretches;
+use crate::median::median;
 use crate::phase;
 use crate::steps::rate_of;
 use std::f64::consts::TAU;
@@ -74,15 +75,20 @@ pub fn beat_synchrony(c: &Context) -> Value {
 
 pub fn beat_hz(c: &Context) -> Value {
     let beat = c.beat_alone();
-    // Over silence and over lost messages nobody counted the turns.
-    let Some(longest_s) = mean_step_s(&beat.t_s).map(|step_s| 1.5 * step_s) else {
+    let steps = || beat.t_s.windows(2).zip(beat.x.windows(2));
+    let rate = |(t, psi): (&[f64], &[f64])| phase::wrap(psi[1] - psi[0]) / (t[1] - t[0]);
+    let mut rates: Vec<f64> = steps().map(rate).filter(|r| r.is_finite()).collect();
+    let Some(usual) = median(&mut rates) else {
         return Value::missing("the beat sounds at a single sample of the window");
     };
+    // Over silence and over many lost messages nobody counted the turns; messages may be early and late.
     let (mut turned, mut sounds_s) = (0.0, 0.0);
-    for (t, psi) in beat.t_s.windows(2).zip(beat.x.windows(2)) {
-        if t[1] - t[0] <= longest_s {
-            turned += phase::wrap(psi[1] - psi[0]);
-            sounds_s += t[1] - t[0];
+    for part in stretches(&beat.t_s, 0.0) {
+        for k in part.start + 1..part.end {
+            let step_s = beat.t_s[k] - beat.t_s[k - 1];
+            let expected = usual * step_s;
+            turned += expected + phase::wrap(beat.x[k] - beat.x[k - 1] - expected);
+            sounds_s += step_s;
         }
     }
     Value::number(turned / (TAU * sounds_s))
@@ -131,5 +137,27 @@ mod tests {
         let by_chance = (1..=60).filter(|s| p_value(false, *s) < 0.1).count();
         // Six of sixty are expected, more than twelve in one series of a hundred.
         assert!(by_chance <= 12, "{by_chance}");
+    }
+
+    #[test]
+    fn late_and_lost_messages_do_not_change_the_beat() {
+        for (late_s, lost) in [(0.003, 0.0), (0.02, 0.0), (0.003, 0.3)] {
+            let mut random = Random(4);
+            let mut came: Vec<(f64, f64)> = (0..1800)
+                .map(|k| f64::from(k) / 30.0)
+                .map(|t| (t, random.uniform(), random.uniform()))
+                .filter(|(t, _, kept)| *kept >= lost && !(20.0..23.3).contains(t))
+                .map(|(t, late, _)| (t - late_s * late.ln(), TAU * 2.0 * t))
+                .collect();
+            came.sort_by(|a, b| a.0.total_cmp(&b.0));
+            let (t_s, beat_phase_rad) = came.into_iter().unzip();
+            let inputs = Inputs {
+                t_s,
+                beat_phase_rad,
+                ..Inputs::default()
+            };
+            let hz = metrics(&inputs, Window::ALL).number("beat_hz").unwrap();
+            assert!((hz - 2.0).abs() < 0.005, "{late_s} {lost}: {hz}");
+        }
     }
 }

@@ -15,7 +15,7 @@
 //! and put right at each as by Kalman. K, τ, σ, ε, a, ω_i, Δ_i maximise the likelihood of the innovations times wide priors, which only
 //! keep within reason what the phases do not tell. A regression of increments on phases would take noise that stands on both sides for
 //! a pull, or a pull for noise; this does not. What is walked before the first beat says ω_i; how carriers come to the beat, slip past it,
-//! or wander about it says K. Who has settled before anybody looked says |Δω| ≤ K and no more: the interval is open upwards then.
+//! or wander about it says K. Who has settled before anybody looked says |Δω| ≤ K, and by wandering √(K² − Δω²) at most: the interval is open upwards then.
 //! What carriers do to each other is not in it.
 //! Source: R. Adler, Proc. IRE 34 (1946) 351; Pikovsky, Rosenblum & Kurths, Synchronization (2001), ch. 7 and 9;
 //! Särkkä, Bayesian Filtering and Smoothing (2013), ch. 9 and 12.
@@ -48,7 +48,7 @@ pub struct Adler {
     pub noise_rad_per_sqrt_s: f64,
     /// Δω of each carrier, positive where alone it would be faster than the beat, rad/s.
     pub detuning_rad_per_s: Vec<f64>,
-    /// Half the 95 % interval of each, rad/s; infinite where carriers were settled all the time.
+    /// Half the 95 % interval of each, rad/s; infinite where nobody saw how a carrier came to the beat.
     pub detuning_half_rad_per_s: Vec<f64>,
     /// Δ of each carrier, −π … π, rad.
     pub offset_rad: Vec<f64>,
@@ -111,9 +111,9 @@ pub fn adler(
     let own: Vec<usize> = (0..carriers).map(|c| place(OWN, c)).collect();
     let sd = cover[(PULL, PULL)].max(0.0).sqrt();
     let mut ends = [false, true].map(|up| walk.end(&x, best.value, sd, up));
-    // Who is with the beat from the first sample to the last may have any own frequency that the pull makes up for, even none and none.
-    let settled = !walk.begins && walk.someone_stays() && (ends[0] == 0.0 || ends[1].is_infinite());
-    if settled {
+    let settled = walk.someone_came_unseen();
+    // At its limit the search tells no pull from a stronger one.
+    if settled || ends[1] >= MOST {
         ends[1] = f64::INFINITY;
     }
     let half = |variance: f64| {

@@ -185,6 +185,74 @@ fn the_settled_give_a_bound_and_no_pull() {
 }
 
 #[test]
+fn a_beat_that_began_before_the_record_gives_a_bound() {
+    // Cut 7 and 20 s after the onset: the pull still grows. Settled at once, with and without noise.
+    let cut = |s: f64| Case {
+        detuning: [-1.3, 0.4],
+        onset_s: -s,
+        ..MUSIC
+    };
+    let settled = |noise: f64| Case {
+        build_up_s: 0.01,
+        noise,
+        ..cut(50.0)
+    };
+    let mut missed = 0;
+    for case in [cut(7.0), cut(20.0), settled(0.01), settled(0.2)] {
+        for seed in 1..=3 {
+            let a = found(&case, seed);
+            let [low, high] = a.pull_ci95_rad_per_s;
+            missed += u8::from(low > case.pull);
+            assert!(high.is_infinite(), "{a:?}");
+            assert!(a.detuning_half_rad_per_s[0].is_infinite(), "{a:?}");
+        }
+    }
+    assert!(missed <= 1, "{missed} of 12 bounds are false");
+    // Who slips all the time shows both.
+    let slips = Case {
+        build_up_s: 0.01,
+        onset_s: -50.0,
+        ..SLIPPING
+    };
+    let a = found(&Case { pull: 0.6, ..slips }, 1);
+    let [low, high] = a.pull_ci95_rad_per_s;
+    assert!(low <= 0.6 && (0.6..0.8).contains(&high), "{a:?}");
+}
+
+#[test]
+fn messages_that_come_late_do_not_look_like_a_strong_pull() {
+    let (omega, pull, noise, dt) = (TAU * 2.0, 1.2, 0.05, 1.0 / 30.0);
+    for seed in 1..=5 {
+        let mut random = Random(seed);
+        let mut behind = [0.0; 2];
+        let (mut t_s, mut beat, mut phase) = (vec![], vec![], [vec![], vec![]]);
+        for k in 0..2700 {
+            let t = f64::from(k) * dt;
+            t_s.push(t - 0.002 * random.uniform().ln());
+            beat.push(omega * t);
+            for (x, seen) in behind.iter_mut().zip(&mut phase) {
+                seen.push(omega * t + *x);
+                *x += -dt * pull * x.sin() + noise * dt.sqrt() * random.normal();
+            }
+        }
+        let found = adler(&t_s, &[&phase[0], &phase[1]], &beat, false).unwrap();
+        let [low, high] = found.pull_ci95_rad_per_s;
+        assert!(low < pull && high.is_infinite(), "{low} {high}");
+    }
+}
+
+#[test]
+fn a_pull_at_the_limit_of_the_search_is_a_bound() {
+    let stiff = Case {
+        pull: 12.0,
+        noise: 0.1,
+        ..MUSIC
+    };
+    let [low, high] = found(&stiff, 1).pull_ci95_rad_per_s;
+    assert!(low < 12.0 && high.is_infinite(), "{low} {high}");
+}
+
+#[test]
 fn without_a_pull_the_interval_begins_at_none() {
     let free = Case {
         pull: 0.0,

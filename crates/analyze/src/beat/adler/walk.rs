@@ -1,6 +1,7 @@
 //! Phases and beat about the first beat, on the grid of Adler's equation.
 
 use super::unknowns::{BUILD_UP, ERROR, NOISE, OFFSET, OWN, PULL, SHARED, place};
+use crate::beat::smooth::smooth;
 use crate::imu::track::period_s;
 use crate::inputs::placed;
 use crate::median::median;
@@ -18,8 +19,10 @@ const BEFORE_S: f64 = 60.0;
 const AFTER_S: f64 = 90.0;
 /// A beat that lasts no longer is a tap or a trial, s.
 const SHORTEST_S: f64 = 4.0;
-/// As long before the first beat nothing sounds where the pull begins with it, s.
+/// As long before the first beat, and as long as a beat, nothing sounds where the pull begins with it, s.
 const SILENT_S: f64 = 1.0;
+/// Who is first seen so long after the first beat may have come to it unseen, s.
+const LATE_S: f64 = 5.0;
 /// A measured phase is that of an analytic signal, wrong so near its ends, s.
 const ENDS_S: f64 = 2.0;
 /// Least σ [rad/√s] and ε (rad) believed: of any phases, and of measured ones, which a band has smoothed. Nobody walks more steadily than
@@ -102,7 +105,10 @@ impl Walk {
                 false => pick(&whole),
             }
         };
-        let phase: Vec<Vec<f64>> = phase_rad.iter().map(observed).collect();
+        let mut phase: Vec<Vec<f64>> = phase_rad.iter().map(observed).collect();
+        if !measured {
+            dated_by_the_beat(&t, &mut beat, &mut phase);
+        }
         let (mut sounds_s, mut turned) = (0.0, 0.0);
         for (t, b) in t.windows(2).zip(beat.windows(2)) {
             if b[0].is_finite() && b[1].is_finite() {
@@ -110,15 +116,16 @@ impl Walk {
                 turned += b[1] - b[0];
             }
         }
+        let omega_rad_per_s = turned / sounds_s;
         let latest = phase
             .iter()
             .map(|p| p.iter().position(|y| y.is_finite()).map_or(0.0, |k| t[k]))
             .fold(f64::MIN, f64::max);
         let [noise, error] = if measured { LEAST_MEASURED } else { LEAST };
         Ok(Walk {
-            begins: t[0] <= -SILENT_S,
+            begins: t[0] <= -SILENT_S.max(TAU / omega_rad_per_s),
             before_s: -latest.min(0.0),
-            omega_rad_per_s: turned / sounds_s,
+            omega_rad_per_s,
             least_noise: noise * noise,
             least_error: error * error,
             measured,
@@ -137,14 +144,17 @@ impl Walk {
         }
     }
 
-    /// Whether a carrier does not slip past the beat by a turn.
-    pub fn someone_stays(&self) -> bool {
+    /// Whether a carrier is with the beat, never a turn past it, and nobody saw how that came: without the music's beginning, or first seen long
+    /// after it. Any own frequency then goes with any pull that makes up for it, and a pull that still grows looks like one that is weak.
+    pub fn someone_came_unseen(&self) -> bool {
         self.phase.iter().any(|phase| {
+            let mut seen = phase.iter().zip(&self.t_s).filter(|(y, _)| y.is_finite());
+            let late = seen.next().is_some_and(|(_, t)| *t > LATE_S);
             let behind = phase.iter().zip(&self.beat).map(|(y, b)| y - b);
             let (low, high) = behind
                 .filter(|d| d.is_finite())
                 .fold((f64::MAX, f64::MIN), |(a, b), d| (a.min(d), b.max(d)));
-            high - low < TAU
+            (late || !self.begins) && high - low < TAU
         })
     }
 
@@ -215,6 +225,24 @@ fn onset(t_s: &[f64], beat_rad: &[f64]) -> Result<usize, &'static str> {
         }
     }
     Err("no beat that lasts for 4 s")
+}
+
+/// Recorded phases and the beat's share a message, and what it comes late by: the beat's phase off its slow course tells that.
+fn dated_by_the_beat(t_s: &[f64], beat: &mut [f64], phase: &mut [Vec<f64>]) {
+    let mut start = 0;
+    for end in 1..=beat.len() {
+        if end < beat.len() && beat[end].is_finite() == beat[start].is_finite() {
+            continue;
+        }
+        if beat[start].is_finite() {
+            let (course, _) = smooth(&t_s[start..end], &beat[start..end]);
+            for (k, psi) in (start..end).zip(course) {
+                phase.iter_mut().for_each(|y| y[k] += psi - beat[k]);
+                beat[k] = psi;
+            }
+        }
+        start = end;
+    }
 }
 
 /// The beat's phase on an even axis, rad: through messages that were lost between two of a beat it goes on at its usual rate, to the nearest
