@@ -1,10 +1,12 @@
 //! A recording in one pass: a line per signal, the roles' columns, what is odd; then metrics, spectra and events.
 
-use std::collections::{HashMap, HashSet};
+use std::collections::{BTreeMap, BTreeSet, HashMap, HashSet};
 
 use rayon::prelude::*;
 use recording::read::{Batch, ReadError, Recording};
+use recording::text::counted;
 
+use crate::arrivals::{Arrivals, Axis};
 use crate::envelope::Envelope;
 use crate::events::{Event, events};
 use crate::field::Field;
@@ -128,6 +130,11 @@ pub struct Trace {
 
 /// So many times tell a rate.
 const FEW: u64 = 17;
+/// So many values at most are put in the order of their times.
+const MOST_SORTED: u64 = 1 << 24;
+/// A topic that begins so late or ends so early is worth a word: this share of the window, and this long (s).
+const LEAST_ABSENT: f64 = 0.02;
+const LEAST_ABSENT_S: f64 = 1.0;
 /// At most so many panels of traces are kept.
 const MOST_TRACES: usize = 24;
 
@@ -177,6 +184,7 @@ pub fn examine(
     let mut pass = Pass::new(recording, request, &roles);
     let select = |path: &str| wanted(path, request, &roles);
     let findings = recording.stream(&select, &mut |batch| pass.take(batch))?;
+    let skipped_messages = recording.skipped_messages().max(info.skipped_messages);
     let mut quality: Vec<Quality> = findings.into_iter().map(Quality::from).collect();
     quality.sort_by(|a, b| (&a.topic, a.kind).cmp(&(&b.topic, b.kind)));
 
@@ -189,6 +197,12 @@ pub fn examine(
     let duration_s = ((i128::from(info.end_ns) - i128::from(info.start_ns)) as f64 / 1e9).max(0.0);
     let said = request.roles.as_ref();
     warnings.extend(said.iter().flat_map(|said| pass.misnamed(said)));
+    let mut remarks = pass.put_in_order()?;
+    remarks.extend(pass.odd_values());
+    remarks.extend(pass.date());
+    let chosen = roles.chosen.iter();
+    remarks
+        .extend(chosen.map(|(topic, text)| Quality::remark(topic, "one_of_several", text.clone())));
     let mut inputs = pass.inputs(&metadata, said);
     let window = window(request, &metadata, said, duration_s, &mut warnings);
     let mut field = match estimates(recording, &roles, request) {
@@ -206,6 +220,8 @@ pub fn examine(
         }
     };
     field.fill(&mut inputs);
+    quality.extend(remarks);
+    quality.extend(pass.coverage(window));
     quality.extend(field.quality());
     let mut metrics = metrics::metrics(&inputs, window);
     field.finish(&mut metrics, window);
@@ -239,7 +255,7 @@ pub fn examine(
         messages: info.messages,
         topics,
         salvaged: info.salvaged,
-        skipped_messages: recording.skipped_messages().max(info.skipped_messages),
+        skipped_messages,
         warnings,
         metadata,
         roles: pass.roles_played(),
@@ -277,6 +293,12 @@ fn estimates(
 /// Whether a field has to be decoded: it is listed, plays a role, or is part of a quaternion whose angles are or do.
 fn wanted(path: &str, request: &Request, roles: &Roles) -> bool {
     let wants = |path: &str| request.lists_path(path) || roles.of_signal(path).is_some();
+    let times = |topic: &str| roles.feeds(topic);
+    path.strip_suffix(".time_s").is_some_and(times) || with_angles(path, wants)
+}
+
+/// Whether a field is wanted, or an angle of the quaternion that it is part of.
+fn with_angles(path: &str, wants: impl Fn(&str) -> bool) -> bool {
     if wants(path) {
         return true;
     }
@@ -333,14 +355,32 @@ struct Entry {
     unit: &'static str,
     channel: usize,
     listed: bool,
+    /// Whether a spectrum is made of it.
+    lines: bool,
     role: Option<Role>,
     stream: Stream,
     /// Times of its own where not every message has it.
     times: Option<Times>,
-    /// Kept values with their times, where it plays a role.
-    kept: Vec<(i64, f64)>,
+    /// Kept values, where it plays a role, and of which messages of the topic they are.
+    kept: Vec<(usize, f64)>,
     /// Its outline, where it is to be drawn.
     outline: Option<Envelope>,
+}
+
+impl Entry {
+    /// Takes all values anew, in the order of their times.
+    fn take_sorted(&mut self, (times_ns, x): (Vec<i64>, Vec<f64>)) {
+        let mut times = Times::default();
+        times.push(&times_ns);
+        let hz = times.hz_between_gaps().unwrap_or(0.0);
+        let nperseg = match self.lines {
+            true => segment(hz, x.len() as u64),
+            false => 0,
+        };
+        self.stream = Stream::new(hz, nperseg);
+        self.stream.push(&x, false, times.gaps());
+        self.times = Some(times);
+    }
 }
 
 /// What is gathered while batches stream by.
@@ -349,6 +389,16 @@ struct Pass<'a> {
     request: &'a Request,
     roles: &'a Roles,
     times: Vec<Times>,
+    /// The first channel of each channel's topic.
+    first: Vec<usize>,
+    /// By first channel of a topic: how many messages all its channels have.
+    messages: Vec<u64>,
+    /// By first channel of a topic: its messages, where it may feed metrics.
+    arrivals: Vec<Arrivals>,
+    /// Where the messages of the batch begin in `arrivals`.
+    row: usize,
+    /// By first channel of a topic: when its messages were taken, where it feeds metrics.
+    axes: HashMap<usize, Axis>,
     /// Rough rate of each channel, for the length of the segments (Hz).
     rough_hz: Vec<f64>,
     entries: Vec<Entry>,
@@ -371,7 +421,20 @@ impl<'a> Pass<'a> {
                 0.0
             }
         };
+        let mut known = HashMap::new();
+        let mut messages = vec![0; info.channels.len()];
+        let mut first = Vec::with_capacity(info.channels.len());
+        for (k, channel) in info.channels.iter().enumerate() {
+            let topic = *known.entry(&channel.topic).or_insert(k);
+            messages[topic] += channel.messages;
+            first.push(topic);
+        }
         Pass {
+            first,
+            messages,
+            arrivals: vec![Arrivals::default(); info.channels.len()],
+            row: 0,
+            axes: HashMap::new(),
             recording,
             request,
             roles,
@@ -387,6 +450,12 @@ impl<'a> Pass<'a> {
 
     fn take(&mut self, batch: &Batch<'_>) {
         self.times[batch.channel].push(batch.times_ns);
+        if self.roles.feeds(batch.topic) {
+            let arrivals = &mut self.arrivals[self.first[batch.channel]];
+            self.row = arrivals.len();
+            let own = own_ns(batch);
+            arrivals.push(batch.times_ns, batch.stamps_ns.or(own.as_deref()));
+        }
         for column in batch.columns {
             if self.by_column.len() <= column.id {
                 self.by_column.resize(column.id + 1, None);
@@ -430,7 +499,7 @@ impl<'a> Pass<'a> {
             false => None,
         }
         .unwrap_or(self.rough_hz[batch.channel]);
-        let mut messages = self.recording.info().channels[batch.channel].messages;
+        let mut messages = self.messages[self.first[batch.channel]];
         if let (from, Some(to)) = self.request.window {
             let window = ((to - from.unwrap_or(0.0)).max(0.0) * hz).ceil();
             messages = messages.min(window as u64);
@@ -438,11 +507,8 @@ impl<'a> Pass<'a> {
         let listed = self.request.lists(batch.topic, path);
         // A stamp's seconds and nanoseconds are a clock, not a signal with lines.
         let clock = field.contains("stamp.") || field == "time_s";
-        let nperseg = if listed && !clock {
-            segment(hz, messages)
-        } else {
-            0
-        };
+        let lines = listed && !clock;
+        let nperseg = if lines { segment(hz, messages) } else { 0 };
         let angle = crate::quaternion::ANGLES
             .iter()
             .any(|a| field.rsplit('.').next() == Some(a));
@@ -454,6 +520,7 @@ impl<'a> Pass<'a> {
             },
             channel: batch.channel,
             listed,
+            lines,
             role: self.roles.of_signal(path),
             stream: Stream::new(hz, nperseg),
             times: None,
@@ -523,9 +590,10 @@ impl<'a> Pass<'a> {
                 .for_each(|(t, x)| outline.push((i128::from(*t) - start_ns) as f64 / 1e9, *x));
         }
         if entry.role.is_some() {
+            let row = |k: usize| self.row + rows.map_or(k, |rows| rows[k] as usize);
             entry
                 .kept
-                .extend(times.iter().copied().zip(values.iter().copied()));
+                .extend(values.iter().enumerate().map(|(k, x)| (row(k), *x)));
         }
     }
 
@@ -543,6 +611,162 @@ impl<'a> Pass<'a> {
         topics
     }
 
+    /// The times of a signal's values.
+    fn times_of<'b>(&'b self, entry: &'b Entry) -> &'b Times {
+        entry.times.as_ref().unwrap_or(&self.times[entry.channel])
+    }
+
+    /// Reads listed signals again whose values do not come in the order of their times, and takes them in that order. Where these are more than
+    /// memory should hold, a remark says that they have neither jitter nor spectrum.
+    fn put_in_order(&mut self) -> Result<Vec<Quality>, ReadError> {
+        let entries = self.entries.iter().enumerate();
+        let tangled: HashMap<String, usize> = entries
+            .filter(|(_, e)| e.listed && self.times_of(e).backward())
+            .map(|(k, e)| (e.path.clone(), k))
+            .collect();
+        let values = |k: &usize| self.times_of(&self.entries[*k]).count();
+        let all: u64 = tangled.values().map(values).sum();
+        if all > MOST_SORTED {
+            let topics: BTreeSet<usize> = (tangled.values())
+                .map(|k| self.first[self.entries[*k].channel])
+                .collect();
+            let told = |k: &usize| {
+                let text = format!(
+                    "messages do not come in the order of their times, and {all} values are more than are sorted ({MOST_SORTED}): their signals have neither jitter nor spectrum; --topic or --signal asks for fewer"
+                );
+                Quality::remark(&self.recording.info().channels[*k].topic, "unsorted", text)
+            };
+            return Ok(topics.iter().map(told).collect());
+        }
+        if tangled.is_empty() {
+            return Ok(Vec::new());
+        }
+        let mut found: Vec<Vec<(i64, f64)>> = vec![Vec::new(); self.entries.len()];
+        let mut quaternions = Quaternions::default();
+        let select = |path: &str| with_angles(path, |path| tangled.contains_key(path));
+        self.recording.stream(&select, &mut |batch| {
+            let mut keep = |path: &str, rows: Option<&[u32]>, values: &[f64]| {
+                if let Some(entry) = tangled.get(path) {
+                    let time = |k: usize| batch.times_ns[rows.map_or(k, |rows| rows[k] as usize)];
+                    found[*entry].extend(values.iter().enumerate().map(|(k, x)| (time(k), *x)));
+                }
+            };
+            for column in batch.columns {
+                keep(column.path, column.rows, column.values);
+            }
+            quaternions.each(batch, keep);
+        })?;
+        let start_ns = i128::from(self.recording.info().start_ns);
+        for (entry, mut values) in self.entries.iter_mut().zip(found) {
+            values.retain(|(t, _)| self.request.holds((i128::from(*t) - start_ns) as f64 / 1e9));
+            values.sort_by_key(|(t, _)| *t);
+            if !values.is_empty() {
+                entry.take_sorted(values.into_iter().unzip());
+            }
+        }
+        Ok(Vec::new())
+    }
+
+    /// Remarks on single values: what is no rotation, and what is too large or too small to be squared.
+    fn odd_values(&self) -> Vec<Quality> {
+        let info = self.recording.info();
+        let start_ns = i128::from(info.start_ns);
+        let mut out = Vec::new();
+        for (path, (channel, count, first_ns)) in &self.quaternions.odd {
+            let topic = &info.channels[*channel].topic;
+            let Some(roll) = self.by_path.get(&format!("{path}.roll")) else {
+                continue;
+            };
+            let roll = &self.entries[*roll];
+            // One that never is a rotation and plays no role is not meant to be one.
+            let plays = |e: &Entry| e.role.is_some() && e.path.starts_with(&format!("{path}."));
+            if roll.stream.count() == 0 && !self.entries.iter().any(plays) {
+                continue;
+            }
+            let t_s = (i128::from(*first_ns) - start_ns) as f64 / 1e9;
+            let field = path.strip_prefix(topic.as_str()).unwrap_or(path);
+            let field = field.trim_start_matches('.');
+            out.push(Quality {
+                count: *count,
+                t_s: Some(t_s),
+                ..Quality::remark(topic, "no_rotation", format!(
+                    "{} of {field} far from unit length, first at {t_s:.3} s: no rotation, so left without angles",
+                    counted(*count, "quaternion", "quaternions")
+                ))
+            });
+        }
+        for entry in self.entries.iter().filter(|e| e.listed) {
+            if let Some((low, high)) = entry.stream.beyond_squares() {
+                let topic = &info.channels[entry.channel].topic;
+                let field = entry
+                    .path
+                    .strip_prefix(topic.as_str())
+                    .unwrap_or(&entry.path);
+                let field = field.trim_start_matches('.');
+                out.push(Quality::remark(topic, "out_of_range", format!(
+                    "values of {field} from {low:e} to {high:e} cannot be squared with the digits of a float: no spread and no spectrum is told of them"
+                )));
+            }
+        }
+        out
+    }
+
+    /// Remarks on topics that metrics rest on and that cover clearly less of the window than there is of the recording.
+    fn coverage(&self, window: Window) -> Vec<Quality> {
+        let info = self.recording.info();
+        let start_ns = i128::from(info.start_ns);
+        let since = |t: i64| (i128::from(t) - start_ns) as f64 / 1e9;
+        let from_s = window.start_s.max(0.0);
+        let to_s = window.end_s.min(since(info.end_ns));
+        let sensors = [Role::Imu, Role::Carriers].map(|role| self.roles.patterns(role));
+        let players = self.entries.iter().filter(|e| !e.kept.is_empty());
+        let fed: HashSet<usize> = players.map(|e| self.first[e.channel]).collect();
+        let sensor = |topic: &String| sensors.iter().any(|topics| topics.contains(topic));
+        let feeds = |k: usize| fed.contains(&k) || sensor(&info.channels[k].topic);
+        let mut out = Vec::new();
+        for k in (0..info.channels.len()).filter(|k| self.first[*k] == *k && feeds(*k)) {
+            let of_topic = || (0..info.channels.len()).filter(|j| self.first[*j] == k);
+            let ends = of_topic().filter_map(|j| self.times[j].ends_ns());
+            let ends = ends.reduce(|a, b| (a.0.min(b.0), a.1.max(b.1)));
+            let Some((first_s, last_s)) = ends.map(|(a, b)| (since(a), since(b))) else {
+                continue;
+            };
+            let messages: u64 = of_topic().map(|j| self.times[j].count()).sum();
+            let step_s = (last_s - first_s) / messages.max(2) as f64;
+            let much_s = LEAST_ABSENT_S
+                .max(LEAST_ABSENT * (to_s - from_s))
+                .max(5.0 * step_s);
+            let mut say = |kind, t_s: f64, text: String| {
+                let remark = Quality::remark(&info.channels[k].topic, kind, text);
+                out.push(Quality {
+                    t_s: Some(t_s),
+                    ..remark
+                });
+            };
+            if first_s - from_s > much_s {
+                let late_s = first_s - from_s;
+                say(
+                    "begins_late",
+                    first_s,
+                    format!(
+                        "the first message is of {first_s:.3} s, {late_s:.3} s after the window begins: what rests on it does not speak of the time before"
+                    ),
+                );
+            }
+            if to_s - last_s > much_s {
+                let early_s = to_s - last_s;
+                say(
+                    "ends_early",
+                    last_s,
+                    format!(
+                        "the last message is of {last_s:.3} s, {early_s:.3} s before the window ends: what rests on it does not speak of the time after"
+                    ),
+                );
+            }
+        }
+        out
+    }
+
     /// A line for every listed signal. Spectra of those that were asked for by name are added to `spectra`, which are named after f.
     fn signals(
         &self,
@@ -557,7 +781,7 @@ impl<'a> Pass<'a> {
             .par_iter()
             .filter(|e| e.listed)
             .map(|e| {
-                let times = e.times.as_ref().unwrap_or(&self.times[e.channel]);
+                let times = self.times_of(e);
                 let (summary, spectrum) = e.stream.finish(times, e.unit, told(e));
                 let spectrum = spectrum.map(|s| SpectrumSummary::new(s, f_hz, e.unit));
                 (summary, spectrum)
@@ -670,17 +894,46 @@ impl<'a> Pass<'a> {
             .filter(move |e| e.role == Some(role) && !e.kept.is_empty())
     }
 
+    /// Whether two signals are of one topic.
+    fn together(&self, a: &Entry, b: &Entry) -> bool {
+        self.first[a.channel] == self.first[b.channel]
+    }
+
+    /// Finds when the messages that feed metrics were taken; remarks on topics where that is not what the log says.
+    fn date(&mut self) -> Vec<Quality> {
+        let mut by_topic: BTreeMap<usize, Vec<&Entry>> = BTreeMap::new();
+        for entry in self.entries.iter().filter(|e| !e.kept.is_empty()) {
+            let topic = self.first[entry.channel];
+            by_topic.entry(topic).or_default().push(entry);
+        }
+        let info = self.recording.info();
+        let mut remarks = Vec::new();
+        for (topic, entries) in by_topic {
+            let arrivals = &self.arrivals[topic];
+            let columns: Vec<_> =
+                (entries.iter().map(|e| by_row(&e.kept, arrivals.len()))).collect();
+            let bits = |x: Option<f64>| x.map(f64::to_bits);
+            let axis = arrivals.dated(info.start_ns, |a, b| {
+                columns.iter().all(|x| bits(x[a]) == bits(x[b]))
+            });
+            let name = &info.channels[topic].topic;
+            let told =
+                |(kind, text): &(&'static str, String)| Quality::remark(name, kind, text.clone());
+            remarks.extend(axis.remarks.iter().map(told));
+            self.axes.insert(topic, axis);
+        }
+        remarks
+    }
+
     /// A role's column, ascending in time, at most one value per time.
     fn column(&self, entry: &Entry) -> (Vec<f64>, Vec<f64>) {
-        let mut kept: Vec<(i64, f64)> = entry.kept.clone();
-        if !kept.is_sorted_by_key(|k| k.0) {
-            kept.sort_by_key(|k| k.0);
-        }
-        kept.dedup_by_key(|k| k.0);
-        let start_ns = i128::from(self.recording.info().start_ns);
-        kept.into_iter()
-            .map(|(t, x)| ((i128::from(t) - start_ns) as f64 / 1e9, x))
-            .unzip()
+        let topic = self.first[entry.channel];
+        let Some(axis) = self.axes.get(&topic) else {
+            return Default::default();
+        };
+        let x = by_row(&entry.kept, self.arrivals[topic].len());
+        let each = axis.t_s.iter().zip(&axis.rows);
+        each.filter_map(|(t, row)| Some((*t, x[*row]?))).unzip()
     }
 
     /// What a roles file names and the recording does not have, or has too much of.
@@ -748,17 +1001,17 @@ impl<'a> Pass<'a> {
             if inputs.t_s.is_empty() {
                 inputs.t_s.clone_from(&t_s);
             }
-            let x = if t_s == inputs.t_s {
-                x
-            } else {
-                match role {
-                    Role::Yaw => wrapped(&t_s, &x, &inputs.t_s),
-                    _ => between(&t_s, &x, &inputs.t_s),
-                }
+            let (x, own) = match (t_s == inputs.t_s, role) {
+                (true, _) => (x, None),
+                (false, Role::Yaw) => (wrapped(&t_s, &x, &inputs.t_s), None),
+                (false, _) => (between(&t_s, &x, &inputs.t_s), Some((t_s, x))),
             };
             match role {
                 Role::Roll => inputs.roll_rad = x,
-                Role::Height => inputs.height_m = x,
+                Role::Height => {
+                    inputs.height_alone = own;
+                    inputs.height_m = x;
+                }
                 Role::Pitch => inputs.pitch_rad = x,
                 _ => inputs.yaw_rad = x,
             }
@@ -771,7 +1024,7 @@ impl<'a> Pass<'a> {
                 inputs.phase_t_s.clone_from(&t_s);
             }
             let beside = self.players(Role::Phases).next();
-            inputs.beat_phase_rad = match beside.is_none_or(|p| p.channel == entry.channel) {
+            inputs.beat_phase_rad = match beside.is_none_or(|p| self.together(p, entry)) {
                 true => at_times(&t_s, &psi, &inputs.phase_t_s),
                 false => wrapped(&t_s, &psi, &inputs.phase_t_s),
             };
@@ -790,26 +1043,46 @@ impl<'a> Pass<'a> {
         inputs
     }
 
-    /// All columns of a role on the time axis of the first; NaN where a column has no value at a time.
+    /// All columns of a role on the time axis of the one that has most samples; NaN where a column has no value at a time.
     fn columns(&self, role: Role) -> (Vec<f64>, Vec<Vec<f64>>) {
         let mut players: Vec<&Entry> = self.players(role).collect();
         players.sort_by(|a, b| natural(&a.path, &b.path));
-        let Some(first) = players.first() else {
+        let found: Vec<_> = players.iter().map(|entry| self.column(entry)).collect();
+        let lengths = found.iter().map(|(t_s, _)| t_s.len());
+        let Some((first, _)) = lengths.enumerate().rev().max_by_key(|(_, n)| *n) else {
             return Default::default();
         };
-        let (axis, x) = self.column(first);
-        let mut columns = vec![x];
-        for entry in &players[1..] {
-            let (t_s, x) = self.column(entry);
-            columns.push(match (t_s == axis, entry.channel == first.channel) {
-                (true, _) => x,
-                (false, true) => at_times(&t_s, &x, &axis),
-                (false, false) if role == Role::Phases => wrapped(&t_s, &x, &axis),
-                (false, false) => between(&t_s, &x, &axis),
-            });
-        }
+        let axis = found[first].0.clone();
+        let on_axis = |(entry, (t_s, x)): (&&Entry, (Vec<f64>, Vec<f64>))| match (
+            t_s == axis,
+            self.together(entry, players[first]),
+        ) {
+            (true, _) => x,
+            (false, true) => at_times(&t_s, &x, &axis),
+            (false, false) if role == Role::Phases => wrapped(&t_s, &x, &axis),
+            (false, false) => between(&t_s, &x, &axis),
+        };
+        let columns = players.iter().zip(found).map(on_axis).collect();
         (axis, columns)
     }
+}
+
+/// Values by message; `None` where a message has none.
+fn by_row(kept: &[(usize, f64)], messages: usize) -> Vec<Option<f64>> {
+    let mut x = vec![None; messages];
+    kept.iter().for_each(|(row, value)| x[*row] = Some(*value));
+    x
+}
+
+/// The times that the project's own messages carry instead of a header's stamp (ns).
+fn own_ns(batch: &Batch<'_>) -> Option<Vec<i64>> {
+    if !batch.schema.starts_with("rath.") {
+        return None;
+    }
+    let own = |path: &str| path.strip_prefix(batch.topic) == Some(".time_s");
+    let column = batch.columns.iter().find(|c| own(c.path))?;
+    let whole = column.rows.is_none() && column.finite;
+    whole.then(|| column.values.iter().map(|t| (t * 1e9) as i64).collect())
 }
 
 /// An angle (rad), wrapped or not, at other times, by the shorter way between samples; −π … π, NaN beyond the ends and in holes.
@@ -852,14 +1125,14 @@ fn spectra(
             .map_or_else(|| role.name().to_owned(), |p| (*p).to_owned())
     };
     let mut out = Vec::new();
-    for (role, x, unit) in [
-        (Role::Height, &inputs.height_m, "m"),
-        (Role::Roll, &inputs.roll_rad, "rad"),
-        (Role::Pitch, &inputs.pitch_rad, "rad"),
+    let (height_t_s, height_m) = inputs.height();
+    for (role, t_s, x, unit) in [
+        (Role::Height, height_t_s, height_m, "m"),
+        (Role::Roll, &inputs.t_s, &inputs.roll_rad, "rad"),
+        (Role::Pitch, &inputs.t_s, &inputs.pitch_rad, "rad"),
     ] {
-        out.extend(
-            SpectrumSummary::of(&inputs.t_s, x, window, f_hz, unit).map(|s| (name(role, 0), s)),
-        );
+        let found = SpectrumSummary::of(t_s, x, window, f_hz, unit);
+        out.extend(found.map(|s| (name(role, 0), s)));
     }
     for (k, force) in inputs.normal_n.iter().enumerate() {
         out.extend(

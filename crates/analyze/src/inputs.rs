@@ -69,6 +69,8 @@ pub struct Inputs {
     pub t_s: Vec<f64>,
     /// Height of the centre of mass (m).
     pub height_m: Vec<f64>,
+    /// Times (s) and heights (m) where the height comes on a clock of its own: what is told of it alone is told of these.
+    pub height_alone: Option<(Vec<f64>, Vec<f64>)>,
     /// Rotation about the pole (rad).
     pub roll_rad: Vec<f64>,
     /// Tilt of the pole (rad).
@@ -108,6 +110,7 @@ impl Default for Inputs {
         Inputs {
             t_s: Vec::new(),
             height_m: Vec::new(),
+            height_alone: None,
             roll_rad: Vec::new(),
             pitch_rad: Vec::new(),
             yaw_rad: Vec::new(),
@@ -128,6 +131,14 @@ impl Default for Inputs {
 }
 
 impl Inputs {
+    /// The height on its own clock: times (s) and heights (m).
+    pub fn height(&self) -> (&[f64], &[f64]) {
+        match &self.height_alone {
+            Some((t_s, x)) => (t_s, x),
+            None => (&self.t_s, &self.height_m),
+        }
+    }
+
     /// The time axis of the forces.
     pub fn force_times(&self) -> &[f64] {
         if self.force_t_s.is_empty() {

@@ -5,6 +5,7 @@ use serde::Serialize;
 use crate::inputs::{Window, mean_step_s, stretches};
 use crate::median::median;
 use crate::spectrum::{DEFAULT_SEGMENT_S, Options, Spectrum, welch};
+use crate::summary::squares;
 
 /// A line of a spectrum.
 #[derive(Clone, Debug, PartialEq, Serialize)]
@@ -82,7 +83,7 @@ impl SpectrumSummary {
     }
 
     /// Of an evenly sampled column in a window, in segments of [`DEFAULT_SEGMENT_S`]: of the longest part without a hole. `None` below 16
-    /// finite samples of it.
+    /// finite samples of it, and where their squares are beyond what a float holds.
     pub fn of(
         t_s: &[f64],
         x: &[f64],
@@ -100,7 +101,12 @@ impl SpectrumSummary {
         let parts = stretches(&t_s, 0.0).into_iter();
         let longest = parts.max_by_key(ExactSizeIterator::len)?;
         let (t_s, x) = (&t_s[longest.clone()], &x[longest]);
-        if x.len() < 16 {
+        let ends = x
+            .iter()
+            .fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), x| {
+                (low.min(*x), high.max(*x))
+            });
+        if x.len() < 16 || !squares(ends.0, ends.1) {
             return None;
         }
         let fs_hz = 1.0 / mean_step_s(t_s)?;

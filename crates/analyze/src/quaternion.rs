@@ -1,6 +1,6 @@
 //! Quaternions as roll, pitch and yaw.
 
-use std::collections::HashMap;
+use std::collections::{BTreeMap, HashMap};
 
 use recording::read::Batch;
 
@@ -34,6 +34,8 @@ pub(crate) struct Quaternions {
     /// order.
     known: HashMap<usize, (Vec<usize>, Vec<Found>)>,
     values: [Vec<f64>; 3],
+    /// Quaternions that are no rotation, by their path without the last part: channel, how many, log time of the first (ns).
+    pub odd: BTreeMap<String, (usize, u64, i64)>,
 }
 
 struct Found {
@@ -61,6 +63,16 @@ impl Quaternions {
                 for (column, angle) in self.values.iter_mut().zip(angles(*x, *y, *z, *w)) {
                     column.push(angle);
                 }
+            }
+            let finite = |k: usize| [x, y, z, w].iter().all(|part| part[k].is_finite());
+            let odd = |k: &usize| self.values[0][*k].is_nan() && finite(*k);
+            let mut odd = (0..x.len()).filter(odd);
+            if let Some(k) = odd.next() {
+                let roll = &found.paths[0];
+                let path = roll.strip_suffix(".roll").unwrap_or(roll).to_owned();
+                let first_ns = batch.times_ns[rows.map_or(k, |rows| rows[k] as usize)];
+                let known = self.odd.entry(path).or_insert((batch.channel, 0, first_ns));
+                known.1 += 1 + odd.count() as u64;
             }
             for (path, values) in found.paths.iter().zip(&self.values) {
                 sink(path, rows, values);

@@ -267,6 +267,8 @@ pub struct Roles {
     patterns: BTreeMap<Role, Vec<String>>,
     /// What the user says of the sensors themselves.
     pub sensors: Sensors,
+    /// Topics that were taken out of several that could have been, with a sentence each.
+    pub chosen: Vec<(String, String)>,
 }
 
 /// What the user says of the sensors; `None` where nothing is said. See [`RolesFile`] for the meaning.
@@ -306,6 +308,13 @@ impl Roles {
                 .map(|(t, _)| format!("{t}.{field}"))
                 .collect();
             if !matches!(role, Role::Forces) {
+                let takes = |r: &Role| user.is_none_or(|user| user.patterns(*r).is_empty());
+                if matches!(role, Role::Height) && [Role::Height, Role::Roll].iter().any(takes) {
+                    let topics = found.iter().map(|path| path.trim_end_matches(field));
+                    let topics = topics.map(|t| t.trim_end_matches('.').to_owned());
+                    let topics: Vec<String> = topics.collect();
+                    roles.choose(&topics, "height and angles are taken from this topic");
+                }
                 found.truncate(1);
             }
             if !found.is_empty() {
@@ -324,6 +333,13 @@ impl Roles {
             .partition(|t| is_carrier(t));
         if !others.is_empty() {
             let first = preferred(&others);
+            let said = user.is_some_and(|user| !user.imu.is_empty());
+            if !said && !about_the_load(&first) && !is_body(&first) {
+                roles.choose(
+                    &others,
+                    "what is carried is taken to move as this sensor says",
+                );
+            }
             let also = others.into_iter().filter(|t| about_the_load(t));
             let also: Vec<String> = also.filter(|t| *t != first).collect();
             roles
@@ -367,6 +383,20 @@ impl Roles {
         roles
     }
 
+    /// Remarks what the first of several topics is taken for, where nothing but its name says so.
+    fn choose(&mut self, topics: &[String], what: &str) {
+        let [topic, others @ ..] = topics else { return };
+        if others.is_empty() {
+            return;
+        }
+        let text = format!(
+            "{what}, the first by name of {} of its kind; if another is meant ({}), name it in a file for --roles",
+            topics.len(),
+            others[..others.len().min(8)].join(", ")
+        );
+        self.chosen.push((topic.clone(), text));
+    }
+
     /// The patterns of a role: paths of signals, or topics, `*` standing for anything.
     pub fn patterns(&self, role: Role) -> &[String] {
         self.patterns.get(&role).map_or(&[], |p| &p[..])
@@ -383,6 +413,15 @@ impl Roles {
             (!role.is_topic() && patterns.iter().any(|p| matches(p, path))).then_some(*role)
         };
         self.patterns.iter().find_map(plays)
+    }
+
+    /// Whether signals of a topic may play a role.
+    pub(crate) fn feeds(&self, topic: &str) -> bool {
+        let may = |pattern: &String| {
+            let stem = pattern.split('*').next().unwrap_or("");
+            topic.starts_with(stem) || stem.starts_with(topic)
+        };
+        (self.patterns.iter()).any(|(role, p)| !role.is_topic() && p.iter().any(may))
     }
 
     /// Role and patterns, in printing order.
@@ -413,9 +452,13 @@ fn is_carrier(topic: &str) -> bool {
 fn preferred(topics: &[String]) -> String {
     topics
         .iter()
-        .find(|t| about_the_load(t) || t.to_lowercase().contains("body"))
+        .find(|t| about_the_load(t) || is_body(t))
         .unwrap_or(&topics[0])
         .clone()
+}
+
+fn is_body(topic: &str) -> bool {
+    topic.to_lowercase().contains("body")
 }
 
 /// Whether a topic's name speaks of what is carried.
@@ -519,6 +562,30 @@ mod tests {
             ["/imu/carrier_2", "/imu/carrier_10"]
         );
         assert_eq!(roles.topic(Role::Truth), Some("/rath/state"));
+    }
+
+    #[test]
+    fn one_of_several_is_named() {
+        let imu = "sensor_msgs/msg/Imu";
+        let chosen = |topics: &[&str], user: Option<&RolesFile>| {
+            Roles::infer(topics.iter().map(|t| (*t, imu)), user).chosen
+        };
+        let several = chosen(&["/imu/b", "/imu/a", "/imu/c"], None);
+        assert_eq!(several.len(), 1);
+        assert_eq!(several[0].0, "/imu/a");
+        assert!(several[0].1.contains("of 3") && several[0].1.contains("/imu/b, /imu/c"));
+        assert!(chosen(&["/imu/a", "/imu/rath"], None).is_empty());
+        assert!(chosen(&["/imu/a"], None).is_empty());
+        let said = RolesFile {
+            imu: vec!["/imu/b".into()],
+            ..RolesFile::default()
+        };
+        assert!(chosen(&["/imu/b", "/imu/a"], Some(&said)).is_empty());
+        let pose = "geometry_msgs/msg/PoseStamped";
+        let poses = [("/odom", pose), ("/aaa", pose), ("/truth/pose", pose)];
+        let roles = Roles::infer(poses.into_iter(), None);
+        assert_eq!(roles.chosen[0].0, "/aaa");
+        assert!(roles.chosen[0].1.contains("(/odom)"));
     }
 
     #[test]

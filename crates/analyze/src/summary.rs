@@ -147,6 +147,8 @@ pub struct Times {
     first: Vec<(u64, f64)>,
     /// Messages that share the time of the last.
     shared: u64,
+    /// Sum of the steps back (s).
+    back_s: f64,
     gaps: Vec<Gap>,
 }
 
@@ -162,6 +164,8 @@ pub struct Gap {
 /// A step so many times the mean of those before it is a gap; the first few are measured against their median.
 const GAP: f64 = 10.0;
 const FIRST: usize = 16;
+/// Steps back that together are a larger share of the span than this put a signal out of order.
+const MUCH_BACK: f64 = 0.01;
 
 /// Of some steps those that are no gaps beside the median: how many messages came with them, and their sum (s).
 fn ordinary(steps: &[(u64, f64)]) -> (u64, f64) {
@@ -198,6 +202,7 @@ impl Times {
         for (k, step) in self.buffer.iter().enumerate() {
             // Messages that came together share the step to them; a clock that steps back tells no rate.
             if *step <= 0.0 {
+                self.back_s -= *step;
                 self.shared = if *step < 0.0 { 0 } else { self.shared + 1 };
                 continue;
             }
@@ -234,6 +239,17 @@ impl Times {
         self.count
     }
 
+    /// Whether messages come so far from the order of their times that steps and spectra tell nothing, until they are put in order: a few that
+    /// are overtaken by the next do no harm.
+    pub fn backward(&self) -> bool {
+        self.back_s > MUCH_BACK * seconds(self.earliest_ns, self.latest_ns)
+    }
+
+    /// The earliest and the latest (ns); `None` without messages.
+    pub fn ends_ns(&self) -> Option<(i64, i64)> {
+        (self.count > 0).then_some((self.earliest_ns, self.latest_ns))
+    }
+
     /// Mean rate (Hz).
     pub fn hz(&self) -> Option<f64> {
         let span_s = seconds(self.earliest_ns, self.latest_ns);
@@ -253,7 +269,7 @@ impl Times {
 
     /// Population standard deviation of the steps (s).
     pub fn jitter_s(&self) -> Option<f64> {
-        self.steps.sd()
+        self.steps.sd().filter(|_| !self.backward())
     }
 }
 
@@ -264,6 +280,13 @@ fn seconds(from_ns: i64, to_ns: i64) -> f64 {
         None => (i128::from(to_ns) - i128::from(from_ns)) as f64,
     };
     ns / 1e9
+}
+
+/// Whether sums of squares of values between these, about their mean, are numbers with all their digits.
+pub(crate) fn squares(low: f64, high: f64) -> bool {
+    const LARGE: f64 = 1e140;
+    let spread = high - low;
+    low.abs().max(high.abs()) < LARGE && (spread == 0.0 || spread > 1.0 / LARGE)
 }
 
 /// One signal's moments and spectrum while the recording streams by.
@@ -350,14 +373,28 @@ impl Stream {
         }
     }
 
-    /// The line of the table; with `told` the spectrum, at the rate that was found in the end.
+    /// Finite values so far.
+    pub fn count(&self) -> u64 {
+        self.moments.count()
+    }
+
+    /// The smallest and the largest value, where their squares are beyond what a float holds: spread and spectrum are not told then.
+    pub fn beyond_squares(&self) -> Option<(f64, f64)> {
+        self.moments
+            .range()
+            .filter(|(low, high)| !squares(*low, *high))
+    }
+
+    /// The line of the table; with `told` the spectrum, at the rate that was found in the end. Neither is told of values that do not come in the
+    /// order of their times, or whose squares are beyond what a float holds.
     pub fn finish(&self, times: &Times, unit: &str, told: bool) -> (Summary, Option<Spectrum>) {
         let hz = times.hz();
         let range = self.moments.range();
         let moves = range.is_some_and(|(low, high)| high > low);
+        let sizes = self.beyond_squares().is_none();
         let spectrum = times
             .hz_between_gaps()
-            .filter(|_| moves || told)
+            .filter(|_| (moves || told) && sizes && !times.backward())
             .and_then(|hz| self.welch.as_ref()?.finish_at(hz).ok());
         let summary = Summary {
             count: self.moments.count(),
@@ -366,7 +403,7 @@ impl Stream {
             min: range.map(|r| r.0),
             max: range.map(|r| r.1),
             mean: self.moments.mean(),
-            sd: self.moments.sd(),
+            sd: self.moments.sd().filter(|_| sizes),
             peak_hz: spectrum
                 .as_ref()
                 .filter(|_| moves)
@@ -502,6 +539,27 @@ mod tests {
             stream.push(&[f64::from(k % 7)], true, times.gaps());
         }
         assert!(stream.finish(&times, "", true).1.is_some());
+    }
+
+    #[test]
+    fn what_cannot_be_squared_has_neither_spread_nor_line() {
+        let of = |size: f64| {
+            let (mut stream, mut times) = (Stream::new(100.0, 1024), Times::default());
+            let x = |k: i64| size * (std::f64::consts::TAU * 0.01 * k as f64).sin();
+            times.push(&(0..6000).map(|k| k * 10_000_000).collect::<Vec<_>>());
+            stream.push(&(0..6000).map(x).collect::<Vec<_>>(), true, times.gaps());
+            stream.finish(&times, "", false).0
+        };
+        for size in [1e160, 1e-170] {
+            let found = of(size);
+            assert_eq!((found.sd, found.peak_hz), (None, None), "{size:e}");
+            assert_eq!(found.count, 6000);
+        }
+        for size in [1e100, 1.0, 1e-100] {
+            let found = of(size);
+            assert!((found.peak_hz.unwrap() - 1.0).abs() < 0.01, "{size:e}");
+            assert!((found.sd.unwrap() / size - 0.5f64.sqrt()).abs() < 1e-3);
+        }
     }
 
     #[test]

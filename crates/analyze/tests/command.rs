@@ -282,6 +282,7 @@ fn tables_for_people_fit_a_terminal() {
     assert!(widest <= 110, "{widest}\n{table}");
     let csv = text(&analyze(&[file.to_str().unwrap(), "--format", "csv"]).stdout);
     assert_eq!(csv.lines().count(), 1 + analyze::metrics::METRICS.len());
+    assert!(csv.starts_with("file,metric,value,unit,source,per,ci95,reason\n"));
 }
 
 #[test]
@@ -550,6 +551,218 @@ fn a_topic_is_told_of_as_a_whole() {
     );
     let rows = std::fs::read_to_string(&table).unwrap().lines().count();
     assert_eq!(rows, 1001);
+}
+
+/// Messages of one channel: topic, and log time (s) and JSON text of each.
+type Told<'a> = (&'a str, Vec<(f64, String)>);
+
+/// A recording of JSON messages without schemas, in the order in which they are given; small chunks, so that order counts.
+fn told(folder: &Path, channels: &[Told]) -> String {
+    let path = folder.join("told.mcap");
+    let options = WriterOptions {
+        chunk_bytes: 4096,
+        ..WriterOptions::default()
+    };
+    let mut w = RecordingWriter::create(&path, &options).unwrap();
+    for (k, (topic, messages)) in channels.iter().enumerate() {
+        let channel = recording::write::RawChannel {
+            topic,
+            message_encoding: "json",
+            schema_name: "",
+            schema_encoding: "",
+            schema_data: &[],
+            metadata: &[("part".to_owned(), k.to_string())].into(),
+        };
+        let channel = w.raw_channel(&channel).unwrap();
+        for (t, text) in messages {
+            let t_ns = 1_700_000_000_000_000_000 + (t * 1e9).round() as i64;
+            w.message(channel, t_ns, text.as_bytes()).unwrap();
+        }
+    }
+    w.finish().unwrap();
+    path.to_str().unwrap().to_owned()
+}
+
+/// What is found with a roles file.
+fn with_roles(folder: &Path, file: &str, roles: &str) -> Value {
+    let path = folder.join("roles.toml");
+    std::fs::write(&path, roles).unwrap();
+    json(&[file, "--format", "json", "--roles", path.to_str().unwrap()])
+}
+
+fn tone(hz: f64, t: f64) -> f64 {
+    (std::f64::consts::TAU * hz * t).sin()
+}
+
+fn metric(found: &Value, name: &str) -> f64 {
+    found["metrics"][name]["value"].as_f64().unwrap_or(f64::NAN)
+}
+
+fn kinds(found: &Value) -> Vec<String> {
+    let all = found["quality"].as_array().unwrap().iter();
+    all.map(|q| q["kind"].as_str().unwrap().to_owned())
+        .collect()
+}
+
+/// Messages that come by tens are told apart by their stamps.
+#[test]
+fn bursts_are_dated_by_their_stamps() {
+    let folder = tempfile::tempdir().unwrap();
+    let message = |k: u32| {
+        let t = f64::from(k) / 30.0;
+        let stamp_ns = (t * 1e9) as u64;
+        let (sec, nanosec) = (stamp_ns / 1_000_000_000, stamp_ns % 1_000_000_000);
+        let (roll, z) = (0.35 * tone(1.0, t), 1.0 + 0.05 * tone(2.0, t));
+        let text = format!(
+            "{{\"header\":{{\"stamp\":{{\"sec\":{sec},\"nanosec\":{nanosec}}}}},\"roll\":{roll},\"z\":{z}}}"
+        );
+        (f64::from(k / 10 + 1) / 3.0, text)
+    };
+    let file = told(folder.path(), &[("/s", (0..1800).map(message).collect())]);
+    let found = with_roles(
+        folder.path(),
+        &file,
+        "roll = \"/s.roll\"\nheight = \"/s.z\"\n",
+    );
+    assert!(
+        (metric(&found, "peak_hz") - 2.0).abs() < 0.02,
+        "{}",
+        found["metrics"]["peak_hz"]
+    );
+    assert!((metric(&found, "roll_peak_hz") - 1.0).abs() < 0.02);
+    assert_eq!(found["metrics"]["mechanism"]["value"], "parametric");
+    assert!(kinds(&found).contains(&"by_stamps".to_owned()));
+}
+
+/// A height that is sampled faster than the roll keeps its line, and a slower one its size.
+#[test]
+fn height_is_judged_on_its_own_clock() {
+    let folder = tempfile::tempdir().unwrap();
+    let of = |roll: (u32, f64), height: (u32, f64)| {
+        let course = |(hz, f): (u32, f64), offset: f64| {
+            let times = (0..60 * hz).map(|k| f64::from(k) / f64::from(hz) + offset);
+            times
+                .map(|t| (t, format!("{{\"x\":{}}}", 0.3 * tone(f, t))))
+                .collect()
+        };
+        let channels = [("/s", course(roll, 0.0)), ("/z", course(height, 0.003))];
+        let file = told(folder.path(), &channels);
+        with_roles(folder.path(), &file, "roll = \"/s.x\"\nheight = \"/z.x\"\n")
+    };
+    let slow_roll = of((5, 0.4), (100, 4.2));
+    assert!((metric(&slow_roll, "peak_hz") - 4.2).abs() < 0.01);
+    assert!((slow_roll["spectra"]["/z.x"]["peak_hz"].as_f64().unwrap() - 4.2).abs() < 0.01);
+    let mechanism = &slow_roll["metrics"]["mechanism"];
+    assert!(mechanism["value"].is_null(), "{mechanism}");
+    assert!(
+        mechanism["reason"]
+            .as_str()
+            .unwrap()
+            .contains("cannot be seen in the roll")
+    );
+    assert!(slow_roll["metrics"]["subharmonic_ratio"]["value"].is_null());
+    let slow_height = of((100, 1.0), (10, 2.0));
+    let rms_m = metric(&slow_height, "rms_z_m");
+    assert!(
+        (rms_m / (0.3 * 0.5f64.sqrt()) - 1.0).abs() < 1e-3,
+        "{rms_m}"
+    );
+    assert_eq!(slow_height["metrics"]["mechanism"]["value"], "parametric");
+}
+
+/// Channels of one topic that differ in length, that alternate, and messages that are shuffled: one line, no jitter.
+#[test]
+fn a_signal_is_the_same_in_whatever_order_it_comes() {
+    let folder = tempfile::tempdir().unwrap();
+    let message = |k: u32| {
+        let t = f64::from(k) / 100.0;
+        (t, format!("{{\"v\":{}}}", 5.0 + 3.0 * tone(1.2345, t)))
+    };
+    let all = || (0..6000).map(message);
+    let shuffled = (0..6000).map(|k| message(k * 617 % 6000)).collect();
+    let few = vec![
+        ("/a", all().take(20).collect()),
+        ("/a", all().skip(20).collect()),
+    ];
+    let alternating = [0, 1].map(|j| ("/a", all().skip(j).step_by(2).collect()));
+    for channels in [few, alternating.into(), vec![("/a", shuffled)]] {
+        let found = json(&[&told(folder.path(), &channels), "--format", "json"]);
+        let v = &found["signals"]["/a.v"];
+        let number = |name: &str| v[name].as_f64().unwrap();
+        assert_eq!(number("count"), 6000.0);
+        assert!((number("peak_hz") - 1.2345).abs() < 0.005, "{v}");
+        assert!(number("jitter_s") < 1e-6, "{v}");
+    }
+}
+
+/// A topic that covers a part of the window, and quaternions that are none.
+#[test]
+fn what_metrics_lack_is_said() {
+    let folder = tempfile::tempdir().unwrap();
+    let turned = |k: u32| {
+        let t = f64::from(k) / 30.0;
+        let half = 0.1 * tone(1.0, t);
+        let length = if k % 100 == 5 { 0.0 } else { 1.0 };
+        let (x, w) = (length * half.sin(), length * half.cos());
+        (
+            t,
+            format!("{{\"q\":{{\"x\":{x},\"y\":0,\"z\":0,\"w\":{w}}}}}"),
+        )
+    };
+    let level = (0..1800).map(|k| (f64::from(k) / 30.0, "1.0".to_owned()));
+    let channels = [
+        ("/s", (0..900).map(turned).collect()),
+        ("/n", level.collect()),
+    ];
+    let file = told(folder.path(), &channels);
+    let found = with_roles(folder.path(), &file, "roll = \"/s.q.roll\"\n");
+    let all = found["quality"].as_array().unwrap();
+    let of = |kind: &str| all.iter().find(|q| q["kind"] == kind).unwrap().clone();
+    assert_eq!(kinds(&found), ["no_rotation", "ends_early"]);
+    assert_eq!(of("no_rotation")["count"], 9);
+    assert!(
+        of("no_rotation")["text"]
+            .as_str()
+            .unwrap()
+            .starts_with("9 quaternions of q far")
+    );
+    let early = of("ends_early");
+    assert_eq!(early["topic"], "/s");
+    assert!((early["t_s"].as_f64().unwrap() - 29.967).abs() < 1e-3);
+    let args = [&file, "--format", "json", "--window", "5..29"];
+    let inside = json(&args.map(|a: &str| a));
+    assert!(!kinds(&inside).contains(&"ends_early".to_owned()));
+}
+
+/// Where there are only lists that are too long, and messages with too many keys, the limit is named.
+#[test]
+fn limits_are_named() {
+    let folder = tempfile::tempdir().unwrap();
+    let list = format!("{{\"a\":{:?}}}", [1.5; 100]);
+    let file = told(
+        folder.path(),
+        &[("/big", vec![(0.0, list.clone()), (1.0, list)])],
+    );
+    let said = text(&analyze(&[&file]).stderr);
+    assert!(
+        said.contains("a has more than 64 items (the limit max_items)"),
+        "{said}"
+    );
+    let keys: Vec<String> = (0..5000).map(|k| format!("\"k{k}\":{k}")).collect();
+    let keys = format!("{{{}}}", keys.join(","));
+    let file = told(
+        folder.path(),
+        &[("/keys", vec![(0.0, keys.clone()), (1.0, keys)])],
+    );
+    let found = json(&[&file, "--format", "json"]);
+    let said = &found["quality"][0]["text"];
+    assert_eq!(found["quality"][0]["count"], 2);
+    assert!(
+        said.as_str()
+            .unwrap()
+            .starts_with("the message itself has more keys than the 4096"),
+        "{said}"
+    );
 }
 
 /// A quaternion that a topic's first messages lack.

@@ -22,6 +22,12 @@ pub fn plain(text: &str) -> std::borrow::Cow<'_, str> {
     }
 }
 
+/// A count with its noun: `1 gap`, `2 gaps`.
+pub fn counted(count: u64, one: &str, several: &str) -> String {
+    let what = if count == 1 { one } else { several };
+    format!("{count} {what}")
+}
+
 /// None is longer; what is may have no end.
 const MOST_BYTES: u64 = 64 << 20;
 
@@ -52,6 +58,12 @@ mod tests {
             plain("a\u{1b}[2J\u{7}\u{9b}"),
             "a\u{fffd}[2J\u{fffd}\u{fffd}"
         );
+    }
+
+    #[test]
+    fn one_is_not_several() {
+        assert_eq!(counted(1, "gap", "gaps"), "1 gap");
+        assert_eq!(counted(0, "gap", "gaps"), "0 gaps");
     }
 
     #[test]

@@ -241,6 +241,41 @@ fn sensor_logger_rows_out_of_order_and_cut() {
 }
 
 #[test]
+fn sensor_logger_times_that_are_none() {
+    let head = "time,seconds_elapsed,z,y,x\n";
+    let rows = |unit: u64, without: u64| {
+        let row = |k: u64| {
+            let time = match k == without {
+                true => String::new(),
+                false => ((1_700_000_000_000 + 10 * k) * unit).to_string(),
+            };
+            format!("{time},{},{k},0,0\n", 0.01 * k as f64)
+        };
+        head.to_owned() + &(0..40).map(row).collect::<String>()
+    };
+    let folder = folder();
+    let path = folder.path().join("walk");
+    file(&path, "TotalAcceleration.csv", &rows(1_000_000, 7));
+    let got = ingest(folder.path(), std::slice::from_ref(&path), None).expect("ingests");
+    let z = got.values("/imu/walk.linear_acceleration.z");
+    assert_eq!(z.len(), 39);
+    assert_eq!(got.times("/imu/walk")[0], 1_700_000_000_000_000_000);
+    let notes = got.ingested.notes.join("; ");
+    assert!(
+        notes.contains("1 row has no time and is left out"),
+        "{notes}"
+    );
+    // Milliseconds and microseconds.
+    for unit in [1, 1000] {
+        file(&path, "TotalAcceleration.csv", &rows(unit, 99));
+        let why = ingest(folder.path(), std::slice::from_ref(&path), None)
+            .err()
+            .expect("refuses");
+        assert!(why.to_string().contains("not in nanoseconds"), "{why}");
+    }
+}
+
+#[test]
 fn movella_dot_wraps_and_turns_free_acceleration() {
     let folder = folder();
     // Upside down: a half turn about x; in free fall minus gravity, at rest, and moving up with 1 m/s².

@@ -144,10 +144,10 @@ fn what_is_odd_is_said() {
     assert_eq!(
         lines,
         [
-            "/cdr/le: 1 values of f64 are NaN or infinite, first at 0.700 s",
-            "/cdr/be: 1 values of f64 are NaN or infinite, first at 0.700 s",
+            "/cdr/le: 1 value of f64 is NaN or infinite, first at 0.700 s",
+            "/cdr/be: 1 value of f64 is NaN or infinite, first at 0.700 s",
             "/imu: orientation is declared as not given (covariance -1)",
-            "/ros1: 1 values of f64 are NaN or infinite, first at 0.700 s",
+            "/ros1: 1 value of f64 is NaN or infinite, first at 0.700 s",
         ]
     );
 }

@@ -76,15 +76,15 @@ fn oddities_are_said() {
     assert_eq!(
         lines(&found),
         [
-            "gap /imu: 1 gaps in the log times (usual interval 0.010002 s), the longest 0.260 s at 9.992 s",
+            "gap /imu: 1 gap in the log times (usual interval 0.010002 s), the longest 0.260 s at 9.992 s",
             "clock_offset /imu: log time lies 0.502 s after the header stamp on average",
             "clock_drift /imu: log time runs 196 ppm faster than the header stamp (3.9 ms over 20.1 s)",
             "nan /imu: 2 values of angular_velocity.y are NaN or infinite, first at 5.001 s",
             "absent_field /imu: orientation is declared as not given (covariance -1)",
-            "duplicate /pose: 1 log times repeat the one before, first at 0.080 s",
-            "backward /pose: 1 log times lie before the one before, first at 0.050 s",
-            "gap /pose: 1 gaps in the log times (usual interval 0.010002 s), the longest 0.260 s at 9.992 s",
-            "zero_stamp /pose: 1 header stamps are zero, first at 0.030 s",
+            "duplicate /pose: 1 log time repeats the one before, first at 0.080 s",
+            "backward /pose: 1 log time lies before the one before, first at 0.050 s",
+            "gap /pose: 1 gap in the log times (usual interval 0.010002 s), the longest 0.260 s at 9.992 s",
+            "zero_stamp /pose: 1 header stamp is zero, first at 0.030 s",
         ]
     );
 }
@@ -356,9 +356,9 @@ fn json_with_bare_words() {
     assert_eq!(
         lines(&found),
         [
-            "nan /j: 1 values of x are NaN or infinite, first at 0.000 s",
-            "nan /j: 1 values of y[0] are NaN or infinite, first at 0.000 s",
-            "nan /j: 1 values of y[1] are NaN or infinite, first at 0.000 s",
+            "nan /j: 1 value of x is NaN or infinite, first at 0.000 s",
+            "nan /j: 1 value of y[0] is NaN or infinite, first at 0.000 s",
+            "nan /j: 1 value of y[1] is NaN or infinite, first at 0.000 s",
         ]
     );
 }

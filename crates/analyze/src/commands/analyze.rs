@@ -9,6 +9,7 @@ use analyze::report;
 use analyze::roles::RolesFile;
 use anyhow::{Context, bail};
 use recording::read::{ReadOptions, Recording, STDIN};
+use recording::text::counted;
 use recording::whole;
 
 use super::{AnalyzeArgs, Done, Format, Limits, annotate, complain, print};
@@ -135,8 +136,9 @@ fn one(path: &Path, args: &AnalyzeArgs, request: &Request) -> anyhow::Result<Ana
         let overlaid = analyze::table::write(&recording, request, args.downsample, out)?;
         if overlaid > 0 {
             recording::note!(
-                "analyze: {}: {overlaid} messages have no row, because one of the same topic and time came after them",
-                out.display()
+                "analyze: {}: {} no row, because one of the same topic and time came after",
+                out.display(),
+                counted(overlaid, "message has", "messages have")
             );
         }
     }
@@ -222,7 +224,7 @@ fn nothing(a: &Analysis, request: &Request) -> String {
         );
     }
     let why: Vec<String> = (a.quality.iter())
-        .filter(|q| q.loss || q.kind == "no_decoder")
+        .filter(|q| q.loss || ["no_decoder", "long_sequence"].contains(&q.kind))
         .take(20)
         .map(Quality::told)
         .collect();

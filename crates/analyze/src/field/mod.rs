@@ -5,7 +5,7 @@
 
 mod carriers;
 mod clocks;
-mod dates;
+pub(crate) mod dates;
 mod judge;
 mod place;
 mod sound;

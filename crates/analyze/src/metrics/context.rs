@@ -3,7 +3,7 @@
 use std::borrow::Cow;
 use std::cell::OnceCell;
 
-use super::lines::Line;
+use super::lines::{Line, NEAR};
 use crate::beat::adler::Adler;
 use crate::inputs::{Inputs, Window, mean_step_s};
 
@@ -152,8 +152,10 @@ impl<'a> Context<'a> {
 
     /// The height (m).
     pub fn height(&self) -> &Series<'a> {
-        self.height
-            .get_or_init(|| self.series(&self.inputs.height_m))
+        self.height.get_or_init(|| {
+            let (t_s, x) = self.inputs.height();
+            self.series_on(t_s, x)
+        })
     }
 
     /// The ratio N_tot / (M g) where it was measured as such.
@@ -212,6 +214,17 @@ impl<'a> Context<'a> {
             .as_ref()
     }
 
+    /// Why the roll cannot be held against the height's line, where it is sampled too slowly to show that.
+    pub fn too_slow(&self) -> Option<String> {
+        let hz = self.height_line()?.hz;
+        let half_rate_hz = 0.5 / self.roll().step_s()?;
+        ((1.0 + NEAR) * hz > half_rate_hz).then(|| format!(
+            "the height's line, {hz:.2} Hz, cannot be seen in the roll, which has {:.2} samples per second: more than {:.2} are needed",
+            2.0 * half_rate_hz,
+            2.0 * (1.0 + NEAR) * hz
+        ))
+    }
+
     /// The end of the first unstable stretch (s).
     pub fn onset(&self) -> Option<f64> {
         *self
@@ -226,48 +239,49 @@ impl<'a> Context<'a> {
 
     /// Why a column is missing, or `None` when it is there.
     pub fn missing(&self, need: Need) -> Option<String> {
-        let empty = |given: bool, kept: bool, what: &str| match (given, kept) {
+        let empty = |kept: bool, what: &str| match (self.has(need), kept) {
             (false, _) => Some(format!("no {what} in the recording")),
             (true, false) => Some(format!("no finite sample of {what} in the window")),
             (true, true) => None,
         };
-        let i = self.inputs;
         match need {
-            Need::Roll => empty(!i.roll_rad.is_empty(), !self.roll().x.is_empty(), "roll"),
-            Need::Pitch => empty(!i.pitch_rad.is_empty(), !self.pitch().x.is_empty(), "pitch"),
-            Need::Yaw => empty(!i.yaw_rad.is_empty(), !self.yaw().x.is_empty(), "yaw"),
-            Need::Height => empty(
-                !i.height_m.is_empty(),
-                !self.height().x.is_empty(),
-                "height",
-            ),
-            Need::Forces => empty(
-                !i.normal_n.is_empty(),
-                !self.forces().is_empty(),
-                "handle forces",
-            ),
-            Need::Support if i.normal_n.is_empty() => empty(
-                !i.support_ratio.is_empty(),
+            Need::Roll => empty(!self.roll().x.is_empty(), "roll"),
+            Need::Pitch => empty(!self.pitch().x.is_empty(), "pitch"),
+            Need::Yaw => empty(!self.yaw().x.is_empty(), "yaw"),
+            Need::Height => empty(!self.height().x.is_empty(), "height"),
+            Need::Forces => empty(!self.forces().is_empty(), "handle forces"),
+            Need::Support if self.inputs.normal_n.is_empty() => empty(
                 !self.support_ratio().x.is_empty(),
                 "handle forces or support",
             ),
-            Need::Support => empty(true, !self.forces().is_empty(), "handle forces"),
-            Need::Phases => empty(
-                !i.phase_rad.is_empty(),
-                !self.phases().is_empty(),
-                "carriers' phases",
-            ),
-            Need::Beat => empty(
-                i.beat_phase_rad.iter().any(|p| p.is_finite()),
-                !self.beat().is_empty(),
-                "beat",
-            ),
-            Need::Steps => empty(!i.step_s.is_empty(), true, "carrier's steps"),
+            Need::Support => empty(!self.forces().is_empty(), "handle forces"),
+            Need::Phases => empty(!self.phases().is_empty(), "carriers' phases"),
+            Need::Beat => empty(!self.beat().is_empty(), "beat"),
+            Need::Steps => empty(true, "carrier's steps"),
         }
     }
 
-    /// The word for where a column comes from.
+    /// Whether the recording has a column at all.
+    fn has(&self, need: Need) -> bool {
+        let i = self.inputs;
+        match need {
+            Need::Roll => !i.roll_rad.is_empty(),
+            Need::Pitch => !i.pitch_rad.is_empty(),
+            Need::Yaw => !i.yaw_rad.is_empty(),
+            Need::Height => !i.height_m.is_empty(),
+            Need::Forces => !i.normal_n.is_empty(),
+            Need::Support => !i.normal_n.is_empty() || !i.support_ratio.is_empty(),
+            Need::Phases => !i.phase_rad.is_empty(),
+            Need::Beat => i.beat_phase_rad.iter().any(|p| p.is_finite()),
+            Need::Steps => !i.step_s.is_empty(),
+        }
+    }
+
+    /// The word for where a column comes from; empty where there is none.
     pub fn source(&self, need: Need) -> String {
+        if !self.has(need) {
+            return String::new();
+        }
         let s = &self.inputs.sources;
         match need {
             Need::Roll | Need::Pitch | Need::Yaw => &s.attitude,

@@ -3,7 +3,7 @@
 use super::lines::Shares;
 use super::{Context, Value};
 use crate::inputs::{between, stretches};
-use crate::mechanism::{self, Evidence};
+use crate::mechanism::{self, Evidence, Verdict};
 
 /// The evidence for this window. `None` where the roll does not move or has no step.
 pub fn evidence(c: &Context) -> Option<Evidence> {
@@ -47,11 +47,12 @@ pub fn evidence(c: &Context) -> Option<Evidence> {
 }
 
 pub fn mechanism(c: &Context) -> Value {
-    match evidence(c) {
-        Some(evidence) => match evidence.verdict() {
-            Ok(verdict) => Value::word(verdict.word(), evidence.to_string()),
-            Err(reason) => Value::missing(reason),
-        },
-        None => Value::missing("fewer than two samples of roll in the window"),
+    let Some(evidence) = evidence(c) else {
+        return Value::missing("fewer than two samples of roll in the window");
+    };
+    match (evidence.verdict(), c.too_slow()) {
+        (Ok(verdict), Some(why)) if verdict != Verdict::Quiet => Value::missing(why),
+        (Ok(verdict), _) => Value::word(verdict.word(), evidence.to_string()),
+        (Err(reason), _) => Value::missing(reason),
     }
 }

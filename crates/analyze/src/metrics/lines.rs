@@ -115,6 +115,9 @@ pub fn subharmonic_ratio(c: &Context) -> Value {
     let Some(line) = c.height_line() else {
         return Value::missing("the height has no line to compare with");
     };
+    if let Some(why) = c.too_slow() {
+        return Value::missing(why);
+    }
     let Some(shares) = Shares::of(c.roll(), line.hz) else {
         return Value::missing(format!(
             "the roll does not move, or the window is shorter than {FEWEST_PERIODS:.0} periods of {:.2} Hz",

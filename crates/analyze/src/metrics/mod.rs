@@ -564,6 +564,7 @@ mod tests {
                 "{name} stands twice"
             );
             assert_eq!(value.datum, Datum::Missing, "{name}");
+            assert_eq!(value.source, "", "{name}");
             assert!(
                 value.reason.as_ref().is_some_and(|r| !r.is_empty()),
                 "{name}"

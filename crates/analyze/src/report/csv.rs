@@ -3,9 +3,9 @@
 use crate::examine::Analysis;
 use crate::metrics::Datum;
 
-/// `file,metric,value,unit,source,per,reason`; `per` is separated by spaces.
+/// `file,metric,value,unit,source,per,ci95,reason`; `per` and the ends of the 95 % interval are separated by spaces.
 pub fn csv(analyses: &[Analysis]) -> String {
-    let mut out = String::from("file,metric,value,unit,source,per,reason\n");
+    let mut out = String::from("file,metric,value,unit,source,per,ci95,reason\n");
     for analysis in analyses {
         for (name, value) in analysis.metrics.iter() {
             let number = match &value.datum {
@@ -14,12 +14,8 @@ pub fn csv(analyses: &[Analysis]) -> String {
                 Datum::Word(x) => (*x).to_owned(),
                 Datum::Missing => String::new(),
             };
-            let per = value
-                .per
-                .iter()
-                .map(f64::to_string)
-                .collect::<Vec<_>>()
-                .join(" ");
+            let spaced = |x: &[f64]| x.iter().map(f64::to_string).collect::<Vec<_>>().join(" ");
+            let ci95 = value.ci95.map_or(String::new(), |ends| spaced(&ends));
             let reason = value.reason.as_deref().unwrap_or("");
             let cells = [
                 &analysis.file,
@@ -27,7 +23,8 @@ pub fn csv(analyses: &[Analysis]) -> String {
                 &number,
                 value.unit,
                 &value.source,
-                &per,
+                &spaced(&value.per),
+                &ci95,
                 reason,
             ]
             .map(quoted);

@@ -199,7 +199,8 @@ pub fn plots(a: &Analysis) -> Vec<Plot> {
         from => format!("Height about its mean{from}"),
     };
     let mut height = Panel::over_time("height", &title, "height, m", a);
-    height.line("height", &i.t_s, &i.height_m);
+    let (t_s, height_m) = i.height();
+    height.line("height", t_s, height_m);
     height.marks = marks(a);
     panel(height);
 

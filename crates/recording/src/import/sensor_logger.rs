@@ -4,11 +4,16 @@
 //! `TotalAcceleration`, or else accelerometer plus gravity. iOS without the app's 'standardisation' has the opposite sign on all axes, and
 //! counts uncalibrated accelerations in g.
 
+use crate::text::counted;
+
 use super::{
     Files, ImportError,
     imu::{self, Log, STANDARD_GRAVITY, Track},
     table::Table,
 };
+
+/// Times that disagree by so many times are in another unit.
+const UNIT: f64 = 300.0;
 
 /// Whether a line is the header of a Sensor Logger table.
 pub(super) fn is_header(line: &str) -> bool {
@@ -118,8 +123,14 @@ fn read_track(
     let mut table = Table::parse(name, text, is_header)?;
     table.drop_cut_row(log, notes);
     let [time, x, y, z] = table.find_all(["time", "x", "y", "z"])?;
-    let mut track = Track::new();
+    let elapsed = table.find("seconds_elapsed");
+    let (mut track, mut untimed) = (Track::new(), 0);
+    let mut ends: Option<[(i64, f64); 2]> = None;
     for row in 0..table.len() {
+        if table.text(row, time).is_empty() {
+            untimed += 1;
+            continue;
+        }
         // Nanoseconds since 1970 have more digits than a double holds.
         let t_ns = match table.text(row, time).parse::<i64>() {
             Ok(t_ns) => t_ns,
@@ -132,6 +143,29 @@ fn read_track(
             )));
         }
         track.push((t_ns, table.vector(row, [x, y, z])?));
+        if let Some(elapsed) = elapsed {
+            let here = (t_ns, table.number(row, elapsed)?);
+            ends = Some([ends.map_or(here, |ends| ends[0]), here]);
+        }
+    }
+    if untimed > 0 {
+        let rows = counted(
+            untimed,
+            "row has no time and is",
+            "rows have no time and are",
+        );
+        notes.push(format!("{name}: {rows} left out"));
+    }
+    if let Some([(from_ns, from_s), (to_ns, to_s)]) = ends
+        && track.is_sorted_by_key(|(t_ns, _)| *t_ns)
+    {
+        let (span_s, elapsed_s) = ((to_ns - from_ns) as f64 / 1e9, to_s - from_s);
+        // Units are a thousand apart; a clock that is set anew changes less.
+        if elapsed_s > 0.0 && !(1.0 / UNIT..UNIT).contains(&(span_s / elapsed_s)) {
+            return Err(table.problem(format!(
+                "has times that span {span_s:e} s as nanoseconds, but seconds_elapsed spans {elapsed_s} s: the column `time` is not in nanoseconds since 1970, as expected"
+            )));
+        }
     }
     if !track.is_sorted_by_key(|(t_ns, _)| *t_ns) {
         let late = track.windows(2).filter(|w| w[1].0 < w[0].0).count();

@@ -1,6 +1,7 @@
 //! What the times of a channel tell: gaps, duplicates, steps back, and how log time and header stamps run against each other.
 
 use crate::finding::{Finding, Kind};
+use crate::text::counted;
 
 /// So many intervals are looked at before 'usual' means something, and no more than so many are kept.
 const SAMPLE: usize = 256;
@@ -150,12 +151,20 @@ impl Order {
             }
         };
         let at = |count: Count| seconds(count.first, start_ns);
+        let many = |count: Count, does: &str, do_: &str| {
+            let one = what.trim_end_matches('s');
+            counted(
+                count.count,
+                &format!("{one} {does}"),
+                &format!("{what} {do_}"),
+            )
+        };
         say(
             Kind::Duplicate,
             self.duplicates,
             format!(
-                "{} {what} repeat the one before, first at {:.3} s",
-                self.duplicates.count,
+                "{} the one before, first at {:.3} s",
+                many(self.duplicates, "repeats", "repeat"),
                 at(self.duplicates)
             ),
         );
@@ -163,8 +172,8 @@ impl Order {
             Kind::Backward,
             self.backward,
             format!(
-                "{} {what} lie before the one before, first at {:.3} s",
-                self.backward.count,
+                "{} before the one before, first at {:.3} s",
+                many(self.backward, "lies", "lie"),
                 at(self.backward)
             ),
         );
@@ -173,8 +182,8 @@ impl Order {
             Kind::Gap,
             self.gaps,
             format!(
-                "{} gaps in the {what} (usual interval {usual_s:.6} s), the longest {:.3} s at {:.3} s",
-                self.gaps.count,
+                "{} in the {what} (usual interval {usual_s:.6} s), the longest {:.3} s at {:.3} s",
+                counted(self.gaps.count, "gap", "gaps"),
                 self.longest.0 as f64 / 1e9,
                 seconds(self.longest.1, start_ns)
             ),
@@ -260,8 +269,8 @@ impl Clocks {
                 self.zero.count,
                 Some(t_s),
                 format!(
-                    "{} header stamps are zero, first at {t_s:.3} s",
-                    self.zero.count
+                    "{} zero, first at {t_s:.3} s",
+                    counted(self.zero.count, "header stamp is", "header stamps are")
                 ),
             );
         }
@@ -417,7 +426,7 @@ mod tests {
         };
         assert_eq!(
             report(1_000_000, &[(0, 0)]),
-            ["1 header stamps are zero, first at 0.000 s"]
+            ["1 header stamp is zero, first at 0.000 s"]
         );
         assert_eq!(
             report(201_000_000, &[(0, 0)])[1],

@@ -218,7 +218,7 @@ impl<'de> Visitor<'de> for Place<'_, '_> {
             stamp,
         } = self;
         // Keys mostly come in the same order, so the next one is tried first.
-        let mut hint = 0;
+        let (mut hint, mut too_many) = (0, false);
         while let Some(key) = map.next_key::<std::borrow::Cow<'_, str>>()? {
             let position = match node.children.get(hint) {
                 Some((known, _)) if *known == key => Some(hint),
@@ -228,7 +228,9 @@ impl<'de> Visitor<'de> for Place<'_, '_> {
                 Some(position) => position,
                 None if node.children.len() >= MAX_KEYS => {
                     map.next_value::<IgnoredAny>()?;
-                    rows.note_long(&node.field);
+                    if !std::mem::replace(&mut too_many, true) {
+                        rows.note_long(&format!("{}{ANY_KEY}", node.field));
+                    }
                     continue;
                 }
                 None => {
@@ -301,4 +303,6 @@ impl<'de> Visitor<'de> for Place<'_, '_> {
 }
 
 /// A document that never stops inventing keys would otherwise grow without end.
-const MAX_KEYS: usize = 4096;
+pub(super) const MAX_KEYS: usize = 4096;
+/// Stands behind the name of a field that has more.
+pub(super) const ANY_KEY: &str = ".*";

@@ -11,9 +11,10 @@ use super::{
     chunk::{self, Unpacker},
     clock::{Clocks, Order, seconds},
     container::{Block, op},
+    json::{ANY_KEY, MAX_KEYS},
     rows::Selection,
 };
-use crate::{Finding, Kind};
+use crate::{Finding, Kind, text::counted};
 
 /// Decoded numbers of one channel out of one chunk.
 #[derive(Clone, Copy, Debug)]
@@ -539,7 +540,11 @@ impl<'a> Taker<'a> {
                     Kind::Nan,
                     *count,
                     Some(t_s),
-                    format!("{count} values of {field} are NaN or infinite, first at {t_s:.3} s"),
+                    format!(
+                        "{} of {field} {} NaN or infinite, first at {t_s:.3} s",
+                        counted(*count, "value", "values"),
+                        if *count == 1 { "is" } else { "are" }
+                    ),
                 );
             }
             for (field, count) in &watch.absent {
@@ -554,20 +559,28 @@ impl<'a> Taker<'a> {
                 say(Kind::AbsentField, *count, None, text);
             }
             for (field, count) in &watch.long {
-                let limit = self.recording.most_items(&info.schema);
-                say(
-                    Kind::LongSequence,
-                    *count,
-                    None,
-                    format!(
-                        "{field} has more than {limit} items (the limit max_items) in {count} messages; it is not among the signals there"
+                let messages = counted(*count, "message", "messages");
+                let whole = |field: &str| match field {
+                    "" => "the message itself".to_owned(),
+                    field => field.to_owned(),
+                };
+                let text = match field.strip_suffix(ANY_KEY) {
+                    Some(field) => format!(
+                        "{} has more keys than the {MAX_KEYS} that become signals, in {messages}; what has further ones is left out",
+                        whole(field)
                     ),
-                );
+                    None => format!(
+                        "{} has more than {} items (the limit max_items) in {messages}; it is not among the signals there",
+                        whole(field),
+                        self.recording.most_items(&info.schema)
+                    ),
+                };
+                say(Kind::LongSequence, *count, None, text);
             }
             if watch.trailing > 0 {
                 let text = format!(
-                    "{} messages are longer than their schema says",
-                    watch.trailing
+                    "{} than their schema says",
+                    counted(watch.trailing, "message is longer", "messages are longer")
                 );
                 say(Kind::TrailingBytes, watch.trailing, None, text);
             }
@@ -597,8 +610,8 @@ impl<'a> Taker<'a> {
                 finding.kind,
                 Kind::NoDecoder | Kind::UnknownChannel | Kind::BadSchema
             ) {
-                let s = if finding.count == 1 { "" } else { "s" };
-                finding.text = format!("skipped {} message{s}: {}", finding.count, finding.text);
+                let skipped = counted(finding.count, "message", "messages");
+                finding.text = format!("skipped {skipped}: {}", finding.text);
             }
         }
         self.recording.skipped.store(self.lost, Ordering::Relaxed);

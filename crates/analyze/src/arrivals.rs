@@ -1,0 +1,237 @@
+//! When the messages of a topic that feeds metrics were taken: by the log, by their own stamps, or evenly where they came in packets.
+
+use crate::field::dates::{Dated, dated};
+use crate::inputs::{mean_step_in, stretches};
+
+/// Log times and stamps of a topic's messages, in the order in which they came.
+#[derive(Clone, Debug, Default)]
+pub(crate) struct Arrivals {
+    log_ns: Vec<i64>,
+    /// As long as `log_ns` where every message has one.
+    stamp_ns: Vec<i64>,
+}
+
+/// Messages in the order of their times, those that repeat another left out.
+#[derive(Clone, Debug, Default)]
+pub(crate) struct Axis {
+    /// Times, ascending (s).
+    pub t_s: Vec<f64>,
+    /// The message at each time, counted as they came.
+    pub rows: Vec<usize>,
+    /// Kinds and texts of remarks.
+    pub remarks: Vec<(&'static str, String)>,
+}
+
+/// Stamps whose span is not the log's within this share tell no times.
+const SAME_SPAN: f64 = 0.1;
+/// Steps that scatter by more than this share of their mean are uneven.
+const UNEVEN: f64 = 0.25;
+/// More than this share of messages that no time can be told of is worth a word.
+const MANY: f64 = 0.01;
+
+impl Arrivals {
+    /// The next messages: log times and, where all have one, stamps (ns).
+    pub fn push(&mut self, log_ns: &[i64], stamp_ns: Option<&[i64]>) {
+        self.log_ns.extend(log_ns);
+        self.stamp_ns.extend(stamp_ns.unwrap_or_default());
+    }
+
+    /// How many.
+    pub fn len(&self) -> usize {
+        self.log_ns.len()
+    }
+
+    /// Dates them, seconds since `start_ns`. Of those with one stamp the first counts; without useful stamps, of those with one log time whose
+    /// content is the `same`.
+    pub fn dated(&self, start_ns: i64, same: impl Fn(usize, usize) -> bool) -> Axis {
+        self.by_stamps(start_ns, &same)
+            .unwrap_or_else(|| self.by_log(start_ns, &same))
+    }
+
+    /// By the stamps, where these are the better times. Stamps that many messages of other content share are those of packets.
+    fn by_stamps(&self, start_ns: i64, same: impl Fn(usize, usize) -> bool) -> Option<Axis> {
+        if !self.keeps_time() {
+            return None;
+        }
+        let stamp_ns = &self.stamp_ns;
+        let mut rows: Vec<usize> = (0..self.len()).collect();
+        rows.sort_by_key(|r| stamp_ns[*r]);
+        rows.dedup_by(|b, a| stamp_ns[*a] == stamp_ns[*b] && same(*a, *b));
+        let all = rows.len();
+        rows.dedup_by_key(|r| stamp_ns[*r]);
+        if (all - rows.len()) as f64 > MANY * all as f64 {
+            return None;
+        }
+        let first_ns = stamp_ns[*rows.first()?];
+        let stamps = rows
+            .iter()
+            .map(|r| seconds(first_ns, stamp_ns[*r]))
+            .collect();
+        let Dated { t_s, remark } = dated(self.log_s(&rows, start_ns), Some(stamps));
+        let axis = |remark| Axis::new(t_s, rows, vec![remark]);
+        remark.filter(|(kind, _)| *kind == "by_stamps").map(axis)
+    }
+
+    /// By the log times; packets are spread.
+    fn by_log(&self, start_ns: i64, same: impl Fn(usize, usize) -> bool) -> Axis {
+        let mut rows: Vec<usize> = (0..self.len()).collect();
+        rows.sort_by_key(|r| self.log_ns[*r]);
+        rows.dedup_by(|b, a| self.log_ns[*a] == self.log_ns[*b] && same(*a, *b));
+        let Dated { t_s, remark } = dated(self.log_s(&rows, start_ns), None);
+        let mut dates: Vec<(f64, usize)> = t_s.into_iter().zip(rows).collect();
+        let all = dates.len();
+        dates.dedup_by(|b, a| b.0 <= a.0);
+        let undated = all - dates.len();
+        let mut remarks: Vec<_> = remark.into_iter().collect();
+        if undated as f64 > MANY * all as f64 {
+            remarks.push(("left_out", format!("{undated} of {all} messages have the log time of another and no useful stamp of their own: they are left out of the metrics")));
+        }
+        let (t_s, rows) = dates.into_iter().unzip();
+        Axis::new(t_s, rows, remarks)
+    }
+
+    fn log_s(&self, rows: &[usize], start_ns: i64) -> Vec<f64> {
+        let log = rows.iter().map(|r| seconds(start_ns, self.log_ns[*r]));
+        log.collect()
+    }
+
+    /// Whether every message has a stamp and these run as the log does: those that are all zero, or count something else, do not.
+    fn keeps_time(&self) -> bool {
+        if self.stamp_ns.len() != self.len() {
+            return false;
+        }
+        let span = |times: &[i64]| {
+            let ends = (times.iter().min(), times.iter().max());
+            ends.0.zip(ends.1).map_or(0.0, |(a, b)| seconds(*a, *b))
+        };
+        let log_s = span(&self.log_ns);
+        (span(&self.stamp_ns) - log_s).abs() <= SAME_SPAN * log_s
+    }
+}
+
+impl Axis {
+    fn new(t_s: Vec<f64>, rows: Vec<usize>, mut remarks: Vec<(&'static str, String)>) -> Self {
+        remarks.extend(uneven(&t_s));
+        Axis { t_s, rows, remarks }
+    }
+}
+
+/// `to − from` in seconds, without overflow.
+fn seconds(from_ns: i64, to_ns: i64) -> f64 {
+    (i128::from(to_ns) - i128::from(from_ns)) as f64 / 1e9
+}
+
+/// A remark where steps between holes are far from even.
+fn uneven(t_s: &[f64]) -> Option<(&'static str, String)> {
+    let parts = stretches(t_s, 0.0);
+    let mean_s = mean_step_in(t_s, &parts)?;
+    let steps = || {
+        let within = parts.iter().map(|part| &t_s[part.clone()]);
+        within.flat_map(|t| t.windows(2).map(|w| w[1] - w[0]))
+    };
+    let squares: f64 = steps().map(|s| (s - mean_s).powi(2)).sum();
+    let scatter_s = (squares / steps().count() as f64).sqrt();
+    (scatter_s > UNEVEN * mean_s).then(|| {
+        let (mean_ms, scatter_ms) = (1e3 * mean_s, 1e3 * scatter_s);
+        ("jitter", format!("samples come unevenly: steps of {mean_ms:.2} ms on average scatter by {scatter_ms:.2} ms (SD), but are taken as even: frequencies are off by up to a few per cent"))
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const HZ: f64 = 30.0;
+
+    fn taken_ns(k: i64) -> i64 {
+        (1e9 * k as f64 / HZ).round() as i64
+    }
+
+    /// 900 messages that come by nines, and what is found of them.
+    fn bursts(stamp: Option<fn(i64) -> i64>) -> Axis {
+        let mut arrivals = Arrivals::default();
+        for k in 0..900 {
+            let stamp = stamp.map(|s| [s(k)]);
+            arrivals.push(&[taken_ns(k / 9 * 9 + 9)], stamp.as_ref().map(|s| &s[..]));
+        }
+        arrivals.dated(0, |_, _| false)
+    }
+
+    fn farthest_step_s(axis: &Axis) -> f64 {
+        let steps = axis.t_s.windows(2).map(|w| (w[1] - w[0] - 1.0 / HZ).abs());
+        steps.fold(0.0, f64::max)
+    }
+
+    #[test]
+    fn messages_of_one_log_time_are_told_apart_by_their_stamps() {
+        let axis = bursts(Some(|k| 1_700_000_000_000_000_000 + taken_ns(k)));
+        assert_eq!(axis.t_s.len(), 900);
+        assert!(farthest_step_s(&axis) < 1e-6);
+        assert_eq!(axis.remarks[0].0, "by_stamps");
+    }
+
+    #[test]
+    fn messages_that_overtake_each_other_are_dated_by_their_stamps() {
+        let mut random = crate::random::Random(7);
+        let late = (0..900).map(|k| {
+            (
+                taken_ns(k) + (-5e7 * (1.0 - random.uniform()).ln()) as i64,
+                k,
+            )
+        });
+        let mut late: Vec<(i64, i64)> = late.collect();
+        late.sort();
+        let mut arrivals = Arrivals::default();
+        let each = late.iter();
+        each.for_each(|(log, k)| arrivals.push(&[*log], Some(&[taken_ns(*k)])));
+        let axis = arrivals.dated(0, |_, _| false);
+        assert!(axis.t_s.len() == 900 && farthest_step_s(&axis) < 1e-4);
+        assert!(axis.rows.iter().zip(0..).all(|(row, k)| late[*row].1 == k));
+    }
+
+    #[test]
+    fn packets_without_stamps_are_spread() {
+        // Stamps that are all zero are none, and those of the packets tell no more than the log.
+        let zero: fn(i64) -> i64 = |_| 0;
+        let shared: fn(i64) -> i64 = |k| taken_ns(k / 9 * 9);
+        for stamp in [None, Some(zero), Some(shared)] {
+            let axis = bursts(stamp);
+            assert_eq!(axis.t_s.len(), 900);
+            assert!(farthest_step_s(&axis) < 1e-4);
+            assert_eq!(axis.remarks[0].0, "packets");
+        }
+    }
+
+    #[test]
+    fn only_what_repeats_is_left_out() {
+        let mut arrivals = Arrivals::default();
+        for k in (0..200).flat_map(|k| [k, k]) {
+            arrivals.push(&[taken_ns(k)], None);
+        }
+        let axis = arrivals.dated(0, |a, b| a / 2 == b / 2);
+        assert_eq!(axis.rows, (0..400).step_by(2).collect::<Vec<_>>());
+        assert!(axis.remarks.is_empty(), "{:?}", axis.remarks);
+        // Packets of thirty, too long to be told from pauses.
+        let mut arrivals = Arrivals::default();
+        (0..900).for_each(|k| arrivals.push(&[taken_ns(k / 30 * 30)], None));
+        let axis = arrivals.dated(0, |_, _| false);
+        assert_eq!(axis.remarks[0].0, "left_out", "{:?}", axis.remarks);
+    }
+
+    #[test]
+    fn uneven_steps_are_told() {
+        let mut random = crate::random::Random(5);
+        let (mut even, mut wild, mut t) = (Arrivals::default(), Arrivals::default(), 0.0);
+        for k in 0..900 {
+            t -= (1.0 - random.uniform()).ln() / HZ;
+            wild.push(&[(1e9 * t) as i64], None);
+            even.push(&[taken_ns(k) + (1e6 * random.uniform()) as i64], None);
+        }
+        let kinds = |a: &Arrivals| -> Vec<&str> {
+            let remarks = a.dated(0, |_, _| false).remarks;
+            remarks.iter().map(|r| r.0).collect()
+        };
+        assert_eq!(kinds(&wild), ["jitter"]);
+        assert!(kinds(&even).is_empty());
+    }
+}
