@@ -186,7 +186,7 @@ fn assert_holds(e: &Estimate, truth: f64, widest: f64) {
 fn nothing_is_fitted_across_a_hole() {
     let mut field = field_of(&scene_of("music"));
     for beat in ["recorded", "hidden"] {
-        // Half of the messages of the build-up, where the pull shows, are not among them.
+        // Four seconds of the build-up, where the pull shows, and a short hole.
         let left = only(&field, |_, t| {
             !(22.0..26.3).contains(&t) && !(40.0..40.2).contains(&t)
         });
@@ -194,7 +194,7 @@ fn nothing_is_fitted_across_a_hole() {
         let found = fit(&left, analyze::Window::from(15.0));
         assert_holds(find(&found, "beat"), 2.1507, 1e-3);
         assert_holds(find(&found, "pull"), 2.7, 0.05);
-        assert_holds(find(&found, "stiffness"), 3000.0, 1.0);
+        assert_holds(find(&found, "stiffness"), 3000.0, 2.5);
         let whole = fit(&field, analyze::Window::from(15.0));
         let (a, b) = (find(&whole, "pendulum"), find(&found, "pendulum"));
         assert!(
@@ -255,7 +255,7 @@ fn a_weak_coupling_is_seen_and_takes_no_frequency_along() {
 fn a_beat_that_changes_its_tempo_has_none() {
     let found = found_in("tempo-change", false);
     assert!(
-        reason(&found, "beat").contains("changes its tempo, 1.9"),
+        reason(&found, "beat").contains("changes its tempo, 2.05 to 2.30 Hz"),
         "{found:?}"
     );
 }

@@ -25,8 +25,8 @@ fn what_cannot_count_is_refused() {
     let strength = "axes = [{ key = \"effects.music.strength_rad_per_s\", values = [1.0, 2.0] }]";
     for (set, fine) in [
         ("set.effects.music = false", false),
-        ("set.effects.music.strength_rad_per_s = 3.0", false),
-        ("set.effects.music = true", true),
+        ("set.effects.music.strength_rad_per_s = 3.0", true),
+        ("set.effects.music = {}", true),
         ("set.effects.music.onset_s = 3.0", true),
     ] {
         let text = format!("{set}\n{strength}");
@@ -97,7 +97,7 @@ fn angles_are_taken_about_their_circular_mean() {
     assert!((low + 179.9).abs() < 1e-9, "{low}");
     let last: Vec<&str> = csv.lines().nth(1).unwrap().split(',').collect();
     let sd: f64 = last[4].parse().unwrap();
-    assert!((sd - 2.154_065_922_7).abs() < 1e-9, "{csv}");
+    assert!((sd - (14.12f64 / 3.0).sqrt()).abs() < 1e-9, "{csv}");
     let about = about_their_mean(&[170.0, -170.0, -160.0], 360.0);
     assert!((about[1] - about[0] - 20.0).abs() < 1e-9 && (about[2] - about[1] - 10.0).abs() < 1e-9);
 }

@@ -202,10 +202,8 @@ impl Normal {
 
 /// Likeness of neighbouring residuals that white noise does not show.
 const ALIKE: f64 = 0.2;
-/// A pull that is not so many standard errors is none: the best of many frequencies has some by chance.
+/// A pull or a coupling that is not so many standard errors is none: the best of many frequencies has some by chance.
 const SURE: f64 = 6.0;
-/// A coupling of so many standard errors is one.
-const COUPLED: f64 = 3.5;
 
 impl Increments {
     /// Every `skip`-th sample of each part.
@@ -312,8 +310,7 @@ impl Increments {
         out
     }
 
-    /// The answer, under a recorded beat or one that is looked for, with a coupling where there is one, and with what the sampling may have
-    /// done and a coupling may hide in its variances.
+    /// The answer, under a recorded beat or one that is looked for, with a coupling where there is one.
     fn solved(&self) -> Result<Solved, String> {
         let alone = self.solved_with(false)?;
         if self.phases.len() < 2 {
@@ -511,7 +508,7 @@ impl Increments {
 impl Answer {
     fn is_coupled(&self) -> bool {
         let (coupling, variance) = self.coupling;
-        coupling.abs() > COUPLED * variance.sqrt()
+        coupling.abs() > SURE * variance.sqrt()
     }
 }
 

@@ -12,7 +12,7 @@
 //! taken from a scene. Where the beat's phase was recorded it takes the place of Ωt + ψ₀. Increments of φ carry white noise, so least squares (Gauss and Newton) gives the interval of Ω, K, ω_i
 //! by itself; sines are the mean of both ends of an increment, the end as expected from its beginning (a predictor: the observed one would
 //! hold the increment's own noise), an error of (ω_i − Ω)²Δt²/12 of K, which the interval holds, with half of what K and ω_i change by when
-//! every other sample is left out, and all of what they change by when a coupling K_c is allowed for that does not show by itself (3.5 standard
+//! every other sample is left out, and all of what they change by when a coupling K_c is allowed for that does not show by itself (six standard
 //! errors). Where neighbouring increments share noise, because it was drawn on a coarser clock than the recorder's, samples are left
 //! out until less than a fifth is shared, up to steps of 0.1 s, and what is shared is counted: σ² Δt = Σ e_k² + 2 Σ e_k e_{k+1}.
 //! Nothing reaches across a hole of the record: no increment, no spline, no straight line through a beat.
@@ -117,7 +117,7 @@ pub fn holes(field: &Field) -> Vec<String> {
         let lost: Vec<String> = lost.map(|(a, b)| format!("{a:.2} to {b:.2} s")).collect();
         let where_ = match &lost[..] {
             [] => continue,
-            [all @ ..] if all.len() <= 3 => all.join(", "),
+            all if all.len() <= 3 => all.join(", "),
             [first, rest @ ..] => format!("{first} and {} more times", rest.len()),
         };
         match told.iter_mut().find(|(_, other)| *other == where_) {
@@ -127,7 +127,7 @@ pub fn holes(field: &Field) -> Vec<String> {
     }
     let sentence = |(names, where_): (Vec<&str>, String)| {
         format!(
-            "{} are not recorded from {where_}; nothing is fitted across that",
+            "nothing of {} is recorded from {where_}; nothing is fitted across that",
             names.join(", ")
         )
     };

@@ -232,12 +232,15 @@ fn within(inner: &str, outer: &str) -> bool {
         .is_some_and(|rest| rest.is_empty() || rest.starts_with('.'))
 }
 
-/// A key of an axis and one of [set] that set the same. To turn on what an axis has a key of (`effects.music = true`) is another thing.
+/// A key of an axis and one of [set] of which one would not count: what an axis replaces as a whole, or what [set] turns off. The axis' own key is
+/// what [set] begins with.
 fn set_and_varied(set: &toml::Table, axis: &Axis) -> Option<(String, String)> {
     let set = flatten(set);
     keys(axis).into_iter().find_map(|key| {
         let clash = |(s, value): &&(String, toml::Value)| {
-            within(s, &key) || (within(&key, s) && value.as_bool() != Some(true))
+            let replaced = within(s, &key);
+            let turned_off = within(&key, s) && value.as_bool() == Some(false);
+            *s != key && (replaced || turned_off)
         };
         let (s, _) = set.iter().find(clash)?;
         Some((key, s.clone()))
