@@ -25,6 +25,8 @@ pub struct Figure {
     pub layers: Vec<Layer>,
     /// Range of the abscissa, where not that of the data.
     pub x_range: Option<(f64, f64)>,
+    /// Whether equal factors of the abscissa are equally far apart.
+    pub x_log: bool,
     /// Range of the ordinate, where not that of the data.
     pub y_range: Option<(f64, f64)>,
 }
@@ -197,6 +199,7 @@ impl Figure {
             .with_x_axis_max(x.1)
             .with_y_axis_min(y.0)
             .with_y_axis_max(y.1);
+        layout.log_x = self.x_log;
         layout.show_legend = named > 0 && !is_map;
         if layout.show_legend {
             layout = layout.with_legend_position(LegendPosition::OutsideRightTop);

@@ -186,7 +186,10 @@ pub fn table(conditions: &[Condition]) -> String {
             let line = format!(
                 "  {:<33}{:>18}{:>18}{:>8}{:>18}{:>8}",
                 row.label,
-                here.map_or("–".into(), |s| format!("{:.d$} ± {:.d$}", s.mean, s.sd)),
+                here.map_or("–".into(), |s| match s.runs {
+                    1 => format!("{:.d$} ± –", s.mean),
+                    _ => format!("{:.d$} ± {:.d$}", s.mean, s.sd),
+                }),
                 known(row.paper[c]),
                 diff(row.paper[c]),
                 known(row.archive[c]),
@@ -248,7 +251,7 @@ pub fn to_json(conditions: &[Condition], wall_s: f64) -> Value {
                 let s = condition.summary(row.name)?;
                 Some((
                     row.name.to_owned(),
-                    json!({"mean": s.mean, "sd": s.sd, "ci95": s.ci95, "runs": s.runs}),
+                    json!({"mean": s.mean, "sd": s.ci95.map(|_| s.sd), "ci95": s.ci95, "runs": s.runs}),
                 ))
             })
             .collect();

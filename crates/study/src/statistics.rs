@@ -1,5 +1,8 @@
 //! Mean, spread and interval of an ensemble.
 
+use analyze::phase::circular;
+use std::f64::consts::TAU;
+
 /// Summary of one number over the runs that have it.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Summary {
@@ -9,8 +12,8 @@ pub struct Summary {
     pub mean: f64,
     /// Sample standard deviation (n − 1); 0 for one run.
     pub sd: f64,
-    /// Half-width of the 95 % interval of the mean, 1.96·SD/√n: the large-sample formula, which the paper's table uses too.
-    pub ci95: f64,
+    /// Half-width of the 95 % interval of the mean by Student's t, t·SD/√n; `None` for one run, which shows no spread.
+    pub ci95: Option<f64>,
 }
 
 /// Summarises finite values in their order, so that the result does not depend on who computed them when; `None` where there are none.
@@ -29,8 +32,21 @@ pub fn summarise(values: impl Iterator<Item = f64>) -> Option<Summary> {
         runs: n,
         mean,
         sd,
-        ci95: 1.96 * sd / (n as f64).sqrt(),
+        ci95: (n > 1).then(|| student_975(n - 1) * sd / (n as f64).sqrt()),
     })
+}
+
+/// Numbers that are the same after a `turn` (degrees: 360), each as the one nearest their circular mean: what a mean, a spread and an
+/// order can be taken of.
+pub fn about_their_mean(values: &[f64], turn: f64) -> Vec<f64> {
+    let angles = values.iter().map(|x| x / turn * TAU);
+    let mean = circular(angles).map_or(0.0, |c| c.mean_rad / TAU * turn);
+    values.iter().map(|x| nearest(*x, mean, turn)).collect()
+}
+
+/// Which of the numbers that are `x` but for whole turns is nearest to `to`.
+pub fn nearest(x: f64, to: f64, turn: f64) -> f64 {
+    x - turn * ((x - to) / turn).round()
 }
 
 /// Student's t that 97.5 % of its distribution lie below, for `freedoms` degrees of freedom: tables up to 10, then Cornish and Fisher's
@@ -85,7 +101,11 @@ mod tests {
         assert_eq!((s.runs, s.mean), (8, 5.0));
         assert!((s.sd - (32.0_f64 / 7.0).sqrt()).abs() < 1e-15);
         assert!(summarise(std::iter::empty()).is_none());
-        assert_eq!(summarise([3.0].into_iter()).unwrap().sd, 0.0);
+        let one = summarise([3.0].into_iter()).unwrap();
+        assert_eq!((one.sd, one.ci95), (0.0, None));
+        // scipy.stats.t.interval(0.95, 2, 2, scale=1/sqrt(3)): 2 ± 2.484
+        let three = summarise([1.0, 2.0, 3.0].into_iter()).unwrap();
+        assert!((three.ci95.unwrap() - 2.4841).abs() < 1e-3);
         assert!((correlation(&[1.0, 2.0, 3.0], &[6.0, 4.0, 2.0]).unwrap() + 1.0).abs() < 1e-15);
         assert!(correlation(&[1.0, 1.0], &[1.0, 2.0]).is_none());
         // scipy.stats.t.ppf(0.975, n)

@@ -103,35 +103,212 @@ fn noise_does_not_bias_the_pull() {
     assert!(held >= 36, "{held}");
 }
 
-/// The columns of a scene, whose settings stand behind its name, its beat hidden or not, and what is found in them.
-fn found_in(scene: &str, hide_the_beat: bool) -> Vec<study::fit::Outcome> {
-    let mut words = scene.split(' ').map(str::to_owned);
+/// A built-in scene, whose settings stand behind its name.
+fn scene_of(words: &str) -> sim::scene::Scene {
+    let mut words = words.split(' ').map(str::to_owned);
     let name = words.next().unwrap();
     let settings: Vec<String> = words.chain(["solver.energy=false".to_owned()]).collect();
-    let scene = sim::scene::load(&name, &settings).unwrap();
+    sim::scene::load(&name, &settings).unwrap()
+}
+
+/// What a run of a scene gives, its beat included.
+fn field_of(scene: &sim::scene::Scene) -> Field {
     let mut compression_m = vec![Vec::new(); scene.carriers.count()];
     let mut keep = |s: &sim::run::Sample| {
         let each = compression_m.iter_mut().zip(&s.compression_m);
         each.for_each(|(c, d): (&mut Vec<f64>, &f64)| c.push(*d));
         true
     };
-    let (mut inputs, _, outcome) = study::ensemble::observe(&scene, None, &mut keep);
+    let (inputs, _, outcome) = study::ensemble::observe(scene, None, &mut keep);
     outcome.unwrap();
-    if hide_the_beat {
-        inputs.beat_phase_rad.clear();
-    }
     let (onset_s, build_up_s) = match &scene.effects.music {
         Some(music) => (music.onset_s, music.build_up_s),
         None => (0.0, 0.0),
     };
-    let field = Field {
+    Field {
         inputs,
         compression_m,
         onset_s,
         build_up_s,
         ..Field::default()
-    };
+    }
+}
+
+/// Its samples that `keeps` names by number and time (s).
+fn only(field: &Field, keeps: impl Fn(usize, f64) -> bool) -> Field {
+    let mut left = field.clone();
+    let i = &mut left.inputs;
+    let t_s = i.t_s.clone();
+    let single = [
+        &mut i.t_s,
+        &mut i.height_m,
+        &mut i.roll_rad,
+        &mut i.beat_phase_rad,
+    ];
+    let several = i.normal_n.iter_mut().chain(&mut i.phase_rad);
+    for column in single
+        .into_iter()
+        .chain(several)
+        .chain(&mut left.compression_m)
+    {
+        let mut at = 0..;
+        column.retain(|_| at.next().is_some_and(|k| keeps(k, t_s[k])));
+    }
+    left
+}
+
+/// What is found in a run of a scene, its beat hidden or not.
+fn found_in(scene: &str, hide_the_beat: bool) -> Vec<study::fit::Outcome> {
+    let mut field = field_of(&scene_of(scene));
+    if hide_the_beat {
+        field.inputs.beat_phase_rad.clear();
+    }
     fit(&field, analyze::Window::from(15.0))
+}
+
+fn reason<'a>(found: &'a [study::fit::Outcome], name: &str) -> &'a str {
+    let why = found.iter().flat_map(|f| f.as_ref().err());
+    let mut why = why.filter(|(n, _)| n == name);
+    why.next()
+        .map_or_else(|| panic!("{name}: {found:?}"), |(_, why)| why)
+}
+
+/// That an interval holds the truth and is no wider than `widest`.
+fn assert_holds(e: &Estimate, truth: f64, widest: f64) {
+    let [low, high] = e.interval;
+    assert!(
+        low <= truth && truth <= high && high - low < widest,
+        "{truth}: {e:?}"
+    );
+}
+
+#[test]
+fn nothing_is_fitted_across_a_hole() {
+    let mut field = field_of(&scene_of("music"));
+    for beat in ["recorded", "hidden"] {
+        // Four seconds of the build-up, where the pull shows, and a short hole.
+        let left = only(&field, |_, t| {
+            !(22.0..26.3).contains(&t) && !(40.0..40.2).contains(&t)
+        });
+        assert_eq!(study::fit::holes(&left).len(), 1);
+        let found = fit(&left, analyze::Window::from(15.0));
+        assert_holds(find(&found, "beat"), 2.1507, 1e-3);
+        assert_holds(find(&found, "pull"), 2.7, 0.05);
+        assert_holds(find(&found, "stiffness"), 3000.0, 2.5);
+        let whole = fit(&field, analyze::Window::from(15.0));
+        let (a, b) = (find(&whole, "pendulum"), find(&found, "pendulum"));
+        assert!(
+            (a.value / b.value - 1.0).abs() < 2e-3,
+            "{beat}: {a:?} {b:?}"
+        );
+        field.inputs.beat_phase_rad.clear();
+    }
+    assert!(study::fit::holes(&field).is_empty());
+    let mut quiet = field_of(&scene_of("baseline"));
+    quiet.inputs.beat_phase_rad.clear();
+    let left = only(&quiet, |_, t| !(30.0..30.5).contains(&t));
+    let found = fit(&left, analyze::Window::from(15.0));
+    assert!(reason(&found, "pull").contains("no pull shows"));
+}
+
+/// Noise is drawn at 30 Hz: at other rates neighbouring increments share some of it.
+#[test]
+fn the_recorder_s_rate_does_not_decide_whether_there_is_a_pull() {
+    for rate in [29, 31, 45, 100, 300] {
+        for hide in [false, true] {
+            let scene = format!("music log_rate_hz={rate}");
+            let own = sim::model::Model::new(&scene_of(&scene)).natural_rad_per_s()[0];
+            let found = found_in(&scene, hide);
+            println!("{rate} {hide} {found:?}");
+            assert_holds(find(&found, "pull"), 2.7, 0.08);
+            assert_holds(find(&found, "gait 1"), own / std::f64::consts::TAU, 0.03);
+            assert_holds(find(&found, "phase noise"), 0.01, 1.5e-3);
+        }
+    }
+}
+
+#[test]
+fn a_weak_coupling_is_seen_and_takes_no_frequency_along() {
+    let mut held = 0;
+    for seed in 201..209 {
+        let scene = scene_of(&format!(
+            "music effects.coupling.strength_rad_per_s=0.1 seed={seed}"
+        ));
+        let own = sim::model::Model::new(&scene).natural_rad_per_s().to_vec();
+        let found = fit(&field_of(&scene), analyze::Window::from(15.0));
+        for (c, w) in own.iter().enumerate() {
+            let e = find(&found, &format!("gait {}", c + 1));
+            let truth = w / std::f64::consts::TAU;
+            held += usize::from(e.interval[0] <= truth && truth <= e.interval[1]);
+            println!("{seed} {truth} {e:?}");
+        }
+        let coupling = found.iter().flatten().find(|e| e.name == "coupling");
+        println!("{coupling:?}");
+        if let Some(e) = coupling {
+            assert!((e.value - 0.1).abs() < 0.1, "{e:?}");
+        }
+    }
+    assert!(held >= 14, "{held} of 16");
+}
+
+#[test]
+fn a_beat_that_changes_its_tempo_has_none() {
+    let found = found_in("tempo-change", false);
+    assert!(
+        reason(&found, "beat").contains("changes its tempo, 2.05 to 2.30 Hz"),
+        "{found:?}"
+    );
+}
+
+/// 300 Hz and every tenth of its samples: the same pendulum.
+#[test]
+fn the_recorder_s_rate_is_not_in_the_pendulum() {
+    let field = field_of(&scene_of("music log_rate_hz=300 effects.noise.grid_hz=30"));
+    let fine = fit(&field, analyze::Window::from(15.0));
+    for (skip, off) in [(10, 2e-3), (15, 3e-3)] {
+        let left = only(&field, |k, _| k.is_multiple_of(skip));
+        let coarse = fit(&left, analyze::Window::from(15.0));
+        for name in ["pendulum", "roll damping"] {
+            let (a, b) = (find(&fine, name), find(&coarse, name));
+            println!("{skip} {a:?} {b:?}");
+            assert!(
+                b.interval[0] <= a.interval[1] && a.interval[0] <= b.interval[1],
+                "{a:?} {b:?}"
+            );
+        }
+        let (a, b) = (
+            find(&fine, "pendulum").value,
+            find(&coarse, "pendulum").value,
+        );
+        assert!((b / a - 1.0).abs() < off, "{a} {b}");
+    }
+}
+
+/// A roll that is pushed at 2 Hz by a load whose strongest line is another.
+#[test]
+fn a_roll_with_any_line_of_the_load_is_no_pendulum() {
+    let t_s: Vec<f64> = (0..1800).map(|k| f64::from(k) / 30.0).collect();
+    let wave = |hz: f64, of: f64| {
+        t_s.iter()
+            .map(move |t| of * (std::f64::consts::TAU * hz * t).sin())
+    };
+    let load = wave(4.0, 100.0)
+        .zip(wave(2.0, 60.0))
+        .map(|(a, b)| 600.0 + a + b);
+    let field = Field {
+        inputs: analyze::Inputs {
+            roll_rad: wave(2.0, 0.05).collect(),
+            normal_n: vec![load.collect()],
+            t_s: t_s.clone(),
+            ..analyze::Inputs::default()
+        },
+        ..Field::default()
+    };
+    let found = fit(&field, analyze::Window::ALL);
+    assert!(
+        reason(&found, "pendulum").contains("swings with the load (2.0"),
+        "{found:?}"
+    );
 }
 
 #[test]
@@ -313,7 +490,8 @@ fn field_twins_lie_within_their_intervals() {
     }
 }
 
-/// a = h/(I_xx + M h²) = 0.0480 ± 0.0005 and the beat 2.150 ± 0.002 Hz, in each of the archive's ten music logs.
+/// a = 0.0474 ± 0.0005 and the beat 2.150 ± 0.002 Hz, in each of the archive's ten music logs. (The second derivative of a spline through samples
+/// 33 ms apart is 1.3 % too large, and says 0.0480.)
 #[test]
 fn val_the_archives_pendulum_and_beat() {
     let archive =
@@ -355,6 +533,6 @@ fn val_the_archives_pendulum_and_beat() {
         );
     }
     assert_eq!(a.len(), 10);
-    assert!(a.iter().all(|a| (a - 0.0480).abs() < 0.0005), "{a:?}");
+    assert!(a.iter().all(|a| (a - 0.0474).abs() < 0.0005), "{a:?}");
     assert!(beat.iter().all(|f| (f - 2.150).abs() < 0.002), "{beat:?}");
 }

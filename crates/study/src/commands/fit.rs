@@ -6,8 +6,8 @@ use anyhow::Result;
 use serde_json::json;
 use sim::scene::load;
 use std::path::PathBuf;
-use study::fit::{Estimate, Field, Outcome, fit};
-use study::statistics::{student_975, summarise};
+use study::fit::{Estimate, Field, Outcome, fit, holes};
+use study::statistics::summarise;
 
 /// Arguments of `study fit`.
 #[derive(clap::Args)]
@@ -71,6 +71,9 @@ pub fn run(args: &Args) -> Result<Input> {
                 "study: {name}: {}; here clocks are left as they are: --put-clocks-right",
                 clock.trim_end_matches("; put right")
             );
+        }
+        for hole in holes(&field) {
+            recording::note!("study: {name}: {hole}");
         }
         if let Some(damage) = told.damage {
             recording::note!("study: {damage}");
@@ -156,7 +159,7 @@ fn common(all: &[(String, Vec<Outcome>)]) -> Vec<(Estimate, usize)> {
             if s.runs == 1 {
                 return Some((of().next()?.clone(), 1));
             }
-            let half = student_975(s.runs - 1) * s.sd / (s.runs as f64).sqrt();
+            let half = s.ci95?;
             let estimate = Estimate {
                 name: name.into(),
                 unit,

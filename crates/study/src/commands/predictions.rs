@@ -5,7 +5,7 @@ use anyhow::{Context, Result, bail};
 use indicatif::{ProgressBar, ProgressStyle};
 use std::path::PathBuf;
 use std::time::Instant;
-use study::predictions::{EXPERIMENTS, Finding, Lab, page, to_json};
+use study::predictions::{EXPERIMENTS, Finding, Lab, SEEDS, page, to_json};
 
 /// Arguments of `study predictions`.
 #[derive(clap::Args)]
@@ -14,12 +14,13 @@ pub struct Args {
     /// Only these experiments: locking, coherence, lever, harmonics, onsets, stability.
     names: Vec<String>,
     /// Seeds of every ensemble, from 1001 on.
-    #[arg(long, value_name = "N", default_value_t = 12, value_parser = clap::value_parser!(u64).range(2..=100_000))]
+    #[arg(long, value_name = "N", default_value_t = SEEDS, value_parser = clap::value_parser!(u64).range(2..=100_000))]
     seeds: u64,
     /// Threads; 0 is one per core. The result does not depend on it.
     #[arg(long, value_name = "N", default_value_t = 0)]
     jobs: usize,
-    /// A folder for predictions.md, predictions.json and the pictures (predictions/*.png).
+    /// A folder for predictions.md, predictions.json and the pictures (predictions/*.png), of the experiments that were run; what is there
+    /// of others is replaced.
     #[arg(long, value_name = "DIR")]
     out: Option<PathBuf>,
     /// What to print.
@@ -84,11 +85,9 @@ pub fn run(args: &Args) -> Result<()> {
                 figure.write(&pictures, stem).map_err(anyhow::Error::msg)?;
             }
         }
-        // One page for all; a part of them has no page.
-        if args.names.is_empty() {
-            let text = page(&findings, "predictions", args.seeds);
-            write_whole(&folder.join("predictions.md"), text.as_bytes())?;
-        }
+        // Page and numbers are of the same experiments, be they all or some.
+        let text = page(&findings, "predictions", args.seeds);
+        write_whole(&folder.join("predictions.md"), text.as_bytes())?;
         write_whole(&folder.join("predictions.json"), json.as_bytes())?;
     }
     match args.format {

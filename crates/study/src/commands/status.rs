@@ -24,7 +24,7 @@ pub fn run(args: &Args) -> Result<()> {
     let store = Store::new(&plan, &args.folder);
     let found = store.progress(Shard::WHOLE).map_err(|e| anyhow!(e))?;
     let parts = plan.blocks() - found.missing.len() as u64;
-    let merged = store.table().exists();
+    let merged = store.is_merged();
     // Neighbouring blocks that are missing, as stretches of runs.
     let mut gaps: Vec<(u64, u64)> = Vec::new();
     for block in &found.missing {
@@ -65,6 +65,12 @@ pub fn run(args: &Args) -> Result<()> {
                 );
             } else if merged {
                 text += &format!("  merged: {}\n", store.table().display());
+            }
+            if !merged && store.table().exists() {
+                text += &format!(
+                    "  {}: is not the table of this study; `study merge` replaces it\n",
+                    store.table().display()
+                );
             }
             text
         }

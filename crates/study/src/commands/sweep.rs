@@ -199,7 +199,7 @@ fn json(
         .map(|(name, range)| {
             let of = |end: &Option<(f64, _)>| end.as_ref().map(|(x, _)| *x);
             let entry = json!({
-                "lowest": of(&range.lowest), "highest": of(&range.highest), "points": range.points,
+                "lowest": of(&range.lowest), "highest": of(&range.highest), "points": range.points, "runs": range.runs,
             });
             (name.clone(), entry)
         })

@@ -1,12 +1,11 @@
 //! What the body feels: stiffness and damping at the handles, and the pendulum of its roll.
 
 use super::squares::{Block, bootstrapped, solve, unexplained};
-use super::{BLOCK_S, CARRIES, EDGE, Field, KEPT_S, Outcome, budgeted, pair};
+use super::{BLOCK_S, CARRIES, EDGE, Field, KEPT_S, Outcome, budgeted, even, pair};
 use analyze::imu::budget::Budget;
-use analyze::inputs::{Window, mean_step_s};
+use analyze::inputs::{Window, about_mean, mean_step_s};
 use analyze::mechanism::spline_derivatives;
 use analyze::spectrum::{Options, welch};
-use std::f64::consts::TAU;
 use std::ops::Range;
 
 /// Compression that changes by less is none, m.
@@ -16,9 +15,10 @@ const NOISE: f64 = 0.01;
 const RIGHT: f64 = 1e-4;
 /// Share of the roll's acceleration that may have another cause than a pendulum's.
 const OTHER: f64 = 0.5;
-/// A pendulum whose frequency is that of the load to this part is not told from a roll that is pushed.
-const NEAR: f64 = 0.3;
-/// Length of a segment in which the load's strongest line is looked for, s.
+/// A roll at whose line the load has this share of its own strongest line, in power, may be pushed by it. Ten thousandths and less where a load
+/// makes a pendulum swing at half its frequency, one where it pushes.
+const PUSHED: f64 = 0.05;
+/// Length of a segment in which lines are looked for, s.
 const LINE_S: f64 = 10.0;
 
 /// Stiffness and damping where contact is kept for a second and longer.
@@ -28,6 +28,7 @@ pub(super) fn contact(field: &Field) -> Result<Vec<Outcome>, String> {
         return Err("the compression of the handles is not recorded".into());
     }
     let step_s = mean_step_s(i.force_times()).ok_or("no forces")?;
+    let parts = even(i.force_times());
     // Of every `skip`-th sample: sums over blocks, all handles together.
     let sums = |skip: usize| {
         let step_s = step_s * skip as f64;
@@ -36,9 +37,11 @@ pub(super) fn contact(field: &Field) -> Result<Vec<Outcome>, String> {
         let mut blocks: Vec<Block<2>> = Vec::new();
         // The same with a damper that grows with the compression.
         let mut bent: Vec<Block<3>> = Vec::new();
-        for (normal, gap) in i.normal_n.iter().zip(&field.compression_m) {
-            let n: Vec<f64> = normal.iter().step_by(skip).copied().collect();
-            let d: Vec<f64> = gap.iter().step_by(skip).copied().collect();
+        let handles = i.normal_n.iter().zip(&field.compression_m);
+        for ((normal, gap), part) in handles.flat_map(|h| parts.iter().map(move |p| (h, p))) {
+            let thin =
+                |x: &[f64]| -> Vec<f64> { x[part.clone()].iter().step_by(skip).copied().collect() };
+            let (n, d) = (thin(normal), thin(gap));
             let mut from = 0;
             while from < n.len() {
                 let length = n[from..].iter().take_while(|x| **x > 0.0).count();
@@ -219,25 +222,46 @@ pub(super) fn pendulum(field: &Field, window: Window) -> Result<Vec<Outcome>, St
     if total.len() != i.t_s.len() || i.roll_rad.len() != i.t_s.len() {
         return Err("roll and forces are not recorded together".into());
     }
-    let step_s = mean_step_s(&i.t_s[range.clone()]).ok_or("no samples in the window")?;
+    let t_s = &i.t_s[range.clone()];
+    let step_s = mean_step_s(t_s).ok_or("no samples in the window")?;
     let (roll, total) = (&i.roll_rad[range.clone()], &total[range]);
     if roll.iter().chain(total).any(|x| !x.is_finite()) {
         return Err("roll or forces have gaps".into());
     }
-    let (rate, bend) = spline_derivatives(roll, step_s).ok_or("too few samples in the window")?;
-    let per_block = (BLOCK_S / step_s).round().max(1.0) as usize;
-    let mut blocks: Vec<Block<2>> = Vec::new();
-    for k in EDGE..roll.len().saturating_sub(EDGE) {
-        if (k - EDGE).is_multiple_of(per_block) {
-            blocks.push(Block::empty());
+    let parts = even(t_s);
+    // Of every `skip`-th sample of each part.
+    let blocks = |skip: usize| {
+        let step_s = step_s * skip as f64;
+        let per_block = (BLOCK_S / step_s).round().max(1.0) as usize;
+        let mut blocks: Vec<Block<2>> = Vec::new();
+        for part in &parts {
+            let at: Vec<usize> = part.clone().step_by(skip).collect();
+            let angle: Vec<f64> = at.iter().map(|k| roll[*k]).collect();
+            let Some((rate, _)) = spline_derivatives(&angle, step_s) else {
+                continue;
+            };
+            let pull: Vec<f64> = at.iter().map(|k| -total[*k] * roll[*k].sin()).collect();
+            let braked: Vec<f64> = rate.iter().map(|r| -r).collect();
+            for k in EDGE..at.len().saturating_sub(EDGE) {
+                if (k - EDGE).is_multiple_of(per_block) {
+                    blocks.push(Block::empty());
+                }
+                if let Some(block) = blocks.last_mut() {
+                    let bend = angle[k - 1] - 2.0 * angle[k] + angle[k + 1];
+                    let x = [numerov(&pull, k), numerov(&braked, k)];
+                    block.add(x, bend / (step_s * step_s));
+                }
+            }
         }
-        if let Some(block) = blocks.last_mut() {
-            block.add([-total[k] * roll[k].sin(), -rate[k]], bend[k]);
-        }
+        blocks
+    };
+    let fine = blocks(1);
+    if fine.is_empty() {
+        return Err("too few samples in the window".into());
     }
     let (value, interval) =
-        bootstrapped(&blocks, |p| [p[0], p[1]]).ok_or("the roll does not move")?;
-    let other = unexplained(&blocks).unwrap_or(1.0);
+        bootstrapped(&fine, |p| [p[0], p[1]]).ok_or("the roll does not move")?;
+    let other = unexplained(&fine).unwrap_or(1.0);
     if other > OTHER {
         return Err(format!(
             "the roll does not swing as a pendulum: {:.0} % of its acceleration has another cause",
@@ -245,15 +269,28 @@ pub(super) fn pendulum(field: &Field, window: Window) -> Result<Vec<Outcome>, St
         ));
     }
     // Any roll that is pushed at one frequency is θ̈ ∝ −θ, and would pass for a pendulum of that frequency.
-    let mean_n = total.iter().sum::<f64>() / total.len() as f64;
-    let own_hz = (value[0] * mean_n).max(0.0).sqrt() / TAU;
-    let load_hz = welch(total, 1.0 / step_s, &Options::seconds(LINE_S, 1.0 / step_s))
+    let line = |x: &[f64]| {
+        let (about, step_s) = about_mean(t_s, x)?;
+        welch(
+            &about,
+            1.0 / step_s,
+            &Options::seconds(LINE_S, 1.0 / step_s),
+        )
         .ok()
-        .and_then(|s| s.peak_hz());
-    if let Some(load_hz) = load_hz.filter(|f| (own_hz / f - 1.0).abs() < NEAR) {
-        return Err(format!(
-            "the roll swings with the load ({load_hz:.2} Hz), and what is pushed at one frequency does not tell its own"
-        ));
+    };
+    if let (Some(roll), Some(load)) = (line(roll), line(total)) {
+        let roll_hz = roll.peak_hz().unwrap_or(0.0);
+        let near = |hz: f64| (hz - roll_hz).abs() < 2.5 / LINE_S;
+        let strongest = |near: &dyn Fn(f64) -> bool| {
+            let lines = load.hz.iter().zip(&load.power);
+            let lines = lines.filter(|(hz, _)| **hz > 0.5 / LINE_S && near(**hz));
+            lines.map(|(_, power)| *power).fold(0.0, f64::max)
+        };
+        if strongest(&near) > PUSHED * strongest(&|_| true) {
+            return Err(format!(
+                "the roll swings with the load ({roll_hz:.2} Hz), and what is pushed at one frequency does not tell its own"
+            ));
+        }
     }
     if interval[1][1] < 0.0 {
         return Err(format!(
@@ -261,6 +298,17 @@ pub(super) fn pendulum(field: &Field, window: Window) -> Result<Vec<Outcome>, St
             value[1]
         ));
     }
+    let coarse = solve(&blocks(2), |k| k).map_or(value, |p| [p[0], p[1]]);
+    let interval = std::array::from_fn(|p| {
+        let sampling = (coarse[p] - value[p]).abs();
+        [interval[p][0] - sampling, interval[p][1] + sampling]
+    });
     let names = [("pendulum", "1/(kg·m)"), ("roll damping", "1/s")];
     Ok(pair(names, value, interval))
+}
+
+/// What a second difference over h² is of `bend`, the second derivative: (θ_{k−1} − 2θ_k + θ_{k+1})/h² = (θ̈_{k−1} + 10 θ̈_k + θ̈_{k+1})/12 + O(h⁴).
+/// Source: Numerov, Mon. Not. R. Astron. Soc. 84 (1924) 592.
+fn numerov(bend: &[f64], k: usize) -> f64 {
+    (bend[k - 1] + 10.0 * bend[k] + bend[k + 1]) / 12.0
 }

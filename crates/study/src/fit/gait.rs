@@ -1,13 +1,15 @@
 //! What the carriers do: beat, pull, frequencies, amplitudes.
 
 use super::squares::{Block, bootstrapped};
-use super::{BLOCK_S, Estimate, Field, Outcome, budgeted, estimate};
+use super::{BLOCK_S, Estimate, Field, Outcome, budgeted, estimate, unwrapped};
 use analyze::beat::adler::Adler;
 use analyze::imu::budget::Budget;
-use analyze::inputs::{Inputs, Window, interpolate, mean_step_s};
-use analyze::phase::unwrap;
+use analyze::inputs::{
+    Inputs, Window, between, longest_step_s, mean_step_in, mean_step_s, stretches,
+};
 use nalgebra::{DMatrix, DVector};
-use std::f64::consts::TAU;
+use std::f64::consts::{PI, TAU};
+use std::ops::Range;
 
 /// Beat, pull and the carriers' own frequencies.
 pub(super) fn gait(field: &Field) -> Result<Vec<Outcome>, String> {
@@ -23,60 +25,102 @@ pub(super) fn gait(field: &Field) -> Result<Vec<Outcome>, String> {
     if i.phases_are_measured {
         return gait_from_steps(i, from);
     }
-    let heard: Vec<f64> = i.beat_phase_rad.iter().skip(from).copied().collect();
-    let phases: Vec<Vec<f64>> = i.phase_rad.iter().map(|p| unwrap(&p[from..])).collect();
+    let phases: Vec<Vec<f64>> = i.phase_rad.iter().map(|p| unwrapped(&p[from..])).collect();
     if phases.iter().flatten().any(|p| !p.is_finite()) {
         return Err("phases have gaps".into());
     }
     let t_s = &t_s[from..];
+    let mut heard: Vec<f64> = i.beat_phase_rad.iter().skip(from).copied().collect();
+    heard.resize(t_s.len(), f64::NAN);
     let grown = t_s.iter().map(|t| match field.build_up_s {
         0.0 => 1.0,
         tau => 1.0 - (-(t - field.onset_s) / tau).exp(),
     });
-    let problem = Increments {
+    let whole = Increments {
         t_s: t_s.to_vec(),
         phases,
+        heard,
         grown: grown.collect(),
+        parts: stretches(t_s, 0.0),
     };
-    let solved = |problem: &Increments, heard: &[f64]| match known(heard) {
-        true => problem.under_a_beat(heard),
-        false => problem.under_a_hidden_beat(),
-    };
-    let found = solved(&problem, &heard)?;
-    let every_other: Vec<f64> = heard.iter().step_by(2).copied().collect();
-    let coarse = (known(&every_other) == known(&heard))
-        .then(|| solved(&problem.every_other(), &every_other).ok())
-        .flatten();
-    problem.told(found, coarse.map(|c| c.answer))
+    // Noise that was drawn for a coarser clock than the recorder's goes on from one increment to the next: thinned until it does not.
+    let step_s = whole.step_s().ok_or("no phases follow each other")?;
+    let coarsest = ((COARSEST_S / step_s) as usize).max(1);
+    let mut last = Err(APART.to_owned());
+    for skip in 1..=coarsest {
+        let problem = whole.thinned(skip);
+        if skip > 1 && problem.t_s.len() < 100 {
+            break;
+        }
+        let found = problem.solved()?;
+        let white = found.is_white(step_s * skip as f64);
+        last = problem.told(found);
+        if white {
+            break;
+        }
+    }
+    last
 }
+
+/// Phases are thinned to steps of at most this, s: a coarser clock of noise would show in the gait itself.
+const COARSEST_S: f64 = 0.1;
 
 /// Whether the beat was recorded for long enough.
 fn known(heard: &[f64]) -> bool {
     heard.iter().filter(|psi| psi.is_finite()).count() >= 100
 }
 
-/// Phases of the carriers after the onset of the music, and how far its pull has grown.
+/// Phases of the carriers after the onset of the music, the beat's, and how far its pull has grown.
 struct Increments {
     t_s: Vec<f64>,
     phases: Vec<Vec<f64>>,
+    /// NaN where nobody recorded it.
+    heard: Vec<f64>,
     grown: Vec<f64>,
+    /// The parts between holes: no increment spans one.
+    parts: Vec<Range<usize>>,
 }
 
-/// The pull, as parts that go with the sine and the cosine of the beat, rad/s; the own frequencies, rad/s.
+/// The pull, as parts that go with the sine and the cosine of the beat, rad/s; the own frequencies, rad/s; how the carriers pull each
+/// other, rad/s.
 #[derive(Clone)]
 struct Drive {
     a: f64,
     b: f64,
     own: Vec<f64>,
+    coupling: f64,
 }
 
-/// What came out; pull and own frequencies (rad/s) with their variances.
+impl Drive {
+    fn alone(rate: f64, carriers: usize) -> Self {
+        Self {
+            a: 0.0,
+            b: 0.0,
+            own: vec![rate; carriers],
+            coupling: 0.0,
+        }
+    }
+
+    /// After a step in all unknowns.
+    fn after(&self, step: &DVector<f64>, part: f64) -> Self {
+        let own = self.own.iter().enumerate();
+        Self {
+            a: self.a + part * step[0],
+            b: self.b + part * step[1],
+            own: own.map(|(c, w)| w + part * step[FIRST_OWN + c]).collect(),
+            coupling: self.coupling + part * step[FIRST_OWN + self.own.len()],
+        }
+    }
+}
+
+/// What came out; pull, own frequencies and coupling (rad/s) with their variances.
 struct Answer {
     beat: Outcome,
     /// Of the beat, rad/s.
     rate: f64,
     pull: (f64, f64),
     own: Vec<(f64, f64)>,
+    coupling: (f64, f64),
 }
 
 /// An answer, the problem about it, and how many unknowns it had.
@@ -86,7 +130,16 @@ struct Solved {
     unknowns: usize,
 }
 
-/// A linear problem about a drive. Unknowns: A, B, Ω, ω_1 …
+impl Solved {
+    /// Whether what is missed looks like noise: the one increment says nothing of the next. What is missed next to nothing of need not.
+    fn is_white(&self, dt: f64) -> bool {
+        let n = &self.normal;
+        let missed = (n.squares / (n.rows as f64 * dt)).sqrt();
+        n.likeness().abs() < ALIKE || missed < 0.01 * self.answer.pull.0.abs()
+    }
+}
+
+/// A linear problem about a drive. Unknowns: A, B, Ω, ω_1 … ω_N, K_c.
 struct Normal {
     gram: DMatrix<f64>,
     right: DVector<f64>,
@@ -99,38 +152,91 @@ struct Normal {
     rows: usize,
 }
 
+/// Place of ω_1 among the unknowns.
+const FIRST_OWN: usize = 3;
+
 impl Normal {
-    /// Variance of the phase noise, rad²/s.
-    fn variance(&self, unknowns: usize) -> f64 {
-        self.squares / (self.rows - unknowns) as f64
+    /// How alike neighbouring increments of what is missed are, −1 … 1.
+    fn likeness(&self) -> f64 {
+        self.with_next / self.squares
     }
 
-    /// Whether what is missed looks like noise: the one increment says nothing of the next. What is missed next to nothing of need not.
-    fn is_white(&self, pull: f64, dt: f64) -> bool {
-        let likeness = self.with_next / self.squares;
-        let missed = (self.squares / (self.rows as f64 * dt)).sqrt();
-        likeness.abs() < ALIKE || missed < 0.01 * pull
+    /// By how much what neighbours share makes noise over a long time stronger than over one increment: where the recorder's clock is not the noise's,
+    /// a step of the one lies in two of the other. 1 where they share no more than chance has it.
+    fn shared(&self) -> f64 {
+        let likeness = self.likeness();
+        match likeness > 3.0 / (self.rows as f64).sqrt() {
+            true => 1.0 + 2.0 * likeness.min(ALIKE),
+            false => 1.0,
+        }
+    }
+
+    /// Variance of the phase noise, rad²/s.
+    fn variance(&self, unknowns: usize) -> f64 {
+        self.shared() * self.squares / (self.rows - unknowns) as f64
+    }
+
+    /// Gauss and Newton's step in the unknowns at `keep`, 0 in the others.
+    fn step(&self, keep: &[usize]) -> Option<DVector<f64>> {
+        let gram = self.gram.select_rows(keep).select_columns(keep);
+        let found = gram.lu().solve(&self.right.select_rows(keep))?;
+        let mut step = DVector::zeros(self.right.len());
+        keep.iter().zip(&found).for_each(|(k, x)| step[*k] = *x);
+        Some(step)
+    }
+
+    /// Covariance of the unknowns at `keep`, 0 elsewhere.
+    fn cover(&self, keep: &[usize]) -> Option<DMatrix<f64>> {
+        let gram = self.gram.select_rows(keep).select_columns(keep);
+        let found = gram.try_inverse()? * self.variance(keep.len());
+        let size = self.right.len();
+        let mut cover = DMatrix::zeros(size, size);
+        for (i, row) in keep.iter().enumerate() {
+            for (j, column) in keep.iter().enumerate() {
+                cover[(*row, *column)] = found[(i, j)];
+            }
+        }
+        Some(cover)
     }
 }
 
 /// Likeness of neighbouring residuals that white noise does not show.
 const ALIKE: f64 = 0.2;
-/// A pull that is not so many standard errors is none: the best of many frequencies has some by chance.
+/// A pull or a coupling that is not so many standard errors is none: the best of many frequencies has some by chance.
 const SURE: f64 = 6.0;
 
 impl Increments {
-    /// The same at half the rate: what comes out differently is what the sampling does.
-    fn every_other(&self) -> Self {
-        let thin = |x: &Vec<f64>| x.iter().step_by(2).copied().collect();
+    /// Every `skip`-th sample of each part.
+    fn thinned(&self, skip: usize) -> Self {
+        let (mut kept, mut parts) = (Vec::new(), Vec::new());
+        for part in &self.parts {
+            let start = kept.len();
+            kept.extend(part.clone().step_by(skip));
+            parts.push(start..kept.len());
+        }
+        let thin = |x: &Vec<f64>| kept.iter().map(|k| x[*k]).collect();
         Self {
             t_s: thin(&self.t_s),
             phases: self.phases.iter().map(thin).collect(),
+            heard: thin(&self.heard),
             grown: thin(&self.grown),
+            parts,
         }
     }
 
+    /// Mean step within the parts, s.
+    fn step_s(&self) -> Option<f64> {
+        mean_step_in(&self.t_s, &self.parts)
+    }
+
+    /// The later end of every increment.
+    fn ends(&self) -> Vec<usize> {
+        let ends = |part: &Range<usize>| part.clone().skip(1);
+        self.parts.iter().flat_map(ends).collect()
+    }
+
     fn unknowns(&self) -> usize {
-        3 + self.phases.len()
+        FIRST_OWN + self.phases.len() + 1
     }
 
     /// Rates of all increments, linear in the unknowns about `drive`, under a beat whose phase at sample k is `psi(k)` and whose phase turns with
@@ -151,88 +257,109 @@ impl Increments {
             rows: 0,
         };
         let (a, b) = (drive.a, drive.b);
+        let carriers = self.phases.len();
         let mut row = DVector::<f64>::zeros(size);
-        for (c, phase) in self.phases.iter().enumerate() {
-            let mut before = 0.0;
-            for k in 1..self.t_s.len() {
-                let dt = self.t_s[k] - self.t_s[k - 1];
-                let rate = (phase[k] - phase[k - 1]) / dt;
+        for part in &self.parts {
+            let mut before = vec![0.0; carriers];
+            for k in part.clone().skip(1) {
                 if !(psi(k - 1) + psi(k)).is_finite() {
-                    before = 0.0;
+                    before.fill(0.0);
                     continue;
                 }
-                let (mut s, mut co, mut turn, mut back) = (0.0, 0.0, 0.0, 0.0);
-                // At the end of the increment the phase that is to be expected from its beginning. The one that was observed holds the
+                let dt = self.t_s[k] - self.t_s[k - 1];
+                // At the end of the increment the phases that are to be expected from its beginning. Those that were observed hold the
                 // increment's own noise, which on both sides took half of a pull of 2.7 rad/s away at 0.3 rad/√s.
-                let mut off = 0.0;
-                for j in [k - 1, k] {
-                    let (sin, cos) = (psi(j) - phase[j] + off).sin_cos();
-                    let m = self.grown[j];
-                    s += 0.5 * m * sin;
-                    co += 0.5 * m * cos;
-                    let held = 0.5 * m * (a * cos - b * sin);
-                    turn += held * turn_s(j);
-                    back += held;
-                    off = (rate - drive.own[c] - m * (a * sin + b * cos)) * dt;
+                let begun: Vec<f64> = self.phases.iter().map(|p| p[k - 1]).collect();
+                let beside = others(&begun);
+                let expected = (0..carriers).map(|c| {
+                    let (sin, cos) = (psi(k - 1) - begun[c]).sin_cos();
+                    let pull = self.grown[k - 1] * (a * sin + b * cos);
+                    begun[c] + (drive.own[c] + pull + drive.coupling * beside[c]) * dt
+                });
+                let expected: Vec<f64> = expected.collect();
+                let beside_then = others(&expected);
+                for c in 0..carriers {
+                    let rate = (self.phases[c][k] - begun[c]) / dt;
+                    let (mut s, mut co, mut turn, mut back) = (0.0, 0.0, 0.0, 0.0);
+                    for (j, phase) in [(k - 1, begun[c]), (k, expected[c])] {
+                        let (sin, cos) = (psi(j) - phase).sin_cos();
+                        let m = self.grown[j];
+                        s += 0.5 * m * sin;
+                        co += 0.5 * m * cos;
+                        let held = 0.5 * m * (a * cos - b * sin);
+                        turn += held * turn_s(j);
+                        back += held;
+                    }
+                    let mutual = 0.5 * (beside[c] + beside_then[c]);
+                    row.fill(0.0);
+                    (row[0], row[1], row[2]) = (s, co, turn);
+                    (row[FIRST_OWN + c], row[size - 1]) = (1.0, mutual);
+                    let miss = rate - drive.own[c] - a * s - b * co - drive.coupling * mutual;
+                    // Increments over dt have variance σ²/dt: weight dt, the same for an even clock.
+                    out.gram.ger(dt, &row, &row, 1.0);
+                    out.right.axpy(dt * miss, &row, 1.0);
+                    out.squares += dt * miss * miss;
+                    out.with_next += before[c] * dt.sqrt() * miss;
+                    before[c] = dt.sqrt() * miss;
+                    // Less what the pull takes back of the noise within dt.
+                    out.kept += (1.0 - back * dt).max(0.1);
+                    out.rows += 1;
                 }
-                row.fill(0.0);
-                (row[0], row[1], row[2], row[3 + c]) = (s, co, turn, 1.0);
-                let miss = rate - drive.own[c] - a * s - b * co;
-                // Increments over dt have variance σ²/dt: weight dt, the same for an even clock.
-                out.gram.ger(dt, &row, &row, 1.0);
-                out.right.axpy(dt * miss, &row, 1.0);
-                out.squares += dt * miss * miss;
-                out.with_next += before * dt.sqrt() * miss;
-                before = dt.sqrt() * miss;
-                // Less what the pull takes back of the noise within dt.
-                out.kept += (1.0 - back * dt).max(0.1);
-                out.rows += 1;
             }
         }
         out
     }
 
+    /// The answer, under a recorded beat or one that is looked for, with a coupling where there is one.
+    fn solved(&self) -> Result<Solved, String> {
+        let alone = self.solved_with(false)?;
+        if self.phases.len() < 2 {
+            return Ok(alone);
+        }
+        Ok(match self.solved_with(true) {
+            Ok(coupled) if coupled.answer.is_coupled() => coupled,
+            _ => alone,
+        })
+    }
+
+    fn solved_with(&self, coupled: bool) -> Result<Solved, String> {
+        match known(&self.heard) {
+            true => self.under_a_beat(coupled),
+            false => self.under_a_hidden_beat(coupled),
+        }
+    }
+
+    /// The unknowns that are looked for.
+    fn wanted(&self, coupled: bool, of_beat: &[usize]) -> Vec<usize> {
+        let last = self.unknowns() - 1;
+        let rest = (FIRST_OWN..last).chain(coupled.then_some(last));
+        of_beat.iter().copied().chain(rest).collect()
+    }
+
     /// Where the beat was recorded: everything but its tempo is linear.
-    fn under_a_beat(&self, heard: &[f64]) -> Result<Solved, String> {
-        let (t_s, psi) = longest_heard(&self.t_s, heard).ok_or("no beat")?;
-        let (omega, omega_half) = tempo(&t_s, &unwrap(&psi));
-        let carriers = self.phases.len();
-        // Of the unknowns A and the own frequencies.
-        let keep: Vec<usize> = std::iter::once(0).chain(3..3 + carriers).collect();
-        let psi = |k: usize| heard[k];
-        let mut drive = Drive {
-            a: 0.0,
-            b: 0.0,
-            own: vec![omega; carriers],
-        };
+    fn under_a_beat(&self, coupled: bool) -> Result<Solved, String> {
+        let (t_s, psi) = longest_heard(&self.t_s, &self.heard).ok_or("no beat")?;
+        let tempo = Tempo::of(&t_s, &unwrapped(&psi));
+        let keep = self.wanted(coupled, &[0]);
+        let psi = |k: usize| self.heard[k];
         let no_tempo = |_: usize| 0.0;
+        let mut drive = Drive::alone(tempo.rate, self.phases.len());
         for _ in 0..50 {
-            let found = self.normal(psi, no_tempo, &drive);
-            let gram = found.gram.select_rows(&keep).select_columns(&keep);
-            let step = gram
-                .lu()
-                .solve(&found.right.select_rows(&keep))
-                .ok_or(APART)?;
-            drive.a += step[0];
-            drive
-                .own
-                .iter_mut()
-                .enumerate()
-                .for_each(|(c, w)| *w += step[1 + c]);
+            let step = self.normal(psi, no_tempo, &drive).step(&keep);
+            let step = step.ok_or(APART)?;
+            drive = drive.after(&step, 1.0);
             if step.norm() < 1e-10 {
                 break;
             }
         }
         let found = self.normal(psi, no_tempo, &drive);
-        let variance = found.variance(keep.len());
-        let gram = found.gram.select_rows(&keep).select_columns(&keep);
-        let cover = gram.try_inverse().ok_or(APART)? * variance;
-        let own = drive.own.into_iter().enumerate();
+        let cover = found.cover(&keep).ok_or(APART)?;
         let answer = Answer {
-            beat: estimate("beat", "Hz", omega / TAU, omega_half / TAU),
-            rate: omega,
+            beat: tempo.told(),
+            rate: tempo.rate,
             pull: (drive.a, cover[(0, 0)]),
-            own: own.map(|(c, w)| (w, cover[(1 + c, 1 + c)])).collect(),
+            own: own_of(&drive, &cover),
+            coupling: coupling_of(&drive, &cover),
         };
         Ok(Solved {
             answer,
@@ -242,60 +369,43 @@ impl Increments {
     }
 
     /// Where nobody recorded the beat: its tempo and phase are looked for.
-    fn under_a_hidden_beat(&self) -> Result<Solved, String> {
+    fn under_a_hidden_beat(&self, coupled: bool) -> Result<Solved, String> {
         let (t_s, phases) = (&self.t_s, &self.phases);
-        let (n, carriers, size) = (t_s.len(), phases.len(), self.unknowns());
+        let (n, carriers) = (t_s.len(), phases.len());
         let middle = 0.5 * (t_s[0] + t_s[n - 1]);
         let from_middle = |k: usize| t_s[k] - middle;
         let normal =
             |omega: f64, drive: &Drive| self.normal(|k| omega * from_middle(k), from_middle, drive);
         // In the last third the carriers follow the beat if they ever do: where the search begins.
-        let third = 2 * n / 3;
-        let span = t_s[n - 1] - t_s[third];
-        let mean = phases
-            .iter()
-            .map(|p| (p[n - 1] - p[third]) / span)
-            .sum::<f64>()
-            / carriers as f64;
+        let ends = self.ends();
+        let late = &ends[2 * ends.len() / 3..];
+        let over = |x: &[f64]| late.iter().map(|k| x[*k] - x[k - 1]).sum::<f64>();
+        let mean = phases.iter().map(|p| over(p)).sum::<f64>() / over(t_s) / carriers as f64;
+        let span = t_s[n - 1] - t_s[*late.first().ok_or(APART)?];
         // Where in its turn the beat is, and how strong: a coarse look before the descent.
-        let alone = Drive {
-            a: 0.0,
-            b: 0.0,
-            own: vec![mean; carriers],
-        };
+        let alone = Drive::alone(mean, carriers);
         let mut best = (f64::INFINITY, mean, alone.clone());
+        // Without Ω the problem is linear.
+        let keep = self.wanted(coupled, &[0, 1]);
         for step in -20..=20 {
             let omega: f64 = mean + f64::from(step) * 0.25 / span;
-            let found = normal(omega, &alone);
-            // Without Ω the problem is linear.
-            let keep: Vec<usize> = (0..size).filter(|k| *k != 2).collect();
-            let small = found.gram.select_rows(&keep).select_columns(&keep);
-            let Some(x) = small.lu().solve(&found.right.select_rows(&keep)) else {
+            let Some(step) = normal(omega, &alone).step(&keep) else {
                 continue;
             };
-            let drive = Drive {
-                a: x[0],
-                b: x[1],
-                own: (0..carriers).map(|c| mean + x[2 + c]).collect(),
-            };
+            let drive = alone.after(&step, 1.0);
             let squares = normal(omega, &drive).squares;
             if squares < best.0 {
                 best = (squares, omega, drive);
             }
         }
         let (mut squares, mut omega, mut drive) = best;
+        let keep = self.wanted(coupled, &[0, 1, 2]);
         for _ in 0..50 {
-            let found = normal(omega, &drive);
-            let step = found.gram.lu().solve(&found.right).ok_or(APART)?;
+            let step = normal(omega, &drive).step(&keep).ok_or(APART)?;
             // Half steps until it is better: far from the answer the beat's frequency overshoots.
             let mut part = 1.0;
             loop {
-                let own = drive.own.iter().enumerate();
-                let new = Drive {
-                    a: drive.a + part * step[0],
-                    b: drive.b + part * step[1],
-                    own: own.map(|(c, w)| w + part * step[3 + c]).collect(),
-                };
+                let new = drive.after(&step, part);
                 let new_omega = omega + part * step[2];
                 let found = normal(new_omega, &new).squares;
                 if found <= squares || part < 1e-3 {
@@ -309,76 +419,120 @@ impl Increments {
             }
         }
         let found = normal(omega, &drive);
-        let cover = found.gram.clone().try_inverse().ok_or(APART)? * found.variance(size);
+        let cover = found.cover(&keep).ok_or(APART)?;
         let pull = drive.a.hypot(drive.b);
         let (ca, cb) = (drive.a / pull, drive.b / pull);
         let pull_variance =
             ca * ca * cover[(0, 0)] + 2.0 * ca * cb * cover[(0, 1)] + cb * cb * cover[(1, 1)];
-        let own = drive.own.into_iter().enumerate();
         let answer = Answer {
             beat: estimate("beat", "Hz", omega / TAU, half(cover[(2, 2)]) / TAU),
             rate: omega,
             pull: (pull, pull_variance),
-            own: own.map(|(c, w)| (w, cover[(3 + c, 3 + c)])).collect(),
+            own: own_of(&drive, &cover),
+            coupling: coupling_of(&drive, &cover),
         };
         Ok(Solved {
             answer,
             normal: found,
-            unknowns: size,
+            unknowns: keep.len(),
         })
     }
 
-    /// Everything that was found, or why it is nothing. `coarse` came of every other sample.
-    fn told(&self, found: Solved, coarse: Option<Answer>) -> Result<Vec<Outcome>, String> {
+    /// Everything that was found, or why it is nothing.
+    fn told(&self, found: Solved) -> Result<Vec<Outcome>, String> {
+        let step_s = self.step_s().ok_or(APART)?;
+        let white = found.is_white(step_s);
         let Solved {
             answer,
             normal: found,
             unknowns,
         } = found;
-        let step_s = (self.t_s[self.t_s.len() - 1] - self.t_s[0]) / (self.t_s.len() - 1) as f64;
         let (pull, pull_variance) = answer.pull;
+        if !white {
+            return Err(format!(
+                "the phases do not follow one beat: what it leaves of one increment is like the next (by {:.2})",
+                found.likeness()
+            ));
+        }
         // What the mean of both ends of an increment is off, where a carrier runs at another rate than the beat.
         let off = |w: f64| pull * ((w - answer.rate) * step_s).powi(2) / 12.0;
         let rough = answer.own.iter().map(|(w, _)| off(*w)).fold(0.0, f64::max);
-        // A mean of both ends errs with the square of the step: every other sample by four times as much, so half of what that changes
-        // is one and a half times the error.
-        let sampling = |of: &dyn Fn(&Answer) -> f64| {
-            coarse
-                .as_ref()
-                .map_or(0.0, |c| 0.5 * (of(c) - of(&answer)).abs())
+        // The same in other ways. A mean of both ends errs with the square of the step: every other sample by four times as much, so half
+        // of what that changes is one and a half times the error. A coupling too weak to show is in what allowing for one changes.
+        let coupled = answer.coupling.1 > 0.0;
+        let sparse = self.thinned(2);
+        let coarse = (known(&sparse.heard) == known(&self.heard))
+            .then(|| sparse.solved_with(coupled).ok())
+            .flatten();
+        let allowed = (!coupled && self.phases.len() > 1)
+            .then(|| self.solved_with(true).ok())
+            .flatten();
+        let other_ways = |of: &dyn Fn(&Answer) -> f64| {
+            let by = |other: &Option<Solved>| {
+                let other = other.as_ref();
+                other.map_or(0.0, |s| (of(&s.answer) - of(&answer)).abs())
+            };
+            0.5 * by(&coarse) + by(&allowed)
         };
-        let pull_sampling = sampling(&|a| a.pull.0);
-        let own_sampling: Vec<f64> = (0..answer.own.len())
-            .map(|c| sampling(&|a| a.own[c].0))
-            .collect();
         let by_chance = half(pull_variance).hypot(rough);
-        let pull_half = by_chance + pull_sampling;
-        if !found.is_white(pull.abs(), step_s) {
-            return Err(format!(
-                "the phases do not follow one beat: what it leaves of one increment is like the next (by {:.2})",
-                found.with_next / found.squares
-            ));
-        }
+        let pull_half = by_chance + other_ways(&|a| a.pull.0);
         if !(pull > SURE / 1.96 * by_chance) {
             return Err(format!(
                 "no pull shows in the phases (at most {:.2} rad/s)",
                 pull.max(0.0) + pull_half
             ));
         }
+        let own_half: Vec<f64> = (0..answer.own.len())
+            .map(|c| half(answer.own[c].1) + other_ways(&|a| a.own[c].0))
+            .collect();
+        let coupling_half = half(answer.coupling.1) + other_ways(&|a| a.coupling.0);
         let mut out = vec![answer.beat, estimate("pull", "rad/s", pull, pull_half)];
-        for (c, (w, variance)) in answer.own.into_iter().enumerate() {
+        for (c, ((w, _), half)) in answer.own.into_iter().zip(own_half).enumerate() {
             let name = format!("gait {}", c + 1);
-            let half = half(variance) + own_sampling[c];
             out.push(estimate(name, "Hz", w / TAU, half / TAU));
         }
-        // The noise: its variance has itself a known spread.
+        if coupled {
+            let name = "coupling";
+            out.push(estimate(name, "rad/s", answer.coupling.0, coupling_half));
+        }
+        // The noise: its variance has itself a known spread; what neighbours share has twice that of its own.
         let rows = found.rows as f64;
         let sigma = (found.variance(unknowns) * rows / found.kept).sqrt();
-        let count = rows - unknowns as f64;
+        let count = (rows - unknowns as f64) / if found.shared() > 1.0 { 3.0 } else { 1.0 };
         let spread = 1.96 * sigma / (2.0 * count).sqrt();
         out.push(estimate("phase noise", "rad/√s", sigma, spread));
         Ok(out)
     }
+}
+
+impl Answer {
+    fn is_coupled(&self) -> bool {
+        let (coupling, variance) = self.coupling;
+        coupling.abs() > SURE * variance.sqrt()
+    }
+}
+
+/// Own frequencies with their variances.
+fn own_of(drive: &Drive, cover: &DMatrix<f64>) -> Vec<(f64, f64)> {
+    let own = drive.own.iter().enumerate();
+    let variance = |c: usize| cover[(FIRST_OWN + c, FIRST_OWN + c)];
+    own.map(|(c, w)| (*w, variance(c))).collect()
+}
+
+/// The coupling with its variance, 0 where none was looked for.
+fn coupling_of(drive: &Drive, cover: &DMatrix<f64>) -> (f64, f64) {
+    let last = cover.nrows() - 1;
+    (drive.coupling, cover[(last, last)])
+}
+
+/// (1/N) Σ_j sin(φ_j − φ_c) for every c: what the others do to a carrier who minds them all.
+fn others(phases: &[f64]) -> Vec<f64> {
+    let n = phases.len() as f64;
+    let (s, c) = phases
+        .iter()
+        .fold((0.0, 0.0), |(s, c), p| (s + p.sin(), c + p.cos()));
+    let of = |p: &f64| (s * p.cos() - c * p.sin()) / n;
+    phases.iter().map(of).collect()
 }
 
 /// Why beat and gait give no answer.
@@ -401,8 +555,7 @@ fn gait_from_steps(i: &Inputs, from: usize) -> Result<Vec<Outcome>, String> {
     let (t_s, psi) = heard
         .filter(|(t_s, _)| t_s.len() >= 100)
         .ok_or("too few beats after the onset of the music")?;
-    let (omega, half) = tempo(&t_s, &unwrap(&psi));
-    let mut out = vec![estimate("beat", "Hz", omega / TAU, half / TAU)];
+    let mut out = vec![Tempo::of(&t_s, &unwrapped(&psi)).told()];
     match Adler::of(i) {
         Ok(found) => {
             let interval = found.pull_ci95_rad_per_s;
@@ -440,31 +593,75 @@ fn gait_from_steps(i: &Inputs, from: usize) -> Result<Vec<Outcome>, String> {
     Ok(out)
 }
 
-/// Times (s) and phases (rad) of the longest stretch in which a beat was heard.
+/// Times (s) and phases (rad) of the longest stretch without a hole in which a beat was heard.
 fn longest_heard(t_s: &[f64], beat_rad: &[f64]) -> Option<(Vec<f64>, Vec<f64>)> {
     let known: Vec<(f64, f64)> = t_s.iter().copied().zip(beat_rad.iter().copied()).collect();
-    let stretches = known.chunk_by(|a, b| a.1.is_finite() == b.1.is_finite());
+    let longest_s = longest_step_s(t_s);
+    let goes_on = |a: &(f64, f64), b: &(f64, f64)| {
+        a.1.is_finite() == b.1.is_finite() && b.0 - a.0 <= longest_s
+    };
+    let stretches = known.chunk_by(goes_on);
     let heard = stretches.filter(|stretch| stretch[0].1.is_finite());
     let longest = heard.max_by_key(|stretch| stretch.len())?;
     Some(longest.iter().copied().unzip())
 }
 
-/// Frequency of a beat that was heard, rad/s, and half of its 95 % interval: a straight line through its phase, every beat one
-/// observation, and never surer than a clock's ppm.
-fn tempo(t_s: &[f64], psi: &[f64]) -> (f64, f64) {
-    let n = t_s.len() as f64;
-    let (mt, mp) = (t_s.iter().sum::<f64>() / n, psi.iter().sum::<f64>() / n);
-    let (mut tt, mut tp) = (0.0, 0.0);
-    for (t, p) in t_s.iter().zip(psi) {
-        tt += (t - mt) * (t - mt);
-        tp += (t - mt) * (p - mp);
+/// A beat that was heard: a straight line through its phase, every beat one observation, and never surer than a clock's ppm.
+struct Tempo {
+    /// rad/s.
+    rate: f64,
+    /// Half of its 95 % interval, rad/s.
+    half: f64,
+    /// How far the phase leaves the line, rad.
+    strays: f64,
+    /// Slowest and fastest over ten beats, rad/s.
+    range: [f64; 2],
+}
+
+impl Tempo {
+    fn of(t_s: &[f64], psi: &[f64]) -> Self {
+        let n = t_s.len() as f64;
+        let (mt, mp) = (t_s.iter().sum::<f64>() / n, psi.iter().sum::<f64>() / n);
+        let (mut tt, mut tp) = (0.0, 0.0);
+        for (t, p) in t_s.iter().zip(psi) {
+            tt += (t - mt) * (t - mt);
+            tp += (t - mt) * (p - mp);
+        }
+        let rate = tp / tt;
+        let misses = || {
+            t_s.iter()
+                .zip(psi)
+                .map(|(t, p)| (p - mp - rate * (t - mt)).abs())
+        };
+        let variance = misses().map(|m| m * m).sum::<f64>() / n;
+        let beats = ((psi[psi.len() - 1] - psi[0]).abs() / TAU).max(1.0);
+        let half = 1.96 * (variance / (tt / n) / beats).sqrt();
+        let ten = ((10.0 * n / beats) as usize).clamp(1, t_s.len() - 1);
+        let over_ten = (ten..t_s.len()).map(|k| (psi[k] - psi[k - ten]) / (t_s[k] - t_s[k - ten]));
+        let range = over_ten.fold([f64::INFINITY, f64::NEG_INFINITY], |[low, high], r| {
+            [low.min(r), high.max(r)]
+        });
+        Self {
+            rate,
+            half: half.max(1e-6 * rate.abs()),
+            strays: misses().fold(0.0, f64::max),
+            range,
+        }
     }
-    let omega = tp / tt;
-    let miss = |(t, p): (&f64, &f64)| (p - mp - omega * (t - mt)).powi(2);
-    let variance = t_s.iter().zip(psi).map(miss).sum::<f64>() / n;
-    let beats = ((psi[psi.len() - 1] - psi[0]).abs() / TAU).max(1.0);
-    let half = 1.96 * (variance / (tt / n) / beats).sqrt();
-    (omega, half.max(1e-6 * omega.abs()))
+
+    /// The tempo, where there is one: who keeps it is never half a turn off.
+    fn told(&self) -> Outcome {
+        if self.strays > PI {
+            let [low, high] = self.range.map(|r| r / TAU);
+            return Err((
+                "beat".into(),
+                format!(
+                    "the beat changes its tempo, {low:.2} to {high:.2} Hz over ten beats: no single one is within half a turn of it"
+                ),
+            ));
+        }
+        estimate("beat", "Hz", self.rate / TAU, self.half / TAU)
+    }
 }
 
 /// How far the shoulders go up and down in step with the phases.
@@ -478,19 +675,15 @@ pub(super) fn amplitudes(field: &Field, window: Window) -> Result<Vec<Outcome>, 
     let step_s = mean_step_s(t_s).ok_or("no samples in the window")?;
     let per_block = (BLOCK_S / step_s).round().max(1.0) as usize;
     let phase_t = i.phase_times();
-    let known = match (phase_t.first(), phase_t.last()) {
-        (Some(a), Some(b)) => *a..=*b,
-        _ => return Err("no gait phases".into()),
-    };
     let each = i.heave_m.iter().zip(&i.phase_rad).enumerate();
     each.map(|(c, (heave, phase))| {
-        let phase = interpolate(phase_t, &unwrap(phase), t_s);
+        let phase = between(phase_t, &unwrapped(phase), t_s);
         let mut blocks: Vec<Block<3>> = Vec::new();
         for (k, (z, phi)) in heave[range.clone()].iter().zip(&phase).enumerate() {
             if k.is_multiple_of(per_block) {
                 blocks.push(Block::empty());
             }
-            let told = z.is_finite() && phi.is_finite() && known.contains(&t_s[k]);
+            let told = z.is_finite() && phi.is_finite();
             if let (true, Some(block)) = (told, blocks.last_mut()) {
                 block.add([phi.sin(), phi.cos(), 1.0], *z);
             }

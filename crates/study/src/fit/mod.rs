@@ -2,6 +2,7 @@
 //!
 //! ```text
 //! beat, pull     φ̇_i = ω_i + K m(t) sin(Ωt + ψ₀ − φ_i) + noise,   m(t) = 1 − e^{−(t − t₀)/τ} from t₀ on
+//! coupling       … + (K_c/N) Σ_j sin(φ_j − φ_i)                     where it shows
 //! amplitude      z_i = A_i sin φ_i + B_i cos φ_i                      √(A² + B²), lift and all
 //! contact        N_i = k δ_i + c δ̇_i                               while contact is kept
 //! … from sensors N_tot = k Σδ_i + c Σδ̇_i + e                       while all handles carry
@@ -11,10 +12,14 @@
 //! taken from a scene. Where the beat's phase was recorded it takes the place of Ωt + ψ₀. Increments of φ carry white noise, so least squares (Gauss and Newton) gives the interval of Ω, K, ω_i
 //! by itself; sines are the mean of both ends of an increment, the end as expected from its beginning (a predictor: the observed one would
 //! hold the increment's own noise), an error of (ω_i − Ω)²Δt²/12 of K, which the interval holds, with half of what K and ω_i change by when
-//! every other sample is left out.
+//! every other sample is left out, and all of what they change by when a coupling K_c is allowed for that does not show by itself (six standard
+//! errors). Where neighbouring increments share noise, because it was drawn on a coarser clock than the recorder's, samples are left
+//! out until less than a fifth is shared, up to steps of 0.1 s, and what is shared is counted: σ² Δt = Σ e_k² + 2 Σ e_k e_{k+1}.
+//! Nothing reaches across a hole of the record: no increment, no spline, no straight line through a beat.
 //! k, c, a, b: linear least squares on derivatives of the not-a-knot spline, their intervals from a moving-block bootstrap (500
-//! draws, blocks of two roll periods), because neighbours are alike. Where steps tell the phases, pull and gait are those of Adler's test
-//! ([`analyze::beat::adler`]), which knows that a step detector smooths them and finds τ by itself. Contact adds what k and c change by when every other
+//! draws, blocks of two roll periods), because neighbours are alike. θ̈ stands as a second difference, and the other side as Numerov's mean
+//! over three samples that goes with it: an error of (ωΔt)⁴/240, where the spline's own second derivative is off by (ωΔt)²/12. Where steps tell the phases, pull and gait are those of Adler's test
+//! ([`analyze::beat::adler`]), which knows that a step detector smooths them and finds τ by itself. Contact and pendulum add what they change by when every other
 //! sample is left out: a bound, 15 times over, of what the sampling does. From sensors z_i is the shoulder's and the body's motion about
 //! their slow course, δ_i = z_i − (body's height + (R p_i)_z), N_tot the body's specific force times its mass; a handle carries where
 //! k δ_i + c δ̇_i + e/N, its share of the load, is above a seventh of the weight over N. Source: Seber & Wild, Nonlinear Regression (1989);
@@ -25,9 +30,12 @@ mod gait;
 mod read;
 mod squares;
 
-use analyze::inputs::{Inputs, Window};
+use analyze::inputs::{Inputs, Window, mean_step_s, stretches};
+use analyze::phase::unwrap;
 use contact::{contact, contact_from_sensors, pendulum};
 use gait::{amplitudes, gait};
+use std::f64::consts::{PI, TAU};
+use std::ops::Range;
 
 /// What a fit is made from.
 #[derive(Clone, Debug, Default)]
@@ -90,6 +98,69 @@ pub fn fit(field: &Field, window: Window) -> Vec<Outcome> {
         pendulum(field, window).unwrap_or_else(|why| missing(&["pendulum", "roll damping"], why)),
     );
     out
+}
+
+/// Where nothing is recorded, a sentence for each time axis that has holes: no increment and no derivative reaches across one.
+pub fn holes(field: &Field) -> Vec<String> {
+    let i = &field.inputs;
+    let axes = [
+        ("the body's motion", &i.t_s[..]),
+        ("the forces", i.force_times()),
+        ("the phases", i.phase_times()),
+    ];
+    let mut told: Vec<(Vec<&str>, String)> = Vec::new();
+    for (name, t_s) in axes {
+        let parts = stretches(t_s, 0.0);
+        let lost = parts
+            .windows(2)
+            .map(|w| (t_s[w[0].end - 1], t_s[w[1].start]));
+        let lost: Vec<String> = lost.map(|(a, b)| format!("{a:.2} to {b:.2} s")).collect();
+        let where_ = match &lost[..] {
+            [] => continue,
+            all if all.len() <= 3 => all.join(", "),
+            [first, rest @ ..] => format!("{first} and {} more times", rest.len()),
+        };
+        match told.iter_mut().find(|(_, other)| *other == where_) {
+            Some((names, _)) => names.push(name),
+            None => told.push((vec![name], where_)),
+        }
+    }
+    let sentence = |(names, where_): (Vec<&str>, String)| {
+        format!(
+            "nothing of {} is recorded from {where_}; nothing is fitted across that",
+            names.join(", ")
+        )
+    };
+    told.into_iter().map(sentence).collect()
+}
+
+/// The parts of an axis that are evenly sampled, for splines: a single sample that is missing ends one too.
+fn even(t_s: &[f64]) -> Vec<Range<usize>> {
+    let Some(step_s) = mean_step_s(t_s) else {
+        return Vec::new();
+    };
+    let mut parts = Vec::new();
+    let mut start = 0;
+    for end in 1..=t_s.len() {
+        if end == t_s.len() || t_s[end] - t_s[end - 1] > 1.5 * step_s {
+            parts.push(start..end);
+            start = end;
+        }
+    }
+    parts
+}
+
+/// A phase that goes on, rad. One that takes more than a turn and never falls by half of one goes on already: where it leaps, it advanced.
+fn unwrapped(phase_rad: &[f64]) -> Vec<f64> {
+    let ends = |(a, b): (f64, f64), x: &f64| (a.min(*x), b.max(*x));
+    let (low, high) = phase_rad
+        .iter()
+        .fold((f64::INFINITY, f64::NEG_INFINITY), ends);
+    let falls = phase_rad.windows(2).any(|w| w[1] - w[0] < -PI);
+    match falls || high - low <= TAU {
+        true => unwrap(phase_rad),
+        false => phase_rad.to_vec(),
+    }
 }
 
 fn estimate(name: impl Into<String>, unit: &'static str, value: f64, half: f64) -> Outcome {

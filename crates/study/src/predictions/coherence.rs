@@ -187,6 +187,7 @@ pub fn run(lab: &Lab) -> Result<Finding, String> {
                     ],
                     x_range: Some((0.1, 1.7)),
                     y_range: Some((0.0, 100.0)),
+                    ..Figure::default()
                 },
             ),
         ],

@@ -233,6 +233,7 @@ pub fn run(lab: &Lab) -> Result<Finding, String> {
                     ],
                     x_range: Some(x_range),
                     y_range: Some(y_range),
+                    ..Figure::default()
                 },
             ),
             (

@@ -276,10 +276,20 @@ fn cell(text: &str) -> String {
     text.replace('|', "\\|")
 }
 
-/// The findings as a page of Markdown; pictures are looked for in `pictures`.
+/// Seeds of every ensemble where nobody says how many.
+pub const SEEDS: u64 = 12;
+
+/// The findings as a page of Markdown, be they all or some; pictures are looked for in `pictures`.
 pub fn page(findings: &[(&str, Finding)], pictures: &str, seeds: u64) -> String {
+    let mut words = String::new();
+    if findings.len() < EXPERIMENTS.len() {
+        words.extend(findings.iter().map(|(name, _)| format!(" {name}")));
+    }
+    if seeds != SEEDS {
+        let _ = write!(words, " --seeds {seeds}");
+    }
     let mut out = format!(
-        "# The paper's predictions, tried\n\n    $ cargo run --release -p study -- predictions --out docs\n\n\
+        "# The paper's predictions, tried\n\n    $ cargo run --release -p study -- predictions{words} --out docs\n\n\
          wrote this page and its pictures, with {seeds} seeds for every ensemble. What the scenes are: docs/reproduction.md; what the\n\
          metrics are: docs/metrics.md. Everything said here is said of this model, not of any procession.\n\n\
          | prediction | verdict | condition |\n|---|---|---|\n"

@@ -181,7 +181,7 @@ pub fn run(lab: &Lab) -> Result<Finding, String> {
             (
                 "onsets",
                 format!(
-                    "Onset times: median and the band of 90 % of {seeds} seeds; vermilion: the same scene with nothing random; broken: the critical amplitude."
+                    "Onset times of those of {seeds} seeds that rock within two minutes (how many: the next picture): median and the band of 90 % of them; vermilion: the same scene with nothing random; broken: the critical amplitude."
                 ),
                 Figure {
                     title: "Onset times through the threshold".into(),
@@ -198,6 +198,7 @@ pub fn run(lab: &Lab) -> Result<Finding, String> {
                     ],
                     x_range: Some((1e3 * amplitudes[0], 1e3 * amplitudes[amplitudes.len() - 1])),
                     y_range: Some((0.0, 1.05 * latest_s)),
+                    ..Figure::default()
                 },
             ),
             (

@@ -188,6 +188,7 @@ pub fn run(lab: &Lab) -> Result<Finding, String> {
         ],
         x_range: Some(x_range),
         y_range: Some(y_range),
+        ..Figure::default()
     };
     let kept = columns(
         &scene(&drive, &[("duration_s", 1.0)], 1)?,

@@ -1,11 +1,12 @@
 //! Figures of a sweep: bands over one axis, maps over two, distributions over any.
 
-use super::Plan;
 use super::parts::Store;
 use super::spec::{Spacing, number};
 use super::summary::Spread;
 use super::table::{Cell, Kind, Reader};
+use super::{Plan, turn_of};
 use crate::draw::{Figure, Layer};
+use crate::statistics::{about_their_mean, nearest};
 use std::path::Path;
 
 /// What is drawn of a metric.
@@ -66,13 +67,14 @@ pub fn draw(plan: &Plan, store: &Store, folder: &Path) -> Result<usize, String> 
             unit => format!(", {unit}"),
         };
         let label = format!("{name}{unit}");
+        let turn = turn_of(name);
         let figure = match kind {
-            Kinds::Band => band(&axes[0].name, &label, &points),
-            Kinds::Map => map(plan, &label, &points),
-            Kinds::Distribution => distribution(
-                &label,
-                points.iter().flat_map(|(_, v)| v.iter().copied()).collect(),
-            ),
+            Kinds::Band => band(plan, &label, &points, turn),
+            Kinds::Map => map(plan, &label, &points, turn),
+            Kinds::Distribution => {
+                let all = points.iter().flat_map(|(_, v)| v.iter().copied()).collect();
+                distribution(&label, all, runs, turn)
+            }
         };
         if let Some(figure) = figure {
             figure.write(folder, name)?;
@@ -82,15 +84,32 @@ pub fn draw(plan: &Plan, store: &Store, folder: &Path) -> Result<usize, String> 
     Ok(drawn)
 }
 
-fn band(x_label: &str, label: &str, points: &[(Vec<Cell>, Vec<f64>)]) -> Option<Figure> {
-    let mut found: Vec<(f64, Spread)> = points
-        .iter()
-        .filter_map(|(axes, values)| Some((axes[0].number()?, Spread::of(values)?)))
-        .collect();
+/// What a figure leaves out, behind its title.
+const HALF: &str = "; where at least half of the runs have it";
+
+fn band(
+    plan: &Plan,
+    label: &str,
+    points: &[(Vec<Cell>, Vec<f64>)],
+    turn: Option<f64>,
+) -> Option<Figure> {
+    let axis = &plan.spec.axes[0];
+    let counted = |(axes, values): &(Vec<Cell>, Vec<f64>)| {
+        let spread = Spread::of_turning(values, turn).filter(|s| s.counts(plan.spec.seeds));
+        Some((axes[0].number()?, spread?))
+    };
+    let mut found: Vec<(f64, Spread)> = points.iter().filter_map(counted).collect();
     found.sort_by(|a, b| a.0.total_cmp(&b.0));
+    if let Some(turn) = turn {
+        for k in 1..found.len() {
+            found[k].1 = found[k].1.near(found[k - 1].1.mean, turn);
+        }
+    }
+    let left_out = if found.len() < points.len() { HALF } else { "" };
     (found.len() > 1).then(|| Figure {
-        title: label.into(),
-        x_label: x_label.into(),
+        title: format!("{label}{left_out}"),
+        x_label: axis.name.clone(),
+        x_log: axis.spacing == Spacing::Log,
         y_label: label.into(),
         layers: vec![
             Layer::Band {
@@ -111,14 +130,26 @@ fn band(x_label: &str, label: &str, points: &[(Vec<Cell>, Vec<f64>)]) -> Option<
     })
 }
 
-fn map(plan: &Plan, label: &str, points: &[(Vec<Cell>, Vec<f64>)]) -> Option<Figure> {
+fn map(
+    plan: &Plan,
+    label: &str,
+    points: &[(Vec<Cell>, Vec<f64>)],
+    turn: Option<f64>,
+) -> Option<Figure> {
     let [y, x] = &plan.spec.axes[..] else {
         return None;
     };
-    let means: Vec<f64> = points
-        .iter()
-        .map(|(_, values)| Spread::of(values).map_or(f64::NAN, |s| s.mean))
-        .collect();
+    let mean = |(_, values): &(Vec<Cell>, Vec<f64>)| {
+        let spread = Spread::of_turning(values, turn).filter(|s| s.counts(plan.spec.seeds));
+        spread.map_or(f64::NAN, |s| s.mean)
+    };
+    let mut means: Vec<f64> = points.iter().map(mean).collect();
+    let first = means.iter().copied().find(|m| m.is_finite());
+    if let (Some(turn), Some(first)) = (turn, first) {
+        means.iter_mut().for_each(|m| *m = nearest(*m, first, turn));
+    }
+    let few = |(_, values): &(Vec<Cell>, Vec<f64>)| 2 * (values.len() as u64) < plan.spec.seeds;
+    let left_out = if points.iter().any(few) { HALF } else { "" };
     if means.iter().all(|m| m.is_nan()) {
         return None;
     }
@@ -140,7 +171,7 @@ fn map(plan: &Plan, label: &str, points: &[(Vec<Cell>, Vec<f64>)]) -> Option<Fig
         values.iter_mut().for_each(|row| row.reverse());
     }
     Some(Figure {
-        title: label.into(),
+        title: format!("{label}{left_out}"),
         x_label: x.name.clone(),
         y_label: y.name.clone(),
         layers: vec![Layer::Map {
@@ -151,22 +182,30 @@ fn map(plan: &Plan, label: &str, points: &[(Vec<Cell>, Vec<f64>)]) -> Option<Fig
         }],
         x_range: Some(ends(x)),
         y_range: Some(ends(y)),
+        ..Figure::default()
     })
 }
 
-fn distribution(label: &str, mut values: Vec<f64>) -> Option<Figure> {
+/// Share of all `runs` up to each value: it ends below one where some have none.
+fn distribution(label: &str, mut values: Vec<f64>, runs: u64, turn: Option<f64>) -> Option<Figure> {
+    if let Some(turn) = turn {
+        values = about_their_mean(&values, turn);
+    }
     values.sort_by(f64::total_cmp);
     let n = values.len();
     // A thousand steps are as many as a picture can show.
     let step = n.div_ceil(1000).max(1);
     let points: Vec<(f64, f64)> = (0..n)
         .step_by(step)
-        .map(|k| (values[k], (k + 1) as f64 / n as f64))
+        .map(|k| (values[k], (k + 1) as f64 / runs as f64))
         .collect();
     (n > 1 && values[n - 1] > values[0]).then(|| Figure {
-        title: format!("Distribution: {label}"),
+        title: match n as u64 {
+            n if n == runs => format!("Distribution: {label}"),
+            n => format!("Distribution: {label}; {n} of {runs} runs have it"),
+        },
         x_label: label.into(),
-        y_label: "share of runs up to the value".into(),
+        y_label: "share of all runs up to the value".into(),
         layers: vec![Layer::line("", points, 0)],
         y_range: Some((0.0, 1.02)),
         ..Figure::default()

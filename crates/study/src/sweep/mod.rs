@@ -51,6 +51,13 @@ const LEAST_ABREAST: u64 = 16;
 /// Runs of more samples are computed one by one.
 const LONGEST_ABREAST: f64 = 20e3;
 
+/// The turn after which a metric's values are the same again; `None` for all but angles that its definition calls a circular mean.
+pub fn turn_of(metric: &str) -> Option<f64> {
+    let metric = find(metric)?;
+    let circular = metric.definition.starts_with("Circular mean") && metric.unit == "deg";
+    circular.then_some(360.0)
+}
+
 /// A study, ready to run: what run `k` is follows from `k` alone.
 pub struct Plan {
     /// The file, as it was read.
@@ -138,6 +145,7 @@ impl Plan {
     /// When that makes too many.
     pub fn with_seeds(mut self, seeds: u64) -> Result<Self, String> {
         self.spec.seeds = seeds;
+        spec::check_seeds(&self.spec)?;
         self.points = Points::new(&self.spec)?;
         Ok(self)
     }
@@ -370,7 +378,7 @@ impl Plan {
         let mut keeper = Keeper(None);
         if let Some(folder) = recordings {
             model = Model::new(scene);
-            let path = folder.join(format!("run-{run:09}.mcap"));
+            let path = folder.join(parts::recording_name(run));
             let recorder = RecordingWriter::create(&path, &WriterOptions::default())
                 .and_then(|writer| Recorder::new(&model, writer));
             match recorder {
@@ -411,10 +419,19 @@ impl Plan {
                     .unwrap_or(Cell::Empty)
             })
         };
+        let metrics: Vec<Cell> = self.metrics.iter().map(cell).collect();
+        let window = Window::from(scene.analysis_start_s).range(&inputs.t_s);
+        let nothing = window.is_empty() && metrics.iter().all(|c| *c == Cell::Empty);
+        let why = || {
+            format!(
+                "the window of analysis begins at {} s (`analysis_start_s`), behind the end of the run at {} s",
+                scene.analysis_start_s, scene.duration_s
+            )
+        };
         Measured {
-            metrics: self.metrics.iter().map(cell).collect(),
+            metrics,
             stats: Some(stats),
-            failed: None,
+            failed: nothing.then(why),
         }
     }
 }
@@ -475,12 +492,11 @@ impl Listener for Keeper<'_> {
     }
 }
 
+/// How many values of a row or a range are tried before its key is called a slip.
+const TRIED: u64 = 100;
+
 /// A key that no value can be given to is a slip; a value that a scene may not have is a row with its reason.
 fn try_axis(axis: &spec::Axis, template: &Template) -> Result<(), String> {
-    let ends = match axis.is_sampled() {
-        true => [axis.at(0.0).into(), axis.at(1.0).into()],
-        false => [axis.value(0), axis.value(axis.len() - 1)],
-    };
     let whole = template
         .value(&axis.key)
         .is_some_and(toml::Value::is_integer);
@@ -495,12 +511,33 @@ fn try_axis(axis: &spec::Axis, template: &Template) -> Result<(), String> {
             axis.key
         ));
     }
-    let mut why = Ok(());
-    for value in ends {
-        let value = match value {
-            toml::Value::Float(x) if whole => toml::Value::Integer(x.round() as i64),
-            other => other,
+    let as_key = |value: toml::Value| match value {
+        toml::Value::Float(x) if whole => toml::Value::Integer(x.round() as i64),
+        other => other,
+    };
+    if let Some(twice) = stands_twice(axis, as_key) {
+        let why = if whole && axis.count.is_some() {
+            ", rounded to whole numbers,"
+        } else {
+            ""
         };
+        return Err(format!(
+            "axis `{}`: its values{why} hold {twice} twice; every point once is enough, `seeds` says how often it is run",
+            axis.key
+        ));
+    }
+    let tried: Vec<toml::Value> = match (axis.is_sampled(), axis.len().min(TRIED)) {
+        (true, _) => (0..=TRIED)
+            .map(|k| axis.at(k as f64 / TRIED as f64).into())
+            .collect(),
+        (false, _) if axis.count.is_none() => axis.values.clone(),
+        (false, n) => (0..n)
+            .map(|k| axis.value(k * (axis.len() - 1) / (n - 1).max(1)))
+            .collect(),
+    };
+    let mut why = Ok(());
+    for value in tried {
+        let value = as_key(value);
         let along = flatten(&axis.along);
         let along = along.iter().filter_map(|(key, factor)| {
             Some((key.as_str(), (number(&value)? * number(factor)?).into()))
@@ -512,6 +549,25 @@ fn try_axis(axis: &spec::Axis, template: &Template) -> Result<(), String> {
         }
     }
     why
+}
+
+/// A value that an axis with values of its own has more than once.
+fn stands_twice(
+    axis: &spec::Axis,
+    as_key: impl Fn(toml::Value) -> toml::Value,
+) -> Option<toml::Value> {
+    if axis.is_sampled() {
+        return None;
+    }
+    let mut values = (0..axis.len()).map(|k| as_key(axis.value(k)));
+    if axis.count.is_some() {
+        // A row goes one way.
+        let mut last = None;
+        return values.find(|v| last.replace(v.clone()).as_ref() == Some(v));
+    }
+    let mut seen = std::collections::BTreeSet::new();
+    // 1 and 1.0 are one value.
+    values.find(|v| !seen.insert(number(v).map_or_else(|| v.to_string(), |x| x.to_string())))
 }
 
 fn columns(spec: &Spec, metrics: &[&Metric]) -> Vec<Column> {

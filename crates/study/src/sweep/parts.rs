@@ -15,7 +15,7 @@ use crate::pool::{in_order, threads};
 use parquet::errors::ParquetError;
 use recording::whole::Sink;
 use sim::record::VERSION;
-use std::io::{BufWriter, Write};
+use std::io::{BufWriter, Read, Seek, SeekFrom, Write};
 use std::ops::Range;
 use std::path::{Path, PathBuf};
 use std::sync::atomic::AtomicBool;
@@ -67,6 +67,15 @@ impl<'p> Store<'p> {
         self.folder.join("runs.parquet")
     }
 
+    /// Whether the merged table is there, and of this very study.
+    pub fn is_merged(&self) -> bool {
+        let ours = |reader: Reader| {
+            let is = |(name, text): &(String, String)| reader.note(name) == Some(text);
+            reader.rows == self.plan.runs() && self.notes().iter().all(is)
+        };
+        Reader::open(&self.table()).is_ok_and(ours)
+    }
+
     fn part(&self, block: u64) -> PathBuf {
         let range = self.plan.block(block);
         let name = format!("{:09}-{:09}.parquet", range.start, range.end);
@@ -115,18 +124,22 @@ impl<'p> Store<'p> {
             write_whole(&path, |file| Ok(file.write_all(text.as_bytes())?))?;
         }
         if self.plan.spec.recordings {
-            let kept = self.folder.join("recordings");
+            let kept = self.recordings();
             std::fs::create_dir_all(&kept)
                 .map_err(|e| format!("{}: cannot be made: {e}", kept.display()))?;
         }
         Ok(())
     }
 
-    /// Which blocks of a shard are there.
+    /// Which blocks of a shard are there, with their recordings where the study keeps them.
     ///
     /// # Errors
     /// A part that cannot be read, or that another study or another version of the program wrote.
     pub fn progress(&self, shard: Shard) -> Outcome<Progress> {
+        self.parts(shard, self.plan.spec.recordings)
+    }
+
+    fn parts(&self, shard: Shard, with_recordings: bool) -> Outcome<Progress> {
         let mut found = Progress::default();
         let notes = self.notes();
         for block in shard.of(self.plan.blocks()) {
@@ -160,6 +173,10 @@ impl<'p> Store<'p> {
                     range.end - range.start
                 )));
             }
+            if with_recordings && !self.recorded(&reader).map_err(|e| say(&e.to_string()))? {
+                found.missing.push(block);
+                continue;
+            }
             found.runs += reader.rows;
             found.failed += reader
                 .note("failed")
@@ -167,6 +184,46 @@ impl<'p> Store<'p> {
                 .unwrap_or(0);
         }
         Ok(found)
+    }
+
+    fn recordings(&self) -> PathBuf {
+        self.folder.join("recordings")
+    }
+
+    /// Whether every run of a part that has a result has its recording too, up to the last byte.
+    fn recorded(&self, part: &Reader) -> Result<bool, ParquetError> {
+        let failed = part.columns.len() - 2;
+        for group in 0..part.groups() {
+            for row in part.group(group)? {
+                let whole = match row[0] {
+                    Cell::Whole(run) => {
+                        ends_whole(&self.recordings().join(recording_name(run as u64)))
+                    }
+                    _ => true,
+                };
+                if row[failed] == Cell::Empty && !whole {
+                    return Ok(false);
+                }
+            }
+        }
+        Ok(true)
+    }
+
+    /// Takes away what a kill left of recordings of these blocks.
+    fn sweep_up(&self, blocks: &[u64]) {
+        let runs: Vec<Range<u64>> = blocks.iter().map(|b| self.plan.block(*b)).collect();
+        let Ok(entries) = std::fs::read_dir(self.recordings()) else {
+            return;
+        };
+        for path in entries.flatten().map(|e| e.path()) {
+            let name = path.file_name().unwrap_or_default().to_string_lossy();
+            let of = |run: &u64| name.contains(&*recording_name(*run));
+            let unfinished = path.extension().is_some_and(|e| e == "part");
+            if unfinished && runs.iter().any(|r| r.clone().any(|run| of(&run))) {
+                // Best effort: it is in nobody's way.
+                let _ = std::fs::remove_file(&path);
+            }
+        }
     }
 
     /// Computes the blocks named; `done` is called after every run. When `stop` is set, whole parts stay and the rest is dropped.
@@ -180,8 +237,11 @@ impl<'p> Store<'p> {
         stop: &AtomicBool,
         mut done: impl FnMut(),
     ) -> Outcome<Written> {
-        let recordings = self.folder.join("recordings");
+        let recordings = self.recordings();
         let recordings = self.plan.spec.recordings.then_some(&*recordings);
+        if recordings.is_some() {
+            self.sweep_up(blocks);
+        }
         let runs: u64 = blocks
             .iter()
             .map(|b| self.plan.block(*b))
@@ -256,7 +316,7 @@ impl<'p> Store<'p> {
     /// # Errors
     /// Missing or unreadable parts; a table that cannot be written.
     pub fn merge(&self) -> Outcome<Found> {
-        let progress = self.progress(Shard::WHOLE)?;
+        let progress = self.parts(Shard::WHOLE, false)?;
         if let Some(first) = progress.missing.first() {
             return Err(format!(
                 "{}: {} of {} parts are missing, the first is that of runs {:?}; `study {} --resume` computes them",
@@ -319,6 +379,24 @@ impl<'p> Store<'p> {
         }
         writer.close()
     }
+}
+
+/// Name of a run's recording.
+pub fn recording_name(run: u64) -> String {
+    format!("run-{run:09}.mcap")
+}
+
+/// Whether a file ends as an MCAP file does.
+fn ends_whole(path: &Path) -> bool {
+    const MAGIC: [u8; 8] = *b"\x89MCAP0\r\n";
+    let last = || -> std::io::Result<[u8; 8]> {
+        let mut file = std::fs::File::open(path)?;
+        file.seek(SeekFrom::End(-8))?;
+        let mut last = [0; 8];
+        file.read_exact(&mut last)?;
+        Ok(last)
+    };
+    last().is_ok_and(|found| found == MAGIC)
 }
 
 /// [`recording::whole::write_whole`] with its errors as sentences.

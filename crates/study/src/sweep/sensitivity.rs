@@ -6,11 +6,12 @@
 //! ```
 //! f the metric's mean over the seeds of a point; A and B two halves of Sobol's points, AB_i is A with axis i of B; V the variance
 //! over A and B together, ⟨⟩ the mean over base points. f is taken about its mean, which does not change S_i and
-//! steadies its estimate. S_i ≤ T_i but for chance; T_i − S_i is what the axis does only together with others. A base point of which
+//! steadies its estimate (of angles about their circular mean). S_i ≤ T_i but for chance; T_i − S_i is what the axis does only together with others. A base point of which
 //! any run has no such metric is left out. Intervals: 95 %, from 500 bootstrap samples of the base points.
 
-use super::Plan;
 use super::summary::{Found, quantile};
+use super::{Plan, turn_of};
+use crate::statistics::about_their_mean;
 use serde_json::{Value, json};
 use sim::random::{Stream, uniform_pair};
 
@@ -49,11 +50,15 @@ pub fn indices(plan: &Plan, found: &Found) -> Option<Vec<Index>> {
     let axes = plan.spec.axes.len();
     let mut out = Vec::new();
     for (k, metric) in found.metrics.iter().enumerate() {
-        let rows: Vec<Vec<f64>> = found
+        let mut rows: Vec<Vec<f64>> = found
             .means
             .chunks(axes + 2)
             .filter_map(|rows| rows.iter().map(|means| means[k]).collect())
             .collect();
+        if let Some(turn) = turn_of(metric) {
+            let about = about_their_mean(&rows.concat(), turn);
+            rows = about.chunks(axes + 2).map(<[f64]>::to_vec).collect();
+        }
         for (axis, of) in plan.spec.axes.iter().enumerate() {
             if let Some((first, total)) = estimate(&rows, axis) {
                 out.push(Index {

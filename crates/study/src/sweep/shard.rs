@@ -112,7 +112,12 @@ impl Shard {
                 })?;
             return Ok(Some((Self { index, count }, s.index)));
         }
-        Ok(None)
+        match shards {
+            Some(n) => Err(format!(
+                "--shards {n} says of how many tasks this is one, but no scheduler says which: give --shard K/{n}"
+            )),
+            None => Ok(None),
+        }
     }
 
     /// Its share of `blocks`: neighbours, as equal as whole blocks can be.
@@ -178,5 +183,7 @@ mod tests {
         );
         assert!(Shard::of_environment(Some(1), kubernetes).is_err());
         assert_eq!(Shard::of_environment(None, |_| None), Ok(None));
+        let nobody = Shard::of_environment(Some(4), |_| None).unwrap_err();
+        assert!(nobody.contains("--shard K/4"), "{nobody}");
     }
 }

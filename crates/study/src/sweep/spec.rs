@@ -129,6 +129,7 @@ fn check(spec: &mut Spec) -> Result<(), String> {
     if spec.seeds == 0 {
         return Err("seeds: found 0, expected at least one run of every point".into());
     }
+    check_seeds(spec)?;
     let names = || analyze::metrics::METRICS.iter().map(|m| m.name);
     for (k, name) in spec.metrics.iter().enumerate() {
         if !names().any(|n| n == name) {
@@ -151,6 +152,11 @@ fn check(spec: &mut Spec) -> Result<(), String> {
             axis.name.clone_from(&axis.key);
         }
         check_axis(axis).map_err(|e| format!("axes.{k} (`{}`): {e}", spec.axes[k].key))?;
+        if let Some((key, set)) = set_and_varied(&spec.set, &spec.axes[k]) {
+            return Err(format!(
+                "axes.{k}: `{key}` stands beside `{set}` of [set]; one of the two would not count"
+            ));
+        }
         let name = &spec.axes[k].name;
         let taken = super::FIXED_COLUMNS.contains(&name.as_str())
             || spec.metrics.contains(name)
@@ -199,20 +205,50 @@ fn check(spec: &mut Spec) -> Result<(), String> {
     }
 }
 
+/// Tables hold seeds as signed numbers.
+pub(super) fn check_seeds(spec: &Spec) -> Result<(), String> {
+    let last = spec.first_seed.checked_add(spec.seeds - 1);
+    match last.is_some_and(|seed| i64::try_from(seed).is_ok()) {
+        true => Ok(()),
+        false => Err(format!(
+            "first_seed: found {} and {} seeds from it on, expected the last to be at most {}",
+            spec.first_seed,
+            spec.seeds,
+            i64::MAX
+        )),
+    }
+}
+
+/// The key of an axis, with what goes along.
+fn keys(axis: &Axis) -> Vec<String> {
+    let along = flatten(&axis.along).into_iter().map(|(key, _)| key);
+    [axis.key.clone()].into_iter().chain(along).collect()
+}
+
+/// Whether a key is another, or stands below it.
+fn within(inner: &str, outer: &str) -> bool {
+    inner
+        .strip_prefix(outer)
+        .is_some_and(|rest| rest.is_empty() || rest.starts_with('.'))
+}
+
+/// A key of an axis and one of [set] of which one would not count: what an axis replaces as a whole, or what [set] turns off. The axis' own key is
+/// what [set] begins with.
+fn set_and_varied(set: &toml::Table, axis: &Axis) -> Option<(String, String)> {
+    let set = flatten(set);
+    keys(axis).into_iter().find_map(|key| {
+        let clash = |(s, value): &&(String, toml::Value)| {
+            let replaced = within(s, &key);
+            let turned_off = within(&key, s) && value.as_bool() == Some(false);
+            *s != key && (replaced || turned_off)
+        };
+        let (s, _) = set.iter().find(clash)?;
+        Some((key, s.clone()))
+    })
+}
+
 /// A key of the last axis, with what goes along, that sets what another key sets as well: both, and the other's axis.
 fn said_twice(axes: &[Axis]) -> Option<(String, String, &str)> {
-    let keys = |axis: &Axis| {
-        let along = flatten(&axis.along).into_iter().map(|(key, _)| key);
-        [axis.key.clone()]
-            .into_iter()
-            .chain(along)
-            .collect::<Vec<_>>()
-    };
-    let within = |inner: &str, outer: &str| {
-        inner
-            .strip_prefix(outer)
-            .is_some_and(|rest| rest.is_empty() || rest.starts_with('.'))
-    };
     let (last, before) = axes.split_last()?;
     let own = keys(last);
     for (k, key) in own.iter().enumerate() {

@@ -1,7 +1,8 @@
 //! What a table of runs says, point by point and altogether, in one pass over its rows.
 
-use super::Plan;
 use super::table::{Cell, Kind};
+use super::{Plan, turn_of};
+use crate::statistics::{about_their_mean, nearest, summarise};
 use std::io::Write;
 
 /// Mean, spread and quantiles of one metric over some runs that have it.
@@ -20,7 +21,7 @@ pub struct Spread {
 impl Spread {
     /// Of finite values, in any order; `None` without any.
     pub fn of(values: &[f64]) -> Option<Self> {
-        let s = crate::statistics::summarise(values.iter().copied())?;
+        let s = summarise(values.iter().copied())?;
         let mut sorted = values.to_vec();
         sorted.sort_by(f64::total_cmp);
         Some(Self {
@@ -29,6 +30,31 @@ impl Spread {
             sd: s.sd,
             quantiles: [0.05, 0.5, 0.95].map(|q| quantile(&sorted, q)),
         })
+    }
+
+    /// The same of values that are the same after a `turn`, where one is given: all about their circular mean, and that within half a turn of 0.
+    pub fn of_turning(values: &[f64], turn: Option<f64>) -> Option<Self> {
+        let Some(turn) = turn else {
+            return Self::of(values);
+        };
+        let found = Self::of(&about_their_mean(values, turn))?;
+        Some(found.near(0.0, turn))
+    }
+
+    /// The same, some turns on, so that the mean is the nearest to `to`.
+    pub fn near(self, to: f64, turn: f64) -> Self {
+        let mean = nearest(self.mean, to, turn);
+        let on = mean - self.mean;
+        Self {
+            mean,
+            quantiles: self.quantiles.map(|q| q + on),
+            ..self
+        }
+    }
+
+    /// Whether at least half of `runs` have it: the mean of fewer is that of a choice.
+    pub fn counts(&self, runs: u64) -> bool {
+        2 * self.runs as u64 >= runs
     }
 }
 
@@ -40,10 +66,12 @@ pub fn quantile(sorted: &[f64], q: f64) -> f64 {
     sorted[below] + (place - place.floor()) * (sorted[above] - sorted[below])
 }
 
-/// What the means of one metric at the points range over.
+/// What the means of one metric range over, at the points where at least half of the runs have it.
 #[derive(Clone, Debug, Default)]
 pub struct Range {
-    /// Points that have it.
+    /// Runs that have it, at any point.
+    pub runs: u64,
+    /// The points that count.
     pub points: u64,
     sum: f64,
     /// Lowest mean and the values of the axes there.
@@ -53,7 +81,16 @@ pub struct Range {
 }
 
 impl Range {
-    fn take(&mut self, mean: f64, axes: &[Cell]) {
+    fn take(&mut self, spread: &Spread, seeds: u64, turn: Option<f64>, axes: &[Cell]) {
+        self.runs += spread.runs as u64;
+        if !spread.counts(seeds) {
+            return;
+        }
+        // Angles on the side of those before them.
+        let mean = match (turn, self.points) {
+            (Some(turn), 1..) => nearest(spread.mean, self.sum / self.points as f64, turn),
+            _ => spread.mean,
+        };
         self.points += 1;
         self.sum += mean;
         if self.lowest.as_ref().is_none_or(|(low, _)| mean < *low) {
@@ -70,6 +107,7 @@ pub struct Summary<W: Write> {
     csv: W,
     axes: usize,
     places: Vec<usize>,
+    turns: Vec<Option<f64>>,
     seeds: u64,
     values: Vec<Vec<f64>>,
     rows: u64,
@@ -128,6 +166,7 @@ impl<W: Write> Summary<W> {
             csv,
             axes,
             values: vec![Vec::new(); places.len()],
+            turns: metrics.iter().map(|name| turn_of(name)).collect(),
             places,
             seeds: plan.spec.seeds,
             rows: 0,
@@ -182,13 +221,14 @@ impl<W: Write> Summary<W> {
         }
         write!(out, ",{},{}", self.seeds, self.failed)?;
         let mut means = Vec::new();
-        for (values, range) in self.values.iter_mut().zip(&mut self.found.ranges) {
-            let spread = Spread::of(values);
+        let ranges = self.found.ranges.iter_mut().zip(&self.turns);
+        for (values, (range, turn)) in self.values.iter_mut().zip(ranges) {
+            let spread = Spread::of_turning(values, *turn);
             match &spread {
                 Some(s) => {
                     let [low, middle, high] = s.quantiles;
                     write!(out, ",{},{},{low},{middle},{high},{}", s.mean, s.sd, s.runs)?;
-                    range.take(s.mean, axes);
+                    range.take(s, self.seeds, *turn, axes);
                 }
                 None => write!(out, ",,,,,,0")?,
             }
@@ -226,8 +266,18 @@ impl Found {
             self.points, self.runs, self.failures, "mean at a point", "lowest", "mean", "highest"
         );
         for (name, range) in self.metrics.iter().zip(&self.ranges) {
+            // Who has it is said where not everybody does.
+            let had = match range.runs {
+                n if n == self.runs => String::new(),
+                n => format!("  in {n} of {} runs", self.runs),
+            };
             let (Some(low), Some(high)) = (&range.lowest, &range.highest) else {
-                out += &format!("{name:<20}{:>11}\n", "–");
+                let few = if range.runs > 0 {
+                    ", at no point in half of them"
+                } else {
+                    ""
+                };
+                out += &format!("{name:<20}{:>11}{had}{few}\n", "–");
                 continue;
             };
             out += &format!(
@@ -239,6 +289,7 @@ impl Found {
             if high.0 > low.0 && !low.1.is_empty() {
                 out += &format!("  {}, {}", place(&low.1), place(&high.1));
             }
+            out += &had;
             out.push('\n');
         }
         for (reason, count) in &self.reasons {
@@ -289,6 +340,13 @@ mod tests {
         for (found, expected) in s.quantiles.iter().zip([1.2, 4.0, 14.4]) {
             assert!((found - expected).abs() < 1e-14);
         }
+        // Angles beside the seam: scipy.stats.circmean([178, -179, -178], 180, -180) = -179.667
+        let turning = Spread::of_turning(&[178.0, -179.0, -178.0], Some(360.0)).unwrap();
+        assert!(
+            (turning.mean + 179.0 + 2.0 / 3.0).abs() < 1e-9,
+            "{turning:?}"
+        );
+        assert!((turning.sd - 2.081_665_999).abs() < 1e-6 && turning.quantiles[1] == -179.0);
         assert_eq!(Spread::of(&[]), None);
         assert_eq!(Spread::of(&[3.0]).unwrap().quantiles, [3.0; 3]);
         assert_eq!(short(0.000123456), "0.0001235");

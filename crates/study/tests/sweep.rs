@@ -1,0 +1,161 @@
+//! What a study file may ask for, and what its table, summary and folder say.
+
+use std::path::Path;
+use std::sync::atomic::AtomicBool;
+use study::statistics::about_their_mean;
+use study::sweep::parts::Store;
+use study::sweep::shard::Shard;
+use study::sweep::summary::{Found, Summary};
+use study::sweep::table::Cell;
+use study::sweep::{Plan, spec};
+
+fn plan(text: &str) -> Result<Plan, String> {
+    let spec = spec::parse("test", &format!("scene = \"music\"\n{text}"))?;
+    Plan::new(spec, Path::new(""))
+}
+
+fn refused(text: &str) -> String {
+    plan(text)
+        .err()
+        .unwrap_or_else(|| panic!("accepted: {text}"))
+}
+
+#[test]
+fn what_cannot_count_is_refused() {
+    let strength = "axes = [{ key = \"effects.music.strength_rad_per_s\", values = [1.0, 2.0] }]";
+    for (set, fine) in [
+        ("set.effects.music = false", false),
+        ("set.effects.music.strength_rad_per_s = 3.0", true),
+        ("set.effects.music = {}", true),
+        ("set.effects.music.onset_s = 3.0", true),
+    ] {
+        let text = format!("{set}\n{strength}");
+        match fine {
+            true => drop(plan(&text).unwrap()),
+            false => assert!(refused(&text).contains("of [set]"), "{set}"),
+        }
+    }
+    for (axis, why) in [
+        (
+            "carriers.handles_m.0.0\", values = [1.0, 2.0, 1]",
+            "hold 1 twice",
+        ),
+        (
+            "effects.gait.order\", from = 1, to = 3, count = 5",
+            "rounded to whole numbers",
+        ),
+    ] {
+        let text = format!("axes = [{{ key = \"{axis} }}]");
+        assert!(refused(&text).contains(why), "{}", refused(&text));
+    }
+    assert!(refused("first_seed = 9223372036854775807\nseeds = 2").contains("first_seed"));
+    plan("first_seed = 9223372036854775807\nseeds = 1").unwrap();
+}
+
+#[test]
+fn a_row_of_values_is_a_slip_only_where_none_can_be() {
+    let axis = |values: &str| format!("axes = [{{ key = \"body.mass_kg\", values = {values} }}]");
+    assert_eq!(plan(&axis("[-1, 60, -2]")).unwrap().points(), 3);
+    assert!(refused(&axis("[-1, -2]")).contains("mass_kg"));
+}
+
+#[test]
+fn a_run_without_a_window_says_so() {
+    let study = plan(
+        "metrics = [\"dz_pp_m\", \"rms_roll_deg\"]\n[set]\nduration_s = 1.0\nanalysis_start_s = 15.0",
+    );
+    let rows = study.unwrap().run(0..1, None);
+    let Cell::Text(why) = &rows[0][rows[0].len() - 2] else {
+        panic!("{rows:?}");
+    };
+    assert!(why.contains("begins at 15 s"), "{why}");
+}
+
+/// What a summary makes of one point's values of a metric, of five runs.
+fn summary_of(metric: &str, values: &[Option<f64>]) -> (Found, String) {
+    let text = format!("seeds = {}\nmetrics = [\"{metric}\"]", values.len());
+    let plan = plan(&text).unwrap();
+    let mut csv = Vec::new();
+    let mut summary = Summary::new(&plan, &mut csv).unwrap();
+    for value in values {
+        let mut row = vec![Cell::Empty; plan.columns().len()];
+        row[3] = value.map_or(Cell::Empty, Cell::Real);
+        summary.row(&row).unwrap();
+    }
+    let found = summary.finish().unwrap();
+    (found, String::from_utf8(csv).unwrap())
+}
+
+#[test]
+fn angles_are_taken_about_their_circular_mean() {
+    // Mean and SD by hand, about 180: -2, 0.4, -1, 3.
+    let (found, csv) = summary_of(
+        "beat_lead_deg",
+        &[Some(178.0), Some(-179.6), Some(179.0), Some(-177.0)],
+    );
+    let (low, _) = found.ranges[0].lowest.clone().unwrap();
+    assert!((low + 179.9).abs() < 1e-9, "{low}");
+    let last: Vec<&str> = csv.lines().nth(1).unwrap().split(',').collect();
+    let sd: f64 = last[4].parse().unwrap();
+    assert!((sd - (14.12f64 / 3.0).sqrt()).abs() < 1e-9, "{csv}");
+    let about = about_their_mean(&[170.0, -170.0, -160.0], 360.0);
+    assert!((about[1] - about[0] - 20.0).abs() < 1e-9 && (about[2] - about[1] - 10.0).abs() < 1e-9);
+}
+
+#[test]
+fn who_has_a_metric_is_said_and_few_do_not_speak_for_all() {
+    let (found, _) = summary_of("onset_time_s", &[Some(34.4), None, None, None, None]);
+    assert_eq!((found.ranges[0].runs, found.ranges[0].points), (1, 0));
+    assert!(
+        found.table().contains("in 1 of 5 runs"),
+        "{}",
+        found.table()
+    );
+    let (found, _) = summary_of(
+        "onset_time_s",
+        &[Some(20.0), Some(30.0), Some(40.0), None, None],
+    );
+    assert_eq!(found.ranges[0].lowest.as_ref().unwrap().0, 30.0);
+    assert!(
+        found.table().contains("in 3 of 5 runs"),
+        "{}",
+        found.table()
+    );
+}
+
+#[test]
+fn a_recording_that_is_lost_is_made_again_and_another_study_s_table_is_none_of_ours() {
+    let text = |metric: &str| {
+        format!(
+            "seeds = 2\nrecordings = true\nmetrics = [\"{metric}\"]\n[set]\nduration_s = 0.5\nanalysis_start_s = 0.0"
+        )
+    };
+    let ours = plan(&text("dz_pp_m")).unwrap();
+    let folder = tempfile::tempdir().unwrap();
+    let store = Store::new(&ours, folder.path());
+    store.create().unwrap();
+    let missing = || store.progress(Shard::WHOLE).unwrap().missing;
+    let compute = || {
+        store
+            .compute(&missing(), 1, &AtomicBool::new(false), || ())
+            .unwrap()
+    };
+    assert_eq!(compute().runs, 2);
+    assert!(missing().is_empty());
+    let kept = folder.path().join("recordings");
+    let first = kept.join("run-000000000.mcap");
+    let left = kept.join(".run-000000000.mcap.abc.part");
+    let whole = std::fs::read(&first).unwrap();
+    std::fs::write(&first, &whole[..whole.len() / 2]).unwrap();
+    std::fs::write(&left, "half").unwrap();
+    assert_eq!(missing(), [0]);
+    compute();
+    assert!(std::fs::read(&first).unwrap() == whole && !left.exists());
+    std::fs::remove_file(kept.join("run-000000001.mcap")).unwrap();
+    assert_eq!(missing(), [0]);
+    // The table needs no recordings.
+    store.merge().unwrap();
+    assert!(store.is_merged());
+    let other = plan(&text("rms_roll_deg")).unwrap();
+    assert!(!Store::new(&other, folder.path()).is_merged());
+}
