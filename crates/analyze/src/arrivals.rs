@@ -22,8 +22,6 @@ pub(crate) struct Axis {
     pub remarks: Vec<(&'static str, String)>,
 }
 
-/// Stamps whose span is not the log's within this share tell no times.
-const SAME_SPAN: f64 = 0.1;
 /// Steps that scatter by more than this share of their mean are uneven.
 const UNEVEN: f64 = 0.25;
 /// More than this share of messages that no time can be told of is worth a word.
@@ -50,7 +48,7 @@ impl Arrivals {
 
     /// By the stamps, where these are the better times. Stamps that many messages of other content share are those of packets.
     fn by_stamps(&self, start_ns: i64, same: impl Fn(usize, usize) -> bool) -> Option<Axis> {
-        if !self.keeps_time() {
+        if self.stamp_ns.len() != self.len() {
             return None;
         }
         let stamp_ns = &self.stamp_ns;
@@ -67,7 +65,7 @@ impl Arrivals {
             .iter()
             .map(|r| seconds(first_ns, stamp_ns[*r]))
             .collect();
-        let Dated { t_s, remark } = dated(self.log_s(&rows, start_ns), Some(stamps));
+        let Dated { t_s, remark, .. } = dated(self.log_s(&rows, start_ns), Some(stamps));
         let axis = |remark| Axis::new(t_s, rows, vec![remark]);
         remark.filter(|(kind, _)| *kind == "by_stamps").map(axis)
     }
@@ -77,7 +75,7 @@ impl Arrivals {
         let mut rows: Vec<usize> = (0..self.len()).collect();
         rows.sort_by_key(|r| self.log_ns[*r]);
         rows.dedup_by(|b, a| self.log_ns[*a] == self.log_ns[*b] && same(*a, *b));
-        let Dated { t_s, remark } = dated(self.log_s(&rows, start_ns), None);
+        let Dated { t_s, remark, .. } = dated(self.log_s(&rows, start_ns), None);
         let mut dates: Vec<(f64, usize)> = t_s.into_iter().zip(rows).collect();
         let all = dates.len();
         dates.dedup_by(|b, a| b.0 <= a.0);
@@ -93,19 +91,6 @@ impl Arrivals {
     fn log_s(&self, rows: &[usize], start_ns: i64) -> Vec<f64> {
         let log = rows.iter().map(|r| seconds(start_ns, self.log_ns[*r]));
         log.collect()
-    }
-
-    /// Whether every message has a stamp and these run as the log does: those that are all zero, or count something else, do not.
-    fn keeps_time(&self) -> bool {
-        if self.stamp_ns.len() != self.len() {
-            return false;
-        }
-        let span = |times: &[i64]| {
-            let ends = (times.iter().min(), times.iter().max());
-            ends.0.zip(ends.1).map_or(0.0, |(a, b)| seconds(*a, *b))
-        };
-        let log_s = span(&self.log_ns);
-        (span(&self.stamp_ns) - log_s).abs() <= SAME_SPAN * log_s
     }
 }
 

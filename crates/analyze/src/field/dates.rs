@@ -16,6 +16,8 @@ const MORE_EVEN: f64 = 0.8;
 const EVEN_S: f64 = 2e-5;
 /// Samples whose usual step is below this share of their mean step came in packets.
 const PACKETS: f64 = 0.6;
+/// Stamps whose span is not the log's within this share tell no times.
+const SAME_SPAN: f64 = 0.1;
 /// A clock is set back once or twice; what goes back more often are messages that overtake each other.
 const SET_BACK: usize = 3;
 
@@ -35,6 +37,7 @@ pub fn dated(log_s: Vec<f64>, stamp_s: Option<Vec<f64>>) -> Dated {
     if let Some(stamp_s) = stamp_s
         && of_log > EVEN_S
         && stamp_s.len() == log_s.len()
+        && keep_time(&stamp_s, &log_s)
     {
         let back = stamp_s.windows(2).filter(|w| w[1] < w[0]).count();
         let overtaken = back > SET_BACK;
@@ -79,6 +82,17 @@ pub fn dated(log_s: Vec<f64>, stamp_s: Option<Vec<f64>>) -> Dated {
             remark: None,
         },
     }
+}
+
+/// Whether stamps run as the log does: those that are all zero, or count something else, do not.
+fn keep_time(stamp_s: &[f64], log_s: &[f64]) -> bool {
+    let [stamps_s, log_s] = [stamp_s, log_s].map(|t| {
+        let (low, high) = t
+            .iter()
+            .fold((f64::MAX, f64::MIN), |(a, b), t| (a.min(*t), b.max(*t)));
+        high - low
+    });
+    (stamps_s - log_s).abs() <= SAME_SPAN * log_s
 }
 
 /// Mean absolute difference of steps from the usual one, s.
@@ -157,7 +171,11 @@ mod tests {
         assert!(off < 5e-5, "{off}");
         // What is as even as its stamps is left alone.
         assert_eq!(dated(taken.clone(), Some(stamps)).t_s, taken);
-        assert!(dated(log, None).remark.is_none());
+        assert!(dated(log.clone(), None).remark.is_none());
+        // Stamps that nobody filled in, or in another unit.
+        for stamps in [vec![0.0; 6000], taken.iter().map(|t| 1e-3 * t).collect()] {
+            assert_eq!(dated(log.clone(), Some(stamps)).t_s, log);
+        }
     }
 
     #[test]

@@ -582,7 +582,7 @@ impl Columns {
         let (t_s, remark) = match own_s {
             Some(own_s) => (never_early(own_s, &log_s), None),
             None => {
-                let Dated { t_s, remark } = dated(log_s, None);
+                let Dated { t_s, remark, .. } = dated(log_s, None);
                 (t_s, remark)
             }
         };
