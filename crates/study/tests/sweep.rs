@@ -41,11 +41,12 @@ fn what_cannot_count_is_refused() {
             "hold 1 twice",
         ),
         (
-            "effects.gait.order\", from = 1, to = 3, count = 5",
+            "effects.gait.harmonics.0.order\", from = 2, to = 4, count = 5",
             "rounded to whole numbers",
         ),
     ] {
-        let text = format!("axes = [{{ key = \"{axis} }}]");
+        let harmonics = "set.effects.gait.harmonics = [{ order = 2, amplitude_m = [0.01, 0.0, 0.0] }]";
+        let text = format!("{harmonics}\naxes = [{{ key = \"{axis} }}]");
         assert!(refused(&text).contains(why), "{}", refused(&text));
     }
     assert!(refused("first_seed = 9223372036854775807\nseeds = 2").contains("first_seed"));
