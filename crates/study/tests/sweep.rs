@@ -45,7 +45,8 @@ fn what_cannot_count_is_refused() {
             "rounded to whole numbers",
         ),
     ] {
-        let harmonics = "set.effects.gait.harmonics = [{ order = 2, amplitude_m = [0.01, 0.0, 0.0] }]";
+        let harmonics =
+            "set.effects.gait.harmonics = [{ order = 2, amplitude_m = [0.01, 0.0, 0.0] }]";
         let text = format!("{harmonics}\naxes = [{{ key = \"{axis} }}]");
         assert!(refused(&text).contains(why), "{}", refused(&text));
     }
