@@ -2,6 +2,7 @@
 
 use crate::field::dates::{Dated, dated};
 use crate::inputs::{mean_step_in, stretches};
+use crate::summary::seconds;
 
 /// Log times and stamps of a topic's messages, in the order in which they came.
 #[derive(Clone, Debug, Default)]
@@ -99,11 +100,6 @@ impl Axis {
         remarks.extend(uneven(&t_s));
         Axis { t_s, rows, remarks }
     }
-}
-
-/// `to − from` in seconds, without overflow.
-fn seconds(from_ns: i64, to_ns: i64) -> f64 {
-    (i128::from(to_ns) - i128::from(from_ns)) as f64 / 1e9
 }
 
 /// A remark where steps between holes are far from even.

@@ -274,7 +274,7 @@ impl Times {
 }
 
 /// `to − from` in seconds, without overflow.
-fn seconds(from_ns: i64, to_ns: i64) -> f64 {
+pub(crate) fn seconds(from_ns: i64, to_ns: i64) -> f64 {
     let ns = match to_ns.checked_sub(from_ns) {
         Some(ns) => ns as f64,
         None => (i128::from(to_ns) - i128::from(from_ns)) as f64,

@@ -521,22 +521,18 @@ impl Columns {
         }
         let still = vec![0.0; n];
         let gyro = gyro.filter(|_| turns).unwrap_or([&still, &still, &still]);
-        let mut order: Vec<usize> = (0..n).collect();
+        let [x, y, z] = gyro;
+        let mut columns = [&t_s, x, y, z, accel[0], accel[1], accel[2]];
+        let sorted;
         if overtaken {
+            let mut order: Vec<usize> = (0..n).collect();
             // What has no time comes last and is left out.
             order.sort_by(|a, b| t_s[*a].total_cmp(&t_s[*b]));
+            sorted = columns.map(|x| order.iter().map(|k| x[*k]).collect::<Vec<f64>>());
+            columns = sorted.each_ref().map(|x| &x[..]);
         }
-        let [t_s, g @ .., x, y, z] = [
-            &t_s[..],
-            gyro[0],
-            gyro[1],
-            gyro[2],
-            accel[0],
-            accel[1],
-            accel[2],
-        ]
-        .map(|column| order.iter().map(|k| column[*k]).collect::<Vec<f64>>());
-        let track = Track::from_columns(&t_s, g.each_ref().map(|c| &c[..]), [&x, &y, &z]);
+        let [t_s, x, y, z, accel @ ..] = columns;
+        let track = Track::from_columns(t_s, [x, y, z], accel);
         let dropped = track.dropped - if turns { without } else { 0 };
         if dropped as f64 > MANY * n as f64 {
             remarks.push((

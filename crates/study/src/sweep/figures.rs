@@ -87,6 +87,11 @@ pub fn draw(plan: &Plan, store: &Store, folder: &Path) -> Result<usize, String> 
 /// What a figure leaves out, behind its title.
 const HALF: &str = "; where at least half of the runs have it";
 
+/// What the runs of a point say together, where at least half of them have the metric.
+fn counted(plan: &Plan, values: &[f64], turn: Option<f64>) -> Option<Spread> {
+    Spread::of_turning(values, turn).filter(|s| s.counts(plan.spec.seeds))
+}
+
 fn band(
     plan: &Plan,
     label: &str,
@@ -94,11 +99,10 @@ fn band(
     turn: Option<f64>,
 ) -> Option<Figure> {
     let axis = &plan.spec.axes[0];
-    let counted = |(axes, values): &(Vec<Cell>, Vec<f64>)| {
-        let spread = Spread::of_turning(values, turn).filter(|s| s.counts(plan.spec.seeds));
-        Some((axes[0].number()?, spread?))
-    };
-    let mut found: Vec<(f64, Spread)> = points.iter().filter_map(counted).collect();
+    let mut found: Vec<(f64, Spread)> = points
+        .iter()
+        .filter_map(|(axes, values)| Some((axes[0].number()?, counted(plan, values, turn)?)))
+        .collect();
     found.sort_by(|a, b| a.0.total_cmp(&b.0));
     if let Some(turn) = turn {
         for k in 1..found.len() {
@@ -139,17 +143,19 @@ fn map(
     let [y, x] = &plan.spec.axes[..] else {
         return None;
     };
-    let mean = |(_, values): &(Vec<Cell>, Vec<f64>)| {
-        let spread = Spread::of_turning(values, turn).filter(|s| s.counts(plan.spec.seeds));
-        spread.map_or(f64::NAN, |s| s.mean)
-    };
-    let mut means: Vec<f64> = points.iter().map(mean).collect();
+    let mut means: Vec<f64> = points
+        .iter()
+        .map(|(_, values)| counted(plan, values, turn).map_or(f64::NAN, |s| s.mean))
+        .collect();
     let first = means.iter().copied().find(|m| m.is_finite());
     if let (Some(turn), Some(first)) = (turn, first) {
         means.iter_mut().for_each(|m| *m = nearest(*m, first, turn));
     }
-    let few = |(_, values): &(Vec<Cell>, Vec<f64>)| 2 * (values.len() as u64) < plan.spec.seeds;
-    let left_out = if points.iter().any(few) { HALF } else { "" };
+    let left_out = if means.iter().any(|m| m.is_nan()) {
+        HALF
+    } else {
+        ""
+    };
     if means.iter().all(|m| m.is_nan()) {
         return None;
     }
