@@ -64,6 +64,26 @@ fn val_broad_height() {
 
 #[test]
 #[ignore = "needs recordings that are not shipped: see above"]
+fn val_broad_metrics() {
+    for name in BROAD {
+        let found = analysed(name);
+        // Not those of the height: it wanders more slowly than an inertial sensor sees.
+        for error in [
+            "rms_roll_deg_error",
+            "rms_pitch_deg_error",
+            "roll_excess_s_error",
+            "t_float_error",
+        ] {
+            let value = found.metrics.get(error).unwrap();
+            let (off, [low, high]) = (value.as_f64().unwrap(), value.ci95.unwrap());
+            println!("{name}: {error} {off:+.4}, {low:+.4} … {high:+.4}");
+            assert!((low..=high).contains(&0.0), "{name}: {error} {value:?}");
+        }
+    }
+}
+
+#[test]
+#[ignore = "needs recordings that are not shipped: see above"]
 fn val_oxford_steps() {
     for name in [
         "oxford_Pixel_Jamie_Hard_InHand_1.mcap",

@@ -3,20 +3,22 @@
 use recording::read::Recording;
 
 use super::{Columns, Records};
-use crate::clock::from_signals;
+use nalgebra::{UnitQuaternion, Vector3};
+
+use crate::clock::{Clock, from_signals};
 use crate::filter::{Band, butter, sosfiltfilt};
 use crate::imu::orientation::causal;
 use crate::imu::rath::Motion;
 use crate::imu::track::period_s;
 use crate::imu::truth::{Truth, inclination_error_deg, relative_error};
 use crate::imu::unloading::unloadings;
-use crate::imu::{Track, vertical};
-use crate::metrics::{Datum, Metrics, Value};
+use crate::imu::{Track, interval, vertical};
+use crate::metrics::{Datum, Metrics, Value, metrics_of};
 use crate::roles::{Role, Roles};
 use crate::steps::agreement;
 
 use super::carriers::Carriers;
-use crate::inputs::{Window, interpolate};
+use crate::inputs::{Inputs, Window, interpolate};
 
 /// Where a recording holds the moments of true steps.
 pub const STEP_TOPIC: &str = "/truth/step";
@@ -75,6 +77,9 @@ pub fn wants(field: &str) -> bool {
     HEIGHT.contains(&field) || ORIENTATION.iter().any(|o| o.contains(&field))
 }
 
+/// Corner below which the second derivative of an optical height is more than its noise, Hz.
+const SUPPORT_HZ: f64 = 10.0;
+
 /// A recorded truth and the raw sensor beside it.
 pub struct Judge {
     truth: Truth,
@@ -112,7 +117,10 @@ impl Judge {
                 }
             }
             let height = HEIGHT.iter().find_map(|f| columns.get(topic, f));
-            judge.height = height.map(|s| (s.times_s(columns.start_ns), s.values.clone()));
+            judge.height = height.map(|s| {
+                let all = s.times_s(columns.start_ns).into_iter().zip(&s.values);
+                all.filter(|(_, z)| z.is_finite()).unzip()
+            });
             judge.of_body = recording
                 .info()
                 .channels
@@ -136,18 +144,36 @@ impl Judge {
         window: Window,
     ) {
         let mut out: Vec<(&'static str, Value)> = Vec::new();
+        let mut of_pose = Metrics::default();
+        let mut slow_m = None;
         if let (Some(motion), Some(sensor)) = (motion, &self.sensor) {
             self.orientation(motion, sensor, window, &mut out);
+            let heave = self.heave(motion);
+            if let Some(heave) = &heave {
+                self.height_errors(motion, heave, window, &mut out);
+            }
+            slow_m = heave.as_ref().and_then(|h| h.slow_m(motion, window));
+            of_pose = self.metrics(motion, heave, window);
         }
         for (name, error) in ERRORS {
-            let (Some(truth), Some(estimate)) = (metrics.get(name), estimated.get(name)) else {
+            // A metric that came from the sensors itself has no truth beside it, but in the true pose.
+            let beside = metrics
+                .get(name)
+                .filter(|v| v.source != "imu" && !v.source.is_empty());
+            let truth = beside.or_else(|| of_pose.get(name));
+            let (Some(truth), Some(estimate)) = (truth, estimated.get(name)) else {
                 continue;
             };
-            // A metric that came from the sensors itself has no truth beside it.
-            if truth.source == "imu" || truth.source.is_empty() {
-                continue;
+            let mut error_of = difference(estimate, truth);
+            if let (Some(sd_m), None, true) = (slow_m, beside, interval::is_of_height(name)) {
+                let said = error_of.reason.take().map(|r| format!("{r}; "));
+                error_of.reason = Some(format!(
+                    "{}the true height has a course of SD {sd_m:.3} m slower than {} Hz, which the sensor does not see",
+                    said.unwrap_or_default(),
+                    motion.map_or(0.0, |m| m.settings.height_corner_hz)
+                ));
             }
-            out.push((*error, difference(estimate, truth)));
+            out.push((*error, error_of));
         }
         if !self.step_s.is_empty()
             && let Some(found) = carriers.first_steps()
@@ -192,6 +218,70 @@ impl Judge {
         metrics.0.extend(out);
     }
 
+    /// Body from sensor where the truth is the sensor's pose.
+    fn body_from_true(&self, motion: &Motion) -> UnitQuaternion<f64> {
+        match self.of_body {
+            true => UnitQuaternion::identity(),
+            false => motion.body_from_sensor,
+        }
+    }
+
+    /// The true height of the point whose height the sensor gives, and how its clock lies to the sensor's; `None` without a true height.
+    fn heave(&self, motion: &Motion) -> Option<Heave> {
+        let (t_s, z_m) = self.height.clone()?;
+        let mut heave = Heave {
+            t_s,
+            z_m,
+            clock: None,
+        };
+        if !self.of_body {
+            // From the sensor to the centre of mass.
+            let true_from_body = self.body_from_true(motion).inverse();
+            let lever = Vector3::from(motion.settings.lever_m);
+            let above = self.truth.world_from_body.iter();
+            let above: Vec<f64> = above.map(|q| (q * true_from_body * lever).z).collect();
+            let above = interpolate(&self.truth.t_s, &above, &heave.t_s);
+            heave.z_m.iter_mut().zip(above).for_each(|(z, a)| *z -= a);
+        }
+        // How old the accelerometer's stamps are beside the truth's (the gyroscope's may be older): both heaved alike.
+        let own = motion.height_m(vertical::CORNER_HZ);
+        let own = (&motion.inputs.t_s[..], &own[..]);
+        heave.clock = from_signals(own, (&heave.t_s, &heave.z_m), 0.1).ok();
+        Some(heave)
+    }
+
+    /// The motion's metrics of the true pose, for a body on which the sensor sits as `motion` takes it to.
+    fn metrics(&self, motion: &Motion, heave: Option<Heave>, window: Window) -> Metrics {
+        let true_from_body = self.body_from_true(motion).inverse();
+        let poses = self.truth.world_from_body.iter();
+        // R = Rz(yaw) Ry(pitch) Rx(roll), REP-103.
+        let angles = poses.map(|q| (q * true_from_body).euler_angles());
+        let (roll_rad, pitch_rad) = angles.map(|(roll, pitch, _)| (roll, pitch)).unzip();
+        let t_s = self.truth.t_s.clone();
+        let support = heave.as_ref().and_then(|h| h.support_ratio(motion));
+        let support_ratio = support.map_or_else(Vec::new, |ratio| {
+            interpolate(&motion.inputs.t_s, &ratio, &t_s)
+        });
+        let inputs = Inputs {
+            height_alone: heave.map(|h| (h.t_s, h.z_m)),
+            t_s,
+            roll_rad,
+            pitch_rad,
+            support_ratio,
+            gravity_m_per_s2: motion.settings.gravity_m_per_s2,
+            ..Inputs::default()
+        };
+        metrics_of(&inputs, window, interval::gives)
+    }
+
+    /// The stretches of time that count (s).
+    fn spans_s(&self, window: Window) -> Vec<(f64, f64)> {
+        match self.spans_s.is_empty() {
+            true => vec![(window.start_s, window.end_s)],
+            false => self.spans_s.clone(),
+        }
+    }
+
     fn orientation(
         &self,
         motion: &Motion,
@@ -202,36 +292,17 @@ impl Judge {
         if self.truth.t_s.is_empty() {
             return;
         }
-        let spans = if self.spans_s.is_empty() {
-            vec![(window.start_s, window.end_s)]
-        } else {
-            self.spans_s.clone()
-        };
+        let spans = self.spans_s(window);
         let options = motion.settings.orientation;
-        let sensor_from_body = motion.body_from_sensor.inverse();
+        let body_from_true = self.body_from_true(motion);
+        let true_from_sensor = body_from_true.inverse() * motion.body_from_sensor;
         let live: Vec<_> = causal(sensor, options)
             .earth_from_sensor
             .into_iter()
-            .map(|q| {
-                if self.of_body {
-                    q * sensor_from_body
-                } else {
-                    q
-                }
-            })
+            .map(|q| q * true_from_sensor.inverse())
             .collect();
-        let whole: Vec<_> = motion
-            .orientation
-            .earth_from_sensor
-            .iter()
-            .map(|q| {
-                if self.of_body {
-                    *q
-                } else {
-                    q * motion.body_from_sensor
-                }
-            })
-            .collect();
+        let whole = motion.orientation.earth_from_sensor.iter();
+        let whole: Vec<_> = whole.map(|q| q * body_from_true).collect();
         let mut push = |name, error: Option<f64>| {
             let value = match error {
                 Some(e) => Value::number(e),
@@ -259,28 +330,32 @@ impl Judge {
             "inclination_error_batch_deg",
             inclination_error_deg(&motion.inputs.t_s, &whole, &self.truth, &spans),
         );
-        let Some((t_s, z)) = &self.height else { return };
-        let height_m = motion.height_m(vertical::CORNER_HZ);
-        let inner = spans
+    }
+
+    fn height_errors(
+        &self,
+        motion: &Motion,
+        heave: &Heave,
+        window: Window,
+        out: &mut Vec<(&'static str, Value)>,
+    ) {
+        let inner = self
+            .spans_s(window)
             .iter()
             .fold((f64::MAX, f64::MIN), |(a, b), s| (a.min(s.0), b.max(s.1)));
-        let clean: (Vec<f64>, Vec<f64>) = t_s.iter().zip(z).filter(|(_, z)| z.is_finite()).unzip();
-        // How old the accelerometer's stamps are beside the truth's (the gyroscope's may be older): both heaved alike.
-        let own = (&motion.inputs.t_s[..], &height_m[..]);
-        let clock = from_signals(own, (&clean.0, &clean.1), 0.1).ok();
-        let offset_s = clock.map_or(0.0, |c| c.offset_s);
+        let height_m = motion.height_m(vertical::CORNER_HZ);
         let error = relative_error(
             (&motion.inputs.t_s, &height_m),
-            (&clean.0, &clean.1),
+            (&heave.t_s, &heave.z_m),
             vertical::VALID_BAND_HZ,
-            offset_s,
+            heave.offset_s(),
             inner,
         );
-        if let Some(value) = unloading_agreement(motion, &clean, offset_s, inner) {
+        if let Some(value) = unloading_agreement(motion, heave, inner) {
             out.push(("unloading_f1", value));
         }
         if let Some(e) = error {
-            let text = match clock {
+            let text = match heave.clock {
                 Some(c) => format!(
                     "RMS of the difference over RMS of the truth, both 0.3 to 10 Hz, after {:+.2} ± {:.2} ms between the two clocks",
                     1e3 * c.offset_s,
@@ -304,37 +379,23 @@ impl Judge {
 /// below 10 Hz: the share that agrees to 10 ms (F1). `None` where the truth is slower than 100 Hz or nothing is unloaded.
 fn unloading_agreement(
     motion: &Motion,
-    (u_s, z): &(Vec<f64>, Vec<f64>),
-    clock_s: f64,
+    heave: &Heave,
     (from_s, to_s): (f64, f64),
 ) -> Option<Value> {
     const WITHIN_S: f64 = 0.01;
     let t_s = &motion.inputs.t_s;
-    let step_s = period_s(t_s)?;
-    if period_s(u_s)? > 0.01 || t_s.len() < 3 {
-        return None;
-    }
     let g = motion.settings.gravity_m_per_s2;
-    let shifted: Vec<f64> = t_s.iter().map(|t| t + clock_s).collect();
-    let z = interpolate(u_s, z, &shifted);
-    let mut lifted: Vec<f64> = z
-        .windows(3)
-        .map(|w| (w[0] - 2.0 * w[1] + w[2]) / (step_s * step_s))
+    let measured: Vec<f64> = motion
+        .accel_up_m_per_s2
+        .iter()
+        .map(|a| 1.0 + a / g)
         .collect();
-    lifted.insert(0, lifted[0]);
-    lifted.push(lifted[lifted.len() - 1]);
-    let sections = butter(2, Band::Low(10.0), 1.0 / step_s).ok()?;
-    let moments = |up: &[f64]| -> Option<Vec<f64>> {
-        let ratio: Vec<f64> = sosfiltfilt(&sections, up)
-            .ok()?
-            .iter()
-            .map(|a| 1.0 + a / g)
-            .collect();
+    let support = [slower(t_s, &measured)?, heave.support_ratio(motion)?];
+    let [found, truth] = support.map(|ratio| {
         let mut found = unloadings(t_s, &ratio);
         found.retain(|t| (from_s..=to_s).contains(t));
-        Some(found)
-    };
-    let (found, truth) = (moments(&motion.accel_up_m_per_s2)?, moments(&lifted)?);
+        found
+    });
     if truth.is_empty() {
         return None;
     }
@@ -346,13 +407,65 @@ fn unloading_agreement(
         found.len(),
         1e3 * WITHIN_S,
         1e3 * a.offset_s,
-        1e3 * clock_s
+        1e3 * heave.offset_s()
     );
     Some(Value {
         unit: "1",
         reason: Some(text),
         ..Value::number(a.f1).source("imu")
     })
+}
+
+/// A true height over time.
+struct Heave {
+    t_s: Vec<f64>,
+    z_m: Vec<f64>,
+    /// From the sensor's clock to this one; `None` where they could not be compared.
+    clock: Option<Clock>,
+}
+
+impl Heave {
+    fn offset_s(&self) -> f64 {
+        self.clock.map_or(0.0, |c| c.offset_s)
+    }
+
+    /// SD of what of it is slower than the sensor's corner, m; `None` where that is below a tenth of the whole.
+    fn slow_m(&self, motion: &Motion, window: Window) -> Option<f64> {
+        let t_s = &motion.inputs.t_s;
+        let z_m = interpolate(&self.t_s, &self.z_m, t_s);
+        let corner = Band::Low(motion.settings.height_corner_hz);
+        let slow = sosfiltfilt(&butter(2, corner, 1.0 / period_s(t_s)?).ok()?, &z_m).ok()?;
+        let sd = |x: &[f64]| {
+            let mean = x.iter().sum::<f64>() / x.len() as f64;
+            (x.iter().map(|x| (x - mean).powi(2)).sum::<f64>() / x.len() as f64).sqrt()
+        };
+        let within = window.range(t_s);
+        let (slow, all) = (sd(&slow[within.clone()]), sd(&z_m[within]));
+        (slow > 0.1 * all).then_some(slow)
+    }
+
+    /// The support ratio 1 + z̈ / g below [`SUPPORT_HZ`] at the sensor's times. `None` where the height is slower than 100 Hz.
+    fn support_ratio(&self, motion: &Motion) -> Option<Vec<f64>> {
+        let t_s = &motion.inputs.t_s;
+        let step_s = period_s(t_s)?;
+        if period_s(&self.t_s)? > 0.01 || t_s.len() < 3 {
+            return None;
+        }
+        let g = motion.settings.gravity_m_per_s2;
+        let shifted: Vec<f64> = t_s.iter().map(|t| t + self.offset_s()).collect();
+        let z_m = interpolate(&self.t_s, &self.z_m, &shifted);
+        let ratio = |w: &[f64]| 1.0 + (w[0] - 2.0 * w[1] + w[2]) / (step_s * step_s * g);
+        let mut all: Vec<f64> = z_m.windows(3).map(ratio).collect();
+        all.insert(0, all[0]);
+        all.push(all[all.len() - 1]);
+        slower(t_s, &all)
+    }
+}
+
+/// What of `x` is slower than [`SUPPORT_HZ`].
+fn slower(t_s: &[f64], x: &[f64]) -> Option<Vec<f64>> {
+    let sections = butter(2, Band::Low(SUPPORT_HZ), 1.0 / period_s(t_s)?).ok()?;
+    sosfiltfilt(&sections, x).ok()
 }
 
 /// Estimate minus truth.
@@ -418,7 +531,10 @@ fn movement(records: &Records, start_ns: i64) -> Vec<(f64, f64)> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::imu::orientation::Options;
+    use crate::imu::rath::{Mounting, Settings, motion};
     use std::collections::BTreeMap;
+    use std::f64::consts::{PI, SQRT_2, TAU};
 
     #[test]
     fn movement_spans_count_from_the_first_message() {
@@ -441,5 +557,96 @@ mod tests {
             &Value::word("mixed", String::new()),
         );
         assert_eq!(word.as_f64(), Some(1.0));
+    }
+
+    /// A load that heaves until it is unloaded and rolls, its sensor 0.36 m off the centre of mass, and the pose of that sensor: what the errors
+    /// are taken against is in closed form.
+    #[test]
+    fn a_true_pose_of_the_sensor_judges_the_motion_of_the_centre_of_mass() {
+        const G: f64 = 9.81;
+        let lever_m = [0.0, 0.2, 0.3];
+        let (roll, heave) = (0.3, 1.4 * G / (TAU * 1.8).powi(2));
+        let (mut track, mut truth) = (Track::default(), Truth::default());
+        let mut height = (Vec::new(), Vec::new());
+        for k in 0..8000 {
+            let t = 0.005 * f64::from(k);
+            let (s, c) = (TAU * 0.9 * t).sin_cos();
+            let (angle, rate, turn) = (
+                roll * s,
+                roll * TAU * 0.9 * c,
+                -roll * (TAU * 0.9).powi(2) * s,
+            );
+            let (z, lift) = (
+                heave * (TAU * 1.8 * t).sin(),
+                -1.4 * G * (TAU * 1.8 * t).sin(),
+            );
+            let world_from_body = UnitQuaternion::from_euler_angles(angle, 0.0, 0.0);
+            let r = world_from_body * Vector3::from(lever_m);
+            let about = Vector3::x();
+            let pull = about.cross(&r) * turn + about.cross(&about.cross(&r)) * (rate * rate);
+            let force = world_from_body.inverse() * (pull + Vector3::z() * (lift + G));
+            track.t_s.push(t);
+            track.gyro_rad_per_s.push([rate, 0.0, 0.0]);
+            track.accel_m_per_s2.push(force.into());
+            truth.t_s.push(t);
+            truth.world_from_body.push(world_from_body);
+            height.0.push(t);
+            height.1.push(z + r.z);
+        }
+        let settings = Settings {
+            orientation: Options {
+                latency_s: 0.0,
+                accel_latency_s: 0.0,
+                ..Options::default()
+            },
+            mounting: Mounting::Known(UnitQuaternion::identity()),
+            lever_m,
+            lever_is_known: true,
+            gravity_m_per_s2: G,
+            ..Settings::default()
+        };
+        let motion = motion(&track, &settings).unwrap();
+        let judge = Judge {
+            truth,
+            height: Some(height),
+            sensor: Some(track),
+            of_body: false,
+            spans_s: Vec::new(),
+            step_s: Vec::new(),
+        };
+        let window = Window {
+            start_s: 5.0,
+            // Whole periods.
+            end_s: 34.9975,
+        };
+        let estimated = interval::metrics(&motion, window);
+        // As in a field log: what the recording has comes from the sensor.
+        let mut metrics = estimated.clone();
+        let carriers = Carriers::default();
+        judge.errors(Some(&motion), &carriers, &estimated, &mut metrics, window);
+        let floating = (PI - 2.0 * (0.95f64 / 1.4).asin()) / TAU;
+        for (name, error, truth, within) in [
+            (
+                "rms_roll_deg",
+                "rms_roll_deg_error",
+                (roll / SQRT_2).to_degrees(),
+                1e-6,
+            ),
+            ("rms_z_m", "rms_z_m_error", heave / SQRT_2, 1e-5),
+            ("dz_pp_m", "dz_pp_m_error", 2.0 * heave, 1e-3 * heave),
+            ("t_float", "t_float_error", floating, 2e-3),
+            ("peak_hz", "peak_hz_error", 1.8, 1e-3),
+            ("growth_ratio", "growth_ratio_error", 1.0, 1e-3),
+        ] {
+            let (estimate, error) = (metrics.number(name).unwrap(), metrics.get(error).unwrap());
+            let found = estimate - error.as_f64().unwrap();
+            assert!(
+                (found - truth).abs() < within,
+                "{name}: {found} for {truth}"
+            );
+            let [low, high] = error.ci95.unwrap();
+            assert!((low..=high).contains(&0.0), "{name}: {error:?}");
+        }
+        assert!(metrics.number("inclination_error_batch_deg").unwrap() < 0.05);
     }
 }

@@ -50,6 +50,11 @@ pub fn gives(name: &str) -> bool {
     FROM_MOTION.contains(&name)
 }
 
+/// Whether a metric rests on the height, whose slow course an inertial sensor loses.
+pub fn is_of_height(name: &str) -> bool {
+    OF_COURSE.contains(&name) || OF_HEAVE.contains(&name)
+}
+
 /// Every metric that rests on the motion alone, over `window`, each number with its 95 % interval.
 pub fn metrics(motion: &Motion, window: Window) -> Metrics {
     let mut out = metrics_of(&motion.inputs, window, gives);

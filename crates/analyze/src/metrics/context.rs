@@ -268,7 +268,7 @@ impl<'a> Context<'a> {
             Need::Roll => !i.roll_rad.is_empty(),
             Need::Pitch => !i.pitch_rad.is_empty(),
             Need::Yaw => !i.yaw_rad.is_empty(),
-            Need::Height => !i.height_m.is_empty(),
+            Need::Height => !i.height().1.is_empty(),
             Need::Forces => !i.normal_n.is_empty(),
             Need::Support => !i.normal_n.is_empty() || !i.support_ratio.is_empty(),
             Need::Phases => !i.phase_rad.is_empty(),
