@@ -115,9 +115,11 @@ pub struct Analysis {
     pub inputs: Inputs,
     /// Outlines of signals that play no role, where they were asked for.
     pub traces: Vec<Trace>,
+    /// How many signals have no place in `traces`.
+    pub undrawn: u64,
 }
 
-/// Signals of one topic and unit, drawn together: name, times (s) and values of each.
+/// Signals of one topic and unit, or without one and alike large, drawn together, no more than there are colours: name, times (s) and values of each.
 #[derive(Clone, Debug, Default)]
 pub struct Trace {
     /// Topic and the part of the path that the signals share.
@@ -126,6 +128,12 @@ pub struct Trace {
     pub label: String,
     /// Name, times and values.
     pub series: Vec<(String, Vec<f64>, Vec<f64>)>,
+}
+
+/// Whether one scale shows both: the larger's greatest size is at most ten times the smaller's.
+fn are_alike_large(x: &[f64], y: &[f64]) -> bool {
+    let [x, y] = [x, y].map(|v| v.iter().fold(0.0, |most: f64, v| most.max(v.abs())));
+    x.max(y) <= 10.0 * x.min(y)
 }
 
 /// So many times tell a rate.
@@ -137,6 +145,8 @@ const LEAST_ABSENT: f64 = 0.02;
 const LEAST_ABSENT_S: f64 = 1.0;
 /// At most so many panels of traces are kept.
 const MOST_TRACES: usize = 24;
+/// At most so many signals are drawn in one panel: as there are colours.
+pub(crate) const MOST_SERIES: usize = 7;
 
 impl Analysis {
     /// What is lost, where something is: one sentence; the exit code is 3 then.
@@ -240,6 +250,7 @@ pub fn examine(
     }));
     events.extend(field.events());
     events.sort_by(|a, b| a.t_s.total_cmp(&b.t_s));
+    let (traces, undrawn) = pass.traces();
     let topics = pass.topics();
     let samples = match inputs.t_s.len() {
         0 => topics.iter().map(|t| t.messages).max().unwrap_or(0),
@@ -265,7 +276,8 @@ pub fn examine(
         spectra,
         events,
         inputs,
-        traces: pass.traces(),
+        traces,
+        undrawn,
     })
 }
 
@@ -801,7 +813,8 @@ impl<'a> Pass<'a> {
     }
 
     /// Outlines of moving signals without a role, those of one vector together.
-    fn traces(&self) -> Vec<Trace> {
+    /// What is drawn of signals that play no role, and how many of them are not.
+    fn traces(&self) -> (Vec<Trace>, u64) {
         // Topics that play a role are drawn as that; transforms, scenes and joints repeat them.
         let known = |channel: usize| {
             let info = &self.recording.info().channels[channel];
@@ -827,6 +840,7 @@ impl<'a> Pass<'a> {
             .collect();
         drawn.sort_by(|a, b| natural(&a.path, &b.path));
         let mut traces: Vec<Trace> = Vec::new();
+        let mut undrawn = 0;
         for entry in drawn {
             let Some(outline) = &entry.outline else {
                 continue;
@@ -842,10 +856,12 @@ impl<'a> Pass<'a> {
             } else {
                 entry.unit.to_owned()
             };
-            match traces
-                .iter()
-                .position(|t| t.topic == shared && t.label == label)
-            {
+            let fits = |t: &Trace| {
+                let seen = &t.series[0].2;
+                let alike = !entry.unit.is_empty() || are_alike_large(seen, &x);
+                t.topic == shared && t.label == label && alike && t.series.len() < MOST_SERIES
+            };
+            match traces.iter().position(fits) {
                 Some(k) => traces[k].series.push((last.to_owned(), t_s, x)),
                 None if traces.len() < MOST_TRACES => {
                     traces.push(Trace {
@@ -854,10 +870,10 @@ impl<'a> Pass<'a> {
                         series: vec![(last.to_owned(), t_s, x)],
                     });
                 }
-                None => {}
+                None => undrawn += 1,
             }
         }
-        traces
+        (traces, undrawn)
     }
 
     fn roles_played(&self) -> Vec<(&'static str, Vec<String>)> {

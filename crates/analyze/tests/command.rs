@@ -798,6 +798,44 @@ fn an_orientation_that_comes_late_is_turned_into_angles() {
     assert!((roll["max"].as_f64().unwrap() - 0.3).abs() < 1e-3);
 }
 
+/// What has no unit shares a scale with what is alike large only, and no panel uses a colour twice.
+#[test]
+fn signals_share_a_panel_where_one_scale_shows_them() {
+    let folder = tempfile::tempdir().unwrap();
+    let message = |k: u32| {
+        let t = f64::from(k) / 50.0;
+        let small = (0..9).map(|i| format!("\"v{i}\":{}", 1.0 + 0.1 * tone(f64::from(i + 1), t)));
+        let rest = format!(
+            "\"rpm\":{},\"torque\":{}",
+            3000.0 + t,
+            500.0 + 30.0 * tone(2.0, t)
+        );
+        let fields: Vec<String> = small.chain([rest]).collect();
+        (t, format!("{{{}}}", fields.join(",")))
+    };
+    let file = told(folder.path(), &[("/m", (0..500).map(message).collect())]);
+    let opened = recording::read::Recording::open(Path::new(&file), &Default::default()).unwrap();
+    let request = analyze::examine::Request {
+        traces: true,
+        ..Default::default()
+    };
+    let found = analyze::examine::examine("told", &opened, &request).unwrap();
+    let panels: Vec<Vec<&str>> = found
+        .traces
+        .iter()
+        .map(|t| t.series.iter().map(|(name, ..)| &name[..]).collect())
+        .collect();
+    assert_eq!(
+        panels,
+        [
+            vec!["rpm", "torque"],
+            vec!["v0", "v1", "v2", "v3", "v4", "v5", "v6"],
+            vec!["v7", "v8"]
+        ]
+    );
+    assert_eq!(found.undrawn, 0);
+}
+
 #[test]
 fn a_report_is_one_page_that_loads_nothing() {
     let folder = tempfile::tempdir().unwrap();

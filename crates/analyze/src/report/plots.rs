@@ -1,19 +1,21 @@
 //! What is drawn, whatever draws it: the HTML report and the figures share these descriptions, so they share one look.
 
 use crate::envelope::outline;
-use crate::examine::Analysis;
+use crate::examine::{Analysis, MOST_SERIES};
 use crate::inputs::{Window, about_mean, mean_step_s, stretches};
 use crate::mechanism::spline_derivatives;
 use crate::peaks::SpectrumSummary;
 use crate::phase;
 use crate::spectrum::{Mode, Options, spectrogram};
-use recording::topics;
+use recording::{text::counted, topics};
 use std::ops::Range;
 
 /// Okabe and Ito's colours, distinct to every kind of colour vision (jfly, 2008); black comes last: it vanishes on dark paper.
 pub const COLOURS: [&str; 7] = [
     "#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9", "#7F7F7F",
 ];
+
+const _: () = assert!(MOST_SERIES == COLOURS.len());
 
 /// A line or a cloud of points.
 #[derive(Clone, Debug, Default)]
@@ -279,12 +281,20 @@ pub fn plots(a: &Analysis) -> Vec<Plot> {
         .chain(force_plane(a))
         .for_each(&mut panel);
     // The account has panels of its own; what each effect did is a sum since the start, which the table of signals tells.
-    for trace in (a.traces.iter()).filter(|t| !t.topic.starts_with(topics::ENERGY)) {
+    let traces = (a.traces.iter()).filter(|t| !t.topic.starts_with(topics::ENERGY));
+    let last = traces.clone().count().saturating_sub(1);
+    for (k, trace) in traces.enumerate() {
         let mut p = Panel::over_time("signals", &trace.topic, &unit(&trace.label), a);
         // That beats are counted is no curve.
         let counts = |name: &str| trace.topic == topics::BEAT && name == "number";
         for (name, t_s, x) in trace.series.iter().filter(|(name, ..)| !counts(name)) {
             p.line(name.clone(), t_s, x);
+        }
+        if k == last && a.undrawn > 0 {
+            p.note = format!(
+                "{} not drawn: --signal and --topic choose which are.",
+                counted(a.undrawn, "more signal is", "more signals are")
+            );
         }
         panel(p);
     }
