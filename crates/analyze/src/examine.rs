@@ -4,6 +4,7 @@ use std::collections::{BTreeMap, BTreeSet, HashMap, HashSet};
 
 use rayon::prelude::*;
 use recording::read::{Batch, ReadError, Recording};
+use recording::signal::unit_of;
 use recording::text::counted;
 
 use crate::arrivals::{Arrivals, Axis};
@@ -16,7 +17,7 @@ use crate::peaks::SpectrumSummary;
 use crate::phase::{unwrap, wrap};
 use crate::quality::Quality;
 use crate::quaternion::Quaternions;
-use crate::roles::{Role, Roles, RolesFile, matches, of_topic};
+use crate::roles::{AngleUnit, Role, Roles, RolesFile, matches, of_topic};
 use crate::summary::{Stream, Summary, Times, segment};
 
 /// What is asked of a recording.
@@ -143,6 +144,8 @@ const MOST_SORTED: u64 = 1 << 24;
 /// A topic that begins so late or ends so early is worth a word: this share of the window, and this long (s).
 const LEAST_ABSENT: f64 = 0.02;
 const LEAST_ABSENT_S: f64 = 1.0;
+/// No attitude that is wrapped goes beyond half a turn (rad); a little more for what rounds.
+const LARGEST_ANGLE_RAD: f64 = 3.15;
 /// At most so many panels of traces are kept.
 const MOST_TRACES: usize = 24;
 /// At most so many signals are drawn in one panel: as there are colours.
@@ -475,7 +478,8 @@ impl<'a> Pass<'a> {
             let entry = match self.by_column[column.id] {
                 Some(entry) => entry,
                 None => {
-                    let entry = self.entry(batch, column.path);
+                    let unit = unit_of(batch.schema, field(batch.topic, column.path));
+                    let entry = self.entry(batch, column.path, unit);
                     self.by_column[column.id] = Some(entry);
                     entry
                 }
@@ -488,7 +492,7 @@ impl<'a> Pass<'a> {
                 let entry = match self.by_path.get(path) {
                     Some(entry) => *entry,
                     None => {
-                        let entry = self.entry(batch, path);
+                        let entry = self.entry(batch, path, "rad");
                         self.by_path.insert(path.to_owned(), entry);
                         entry
                     }
@@ -499,11 +503,8 @@ impl<'a> Pass<'a> {
         self.quaternions = quaternions;
     }
 
-    fn entry(&mut self, batch: &Batch<'_>, path: &str) -> usize {
-        let field = path
-            .strip_prefix(batch.topic)
-            .unwrap_or(path)
-            .trim_start_matches('.');
+    fn entry(&mut self, batch: &Batch<'_>, path: &str, unit: &'static str) -> usize {
+        let field = field(batch.topic, path);
         // The batch's own rate, where it shows one: a topic need not last as long as the file.
         let times = &self.times[batch.channel];
         let hz = match times.count() >= FEW {
@@ -521,15 +522,9 @@ impl<'a> Pass<'a> {
         let clock = field.contains("stamp.") || field == "time_s";
         let lines = listed && !clock;
         let nperseg = if lines { segment(hz, messages) } else { 0 };
-        let angle = crate::quaternion::ANGLES
-            .iter()
-            .any(|a| field.rsplit('.').next() == Some(a));
         self.entries.push(Entry {
             path: path.to_owned(),
-            unit: match recording::signal::unit_of(batch.schema, field) {
-                "" if angle => "rad",
-                unit => unit,
-            },
+            unit,
             channel: batch.channel,
             listed,
             lines,
@@ -679,6 +674,12 @@ impl<'a> Pass<'a> {
         Ok(Vec::new())
     }
 
+    /// The topic of a signal, and its path in the message.
+    fn names<'s>(&'s self, entry: &'s Entry) -> (&'s str, &'s str) {
+        let topic = self.recording.info().channels[entry.channel].topic.as_str();
+        (topic, field(topic, &entry.path))
+    }
+
     /// Remarks on single values: what is no rotation, and what is too large or too small to be squared.
     fn odd_values(&self) -> Vec<Quality> {
         let info = self.recording.info();
@@ -696,8 +697,7 @@ impl<'a> Pass<'a> {
                 continue;
             }
             let t_s = (i128::from(*first_ns) - start_ns) as f64 / 1e9;
-            let field = path.strip_prefix(topic.as_str()).unwrap_or(path);
-            let field = field.trim_start_matches('.');
+            let field = field(topic, path);
             out.push(Quality {
                 count: *count,
                 t_s: Some(t_s),
@@ -707,14 +707,20 @@ impl<'a> Pass<'a> {
                 ))
             });
         }
+        let attitude = [Role::Roll, Role::Pitch, Role::Yaw].into_iter();
+        for entry in attitude.flat_map(|role| self.players(role)) {
+            let most = (entry.kept.iter().map(|(_, x)| x.abs())).fold(0.0, f64::max);
+            let told = !entry.unit.is_empty() || self.in_degrees(entry);
+            if most > LARGEST_ANGLE_RAD && !told {
+                let (topic, field) = self.names(entry);
+                out.push(Quality::remark(topic, "large_angle", format!(
+                    "{field} reaches {most:.1}, taken as radians: where these are degrees, write angle_unit = \"deg\" in a roles file"
+                )));
+            }
+        }
         for entry in self.entries.iter().filter(|e| e.listed) {
             if let Some((low, high)) = entry.stream.beyond_squares() {
-                let topic = &info.channels[entry.channel].topic;
-                let field = entry
-                    .path
-                    .strip_prefix(topic.as_str())
-                    .unwrap_or(&entry.path);
-                let field = field.trim_start_matches('.');
+                let (topic, field) = self.names(entry);
                 out.push(Quality::remark(topic, "out_of_range", format!(
                     "values of {field} from {low:e} to {high:e} cannot be squared with the digits of a float: no spread and no spectrum is told of them"
                 )));
@@ -941,13 +947,28 @@ impl<'a> Pass<'a> {
         remarks
     }
 
-    /// A role's column, ascending in time, at most one value per time.
+    /// Whether an angle that plays a role is in degrees: by its field's name, else by the roles file.
+    fn in_degrees(&self, entry: &Entry) -> bool {
+        let said = self.request.roles.as_ref().and_then(|r| r.angle_unit);
+        let told = !entry.unit.is_empty();
+        let degrees = if told {
+            entry.unit == "deg"
+        } else {
+            said == Some(AngleUnit::Deg)
+        };
+        degrees && entry.role.is_some_and(Role::is_angle)
+    }
+
+    /// A role's column, ascending in time, at most one value per time; angles in radians.
     fn column(&self, entry: &Entry) -> (Vec<f64>, Vec<f64>) {
         let topic = self.first[entry.channel];
         let Some(axis) = self.axes.get(&topic) else {
             return Default::default();
         };
-        let x = by_row(&entry.kept, self.arrivals[topic].len());
+        let mut x = by_row(&entry.kept, self.arrivals[topic].len());
+        if self.in_degrees(entry) {
+            x.iter_mut().flatten().for_each(|a| *a = a.to_radians());
+        }
         let each = axis.t_s.iter().zip(&axis.rows);
         each.filter_map(|(t, row)| Some((*t, x[*row]?))).unzip()
     }
@@ -1081,6 +1102,13 @@ impl<'a> Pass<'a> {
         let columns = players.iter().zip(found).map(on_axis).collect();
         (axis, columns)
     }
+}
+
+/// The path of a signal in its message.
+fn field<'a>(topic: &str, path: &'a str) -> &'a str {
+    path.strip_prefix(topic)
+        .unwrap_or(path)
+        .trim_start_matches('.')
 }
 
 /// Values by message; `None` where a message has none.

@@ -71,6 +71,14 @@ impl Role {
         !self.is_topic() && !matches!(self, Role::Forces | Role::Phases)
     }
 
+    /// Whether what plays it is an angle.
+    pub fn is_angle(self) -> bool {
+        matches!(
+            self,
+            Role::Roll | Role::Pitch | Role::Yaw | Role::Phases | Role::BeatPhase
+        )
+    }
+
     /// Whether the role is played by whole topics, not by single signals.
     pub fn is_topic(self) -> bool {
         matches!(self, Role::Imu | Role::Carriers | Role::Beats | Role::Truth)
@@ -97,6 +105,8 @@ pub struct RolesFile {
     carriers: Vec<String>,
     beats: Option<String>,
     truth: Option<String>,
+    /// Unit of angles whose field does not tell its own by a suffix; radians where nobody says.
+    pub angle_unit: Option<AngleUnit>,
     /// Mass of what is carried (kg); stands over the recording's own.
     #[serde(default, deserialize_with = "above_zero")]
     pub mass_kg: Option<f64>,
@@ -118,6 +128,16 @@ pub struct RolesFile {
     /// How old an accelerometer's sample is at its stamp (s).
     #[serde(default, deserialize_with = "age")]
     pub accel_age_s: Option<f64>,
+}
+
+/// Unit of an angle.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum AngleUnit {
+    /// Radians.
+    Rad,
+    /// Degrees.
+    Deg,
 }
 
 /// One name, or a list of them.

@@ -634,6 +634,48 @@ fn bursts_are_dated_by_their_stamps() {
     assert!(kinds(&found).contains(&"by_stamps".to_owned()));
 }
 
+/// A roll in degrees is one where its name or the user says so, and is suspected where it goes beyond half a turn.
+#[test]
+fn degrees_are_taken_as_such() {
+    let folder = tempfile::tempdir().unwrap();
+    let message = |k: u32| {
+        let t = f64::from(k) / 30.0;
+        let roll_deg = 20.0 * tone(1.0, t);
+        (
+            t,
+            format!("{{\"roll\":{roll_deg},\"roll_deg\":{roll_deg}}}"),
+        )
+    };
+    let file = told(folder.path(), &[("/s", (0..900).map(message).collect())]);
+    for (roles, rms_deg, suspected) in [
+        ("roll = \"/s.roll_deg\"\n", 20.0 / 2f64.sqrt(), false),
+        (
+            "roll = \"/s.roll\"\nangle_unit = \"deg\"\n",
+            20.0 / 2f64.sqrt(),
+            false,
+        ),
+        (
+            "roll = \"/s.roll\"\n",
+            (20.0 / 2f64.sqrt()).to_degrees(),
+            true,
+        ),
+        (
+            "roll = \"/s.roll_deg\"\nangle_unit = \"rad\"\n",
+            20.0 / 2f64.sqrt(),
+            false,
+        ),
+    ] {
+        let found = with_roles(folder.path(), &file, roles);
+        let rms = metric(&found, "rms_roll_deg");
+        assert!((rms / rms_deg - 1.0).abs() < 1e-6, "{roles}: {rms}");
+        assert_eq!(
+            kinds(&found).contains(&"large_angle".to_owned()),
+            suspected,
+            "{roles}"
+        );
+    }
+}
+
 /// A height that is sampled faster than the roll keeps its line, and a slower one its size.
 #[test]
 fn height_is_judged_on_its_own_clock() {
