@@ -130,10 +130,17 @@ mod tests {
 
     /// 900 messages that come by nines, and what is found of them.
     fn bursts(stamp: Option<fn(i64) -> i64>) -> Axis {
+        bursts_of(9, stamp)
+    }
+
+    fn bursts_of(many: i64, stamp: Option<fn(i64) -> i64>) -> Axis {
         let mut arrivals = Arrivals::default();
         for k in 0..900 {
             let stamp = stamp.map(|s| [s(k)]);
-            arrivals.push(&[taken_ns(k / 9 * 9 + 9)], stamp.as_ref().map(|s| &s[..]));
+            arrivals.push(
+                &[taken_ns(k / many * many + many)],
+                stamp.as_ref().map(|s| &s[..]),
+            );
         }
         arrivals.dated(0, |_, _| false)
     }
@@ -175,8 +182,8 @@ mod tests {
         // Stamps that are all zero are none, and those of the packets tell no more than the log.
         let zero: fn(i64) -> i64 = |_| 0;
         let shared: fn(i64) -> i64 = |k| taken_ns(k / 9 * 9);
-        for stamp in [None, Some(zero), Some(shared)] {
-            let axis = bursts(stamp);
+        for (many, stamp) in [(9, None), (30, None), (9, Some(zero)), (9, Some(shared))] {
+            let axis = bursts_of(many, stamp);
             assert_eq!(axis.t_s.len(), 900);
             assert!(farthest_step_s(&axis) < 1e-4);
             assert_eq!(axis.remarks[0].0, "packets");
@@ -192,9 +199,9 @@ mod tests {
         let axis = arrivals.dated(0, |a, b| a / 2 == b / 2);
         assert_eq!(axis.rows, (0..400).step_by(2).collect::<Vec<_>>());
         assert!(axis.remarks.is_empty(), "{:?}", axis.remarks);
-        // Packets of thirty, too long to be told from pauses.
+        // Packets of thirty, too few to tell their rate.
         let mut arrivals = Arrivals::default();
-        (0..900).for_each(|k| arrivals.push(&[taken_ns(k / 30 * 30)], None));
+        (0..90).for_each(|k| arrivals.push(&[taken_ns(k / 30 * 30)], None));
         let axis = arrivals.dated(0, |_, _| false);
         assert_eq!(axis.remarks[0].0, "left_out", "{:?}", axis.remarks);
     }

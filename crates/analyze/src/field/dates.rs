@@ -9,6 +9,7 @@
 
 use crate::inputs::{mean_step_in, stretches};
 use crate::median::median;
+use std::ops::Range;
 
 /// Stamps are believed where their steps scatter by less than this share of the log times' own scatter.
 const MORE_EVEN: f64 = 0.8;
@@ -16,6 +17,9 @@ const MORE_EVEN: f64 = 0.8;
 const EVEN_S: f64 = 2e-5;
 /// Samples whose usual step is below this share of their mean step came in packets.
 const PACKETS: f64 = 0.6;
+/// Packets of so many samples on average leave fewer than one step in twenty, which then look like holes; and so many of them tell their rate.
+const LONG_PACKET: usize = 20;
+const FEWEST_PACKETS: usize = 4;
 /// Stamps whose span is not the log's within this share tell no times.
 const SAME_SPAN: f64 = 0.1;
 /// A clock is set back once or twice; what goes back more often are messages that overtake each other.
@@ -104,7 +108,7 @@ fn scatter_s(t_s: &[f64]) -> f64 {
 
 /// Stamps moved and stretched so that none lies behind its log time, and two lie on it.
 fn on_the_logs_clock(log_s: &[f64], stamp_s: &[f64]) -> Vec<f64> {
-    let least = |range: std::ops::Range<usize>| {
+    let least = |range: Range<usize>| {
         let each = range.map(|k| (stamp_s[k], log_s[k] - stamp_s[k]));
         each.min_by(|a, b| a.1.total_cmp(&b.1))
     };
@@ -122,16 +126,23 @@ fn on_the_logs_clock(log_s: &[f64], stamp_s: &[f64]) -> Vec<f64> {
 }
 
 /// Even times for samples that came in packets, stretch by stretch the least-squares line of time over number; with their usual and mean step.
+///
+/// Of P packets alike with one time each, that line of n samples is too flat, by (1 − 1/P²)/(1 − 1/n²): the variance of stairs over that of a ramp.
 fn unpacked(log_s: &[f64]) -> Option<(Vec<f64>, f64, f64)> {
-    let parts = stretches(log_s, 0.0);
-    let mean = mean_step_in(log_s, &parts)?;
+    let packets = packets(log_s);
+    let (parts, filled_s) = match long(log_s, &packets) {
+        Some((parts, filled_s)) => (parts, Some(filled_s)),
+        None => (stretches(log_s, 0.0), None),
+    };
+    let mean = filled_s.or_else(|| mean_step_in(log_s, &parts))?;
     let usual = median(&mut log_s.windows(2).map(|w| w[1] - w[0]).collect::<Vec<_>>())?;
     if !(usual < PACKETS * mean) {
         return None;
     }
+    let inverse_square = |n: usize| (n as f64).powi(-2);
     let mut t_s = Vec::with_capacity(log_s.len());
     for part in parts {
-        let x = &log_s[part];
+        let x = &log_s[part.clone()];
         let middle = 0.5 * (x.len() as f64 - 1.0);
         let centre = x.iter().sum::<f64>() / x.len() as f64;
         let (mut kt, mut kk) = (0.0, 0.0);
@@ -139,10 +150,46 @@ fn unpacked(log_s: &[f64]) -> Option<(Vec<f64>, f64, f64)> {
             kt += (k as f64 - middle) * (t - centre);
             kk += (k as f64 - middle).powi(2);
         }
-        let step = if kk > 0.0 { kt / kk } else { 0.0 };
+        let count = packets.partition_point(|p| p.start < part.end)
+            - packets.partition_point(|p| p.start < part.start);
+        let step = match count {
+            0 | 1 => filled_s.unwrap_or(0.0),
+            _ => kt / kk * (1.0 - inverse_square(x.len())) / (1.0 - inverse_square(count)),
+        };
         t_s.extend((0..x.len()).map(|k| centre + step * (k as f64 - middle)));
     }
     Some((t_s, usual, mean))
+}
+
+/// Samples that follow each other much faster than the mean, as ranges.
+fn packets(log_s: &[f64]) -> Vec<Range<usize>> {
+    let Some(span_s) = log_s.last().zip(log_s.first()).map(|(b, a)| b - a) else {
+        return Vec::new();
+    };
+    let within_s = 0.1 * span_s / log_s.len() as f64;
+    let ends = (1..log_s.len()).filter(|k| log_s[*k] - log_s[k - 1] > within_s);
+    let mut start = 0;
+    ends.chain([log_s.len()])
+        .map(|end| std::mem::replace(&mut start, end)..end)
+        .collect()
+}
+
+/// Where packets are so long that the pauses between them look like holes: the parts between true holes, and the usual step within (s). A packet
+/// fills the time since the one before; a hole is half as long again as that.
+fn long(log_s: &[f64], packets: &[Range<usize>]) -> Option<(Vec<Range<usize>>, f64)> {
+    if packets.len() < FEWEST_PACKETS || log_s.len() < LONG_PACKET * packets.len() {
+        return None;
+    }
+    let fills = |w: &[Range<usize>]| (log_s[w[1].start] - log_s[w[0].start]) / w[1].len() as f64;
+    let usual_s = median(&mut packets.windows(2).map(fills).collect::<Vec<_>>())?;
+    let mut parts = Vec::new();
+    let mut start = 0;
+    for w in packets.windows(2).filter(|w| fills(w) > 1.5 * usual_s) {
+        parts.push(start..w[1].start);
+        start = w[1].start;
+    }
+    parts.push(start..log_s.len());
+    Some((parts, usual_s))
 }
 
 #[cfg(test)]
@@ -212,5 +259,19 @@ mod tests {
             let off = worst(&found.t_s, (0..12_000).map(|k| taken(k) + late));
             assert!(late.abs() < 0.02 && off < 1e-4, "{late} {off}");
         }
+    }
+
+    #[test]
+    fn packets_of_a_second_are_spread_and_lost_ones_kept() {
+        // 100 samples each, with the time of the last; the 20th and the 40th to 42nd never came.
+        let lost = |packet: i32| packet == 20 || (40..43).contains(&packet);
+        let kept = (0..6000).filter(|k| !lost(k / 100));
+        let taken: Vec<f64> = kept.clone().map(|k| f64::from(k) * 0.01).collect();
+        let log = kept.map(|k| f64::from(k / 100 * 100 + 99) * 0.01);
+        let found = dated(log.collect(), None);
+        assert_eq!(found.remark.unwrap().0, "packets");
+        // Late alike, by half a packet.
+        let off = worst(&found.t_s, taken.iter().map(|t| t + 0.495));
+        assert!(off < 1e-9, "{off}");
     }
 }
