@@ -603,7 +603,7 @@ fn a_large_chunk_is_read_in_pieces() {
     assert_eq!(signals[0].values.len(), 1_000_001);
     assert_eq!(
         findings[0].text,
-        "1 messages are longer than the limit max_message_bytes of 4194304"
+        "1 message is longer than the limit max_message_bytes of 4194304"
     );
 
     let wrong = file(&[

@@ -16,6 +16,7 @@ use std::f64::consts::FRAC_PI_2;
 
 use recording::read::{ReadError, Recording};
 use recording::signal::{Signal, seconds_since};
+use recording::text::counted;
 
 use crate::beat::lock::Course;
 use crate::events::Event;
@@ -253,8 +254,8 @@ impl Field {
                         topic,
                         "holes",
                         format!(
-                            "motion is estimated in {} stretches without a hole, {:.2} s are left out; within {:.1} s of a hole there is no height",
-                            motion.stretches.len(),
+                            "motion is estimated in {} without a hole, {:.2} s are left out; within {:.1} s of a hole there is no height",
+                            counted(motion.stretches.len() as u64, "stretch", "stretches"),
                             motion.left_out_s,
                             rath::BESIDE_HOLES / settings.height_corner_hz
                         ),

@@ -3,6 +3,7 @@
 use prost::Message;
 use recording::read::{ReadError, Recording};
 use recording::schema::foxglove::RawAudio;
+use recording::text::counted;
 
 use crate::beat::{BeatError, Beats, beats_among, onsets};
 
@@ -111,8 +112,8 @@ pub fn listen(recording: &Recording) -> Result<Option<Heard>, ReadError> {
     let mut remarks = Vec::new();
     if joined.refused > 0 {
         remarks.push(format!(
-            "{} messages are no 16-bit PCM of one rate and were passed over",
-            joined.refused
+            "{} no 16-bit PCM of one rate and passed over",
+            counted(joined.refused as u64, "message is", "messages are")
         ));
     }
     if joined.holes_s > 0.0 {

@@ -19,7 +19,7 @@ use super::vertical;
 use crate::filter::{Band, butter, sosfiltfilt};
 use crate::inputs::{Inputs, Window, interpolate, mean_step_in};
 use nalgebra::{Matrix3, Rotation3, UnitQuaternion, Vector3};
-use std::ops::Range;
+use std::ops::{Add, Mul, Range};
 
 /// How the sensor's axes lie on the body (x forward along the pole, y left, z up).
 #[derive(Clone, Copy, Debug, PartialEq, Default)]
@@ -443,9 +443,6 @@ fn at_centre_of_mass(
     let n = rates.len();
     // α over two steps is the mean of two differences, so its edges are those of a sum weighted 1, 2, 1. Whatever else is in the equation
     // is weighted alike: where a pole touches down, α × r cancels what the sensor felt only if both begin at once.
-    let weighted = |v: &[Vector3<f64>], i: usize| {
-        (v[i.saturating_sub(1)] + v[i] * 2.0 + v[(i + 1).min(n - 1)]) * 0.25
-    };
     (0..n)
         .map(|i| {
             let (a, b) = (i.saturating_sub(1), (i + 1).min(n - 1));
@@ -460,9 +457,12 @@ fn at_centre_of_mass(
 /// sampled at 50 Hz; what is left of it is (ω h)⁴/16. Not for the support ratio, whose edges it would overshoot.
 /// Source: twicing, Tukey, Exploratory Data Analysis (1977), ch. 16.
 fn sharpened(x: &[f64]) -> Vec<f64> {
-    let last = x.len().saturating_sub(1);
-    let weighted = |i: usize| (x[i.saturating_sub(1)] + 2.0 * x[i] + x[(i + 1).min(last)]) / 4.0;
-    (0..x.len()).map(|i| 2.0 * x[i] - weighted(i)).collect()
+    (0..x.len()).map(|i| 2.0 * x[i] - weighted(x, i)).collect()
+}
+
+/// A value and its neighbours, weighted 1, 2, 1; beyond the ends stands the last.
+fn weighted<T: Copy + Add<Output = T> + Mul<f64, Output = T>>(v: &[T], i: usize) -> T {
+    (v[i.saturating_sub(1)] + v[i] * 2.0 + v[(i + 1).min(v.len() - 1)]) * 0.25
 }
 
 /// Fast sensors: without what lies above [`ACCELERATION_HZ`], where a derivative is noise only. Others as they are: the weights see to it.

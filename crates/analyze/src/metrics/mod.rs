@@ -487,6 +487,14 @@ pub fn find(name: &str) -> Option<&'static Metric> {
     METRICS.iter().find(|m| m.name == name)
 }
 
+/// Metrics that are directions (deg): their means and spreads are circular.
+const DIRECTIONS: &[&str] = &["beat_lead_deg"];
+
+/// The turn after which a metric's values are the same again, in its unit; `None` for all but directions.
+pub fn turn_of(name: &str) -> Option<f64> {
+    DIRECTIONS.contains(&name).then_some(360.0)
+}
+
 /// Results in the table's order.
 #[derive(Clone, Debug, PartialEq, Default)]
 pub struct Metrics(pub Vec<(&'static str, Value)>);

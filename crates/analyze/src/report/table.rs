@@ -2,6 +2,8 @@
 
 use std::fmt::Write;
 
+use recording::text::counted;
+
 use crate::examine::Analysis;
 use crate::metrics::{self, Datum, Value};
 
@@ -46,9 +48,14 @@ fn head(out: &mut String, a: &Analysis) {
     };
     line!(
         out,
-        "  {} messages on {} topics, written by {library}",
+        "  {} {} on {}, written by {library}",
         thousands(a.messages),
-        a.topics.len()
+        if a.messages == 1 {
+            "message"
+        } else {
+            "messages"
+        },
+        counted(a.topics.len() as u64, "topic", "topics")
     );
     let told: Vec<String> = ["scene", "seed", "method", "source"]
         .iter()
@@ -77,8 +84,11 @@ fn head(out: &mut String, a: &Analysis) {
     if a.skipped_messages > 0 {
         line!(
             out,
-            "  ! {} messages are lost",
-            thousands(a.skipped_messages)
+            "  ! {} lost",
+            match a.skipped_messages {
+                1 => "1 message is".to_owned(),
+                n => format!("{} messages are", thousands(n)),
+            }
         );
     }
 }

@@ -10,6 +10,7 @@ use super::{
     rows::{Rows, Selection},
 };
 use crate::finding::Kind;
+use crate::text::counted;
 
 /// Decoded numbers of one channel in one block.
 #[derive(Default)]
@@ -234,7 +235,8 @@ impl<'a> Worker<'a> {
             Ok(0) => return,
             Ok(count) => {
                 let text = format!(
-                    "{count} messages are longer than the limit max_message_bytes of {}",
+                    "{} longer than the limit max_message_bytes of {}",
+                    counted(count, "message is", "messages are"),
                     options.max_message_bytes
                 );
                 let trouble = Trouble {
@@ -576,6 +578,7 @@ fn lost_chunk(
     let time = super::container::chunk_header(&recording.data[body.clone()])
         .and_then(|header| i64::try_from(header.start_time).ok());
     let messages = match indexed {
+        Some(1) => "its only message was".to_owned(),
         Some(count) => format!("its {count} messages were"),
         None => "it was".to_owned(),
     };

@@ -6,7 +6,10 @@
 use std::{
     borrow::Cow,
     collections::{BTreeMap, BTreeSet},
+    fs::File,
+    io::{Read, Seek, SeekFrom},
     ops::Range,
+    path::Path,
 };
 
 use crate::finding::Kind;
@@ -425,6 +428,18 @@ pub(super) fn begins(bytes: &[u8]) -> bool {
     let header = bytes.get(MAGIC.len()..HEAD_BYTES);
     bytes.starts_with(MAGIC)
         || header.is_some_and(|record| record[0] == op::HEADER && record[5..] == [0; 4])
+}
+
+/// Whether a file ends as an MCAP that was finished does: with its magic. Nothing else of it is read.
+///
+/// # Errors
+/// Where it cannot be opened or is too short to hold the magic.
+pub fn ends_whole(path: &Path) -> std::io::Result<bool> {
+    let mut file = File::open(path)?;
+    let mut last = [0; MAGIC.len()];
+    file.seek(SeekFrom::End(-(MAGIC.len() as i64)))?;
+    file.read_exact(&mut last)?;
+    Ok(last == *MAGIC)
 }
 
 /// Walks over a whole file, which must not be empty; `None` if nothing in it looks like an MCAP. `forget` hears of stretches that

@@ -35,6 +35,7 @@ use std::{
 
 use container::{Container, Damage, Definitions};
 
+pub use container::ends_whole;
 pub use decode::supported;
 pub use stream::{Batch, Column, RawMessage};
 

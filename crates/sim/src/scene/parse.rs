@@ -343,7 +343,7 @@ fn readable(message: &str) -> String {
         ("invalid type: ", "found "),
         ("invalid value: ", "found "),
         ("expected f64", "expected a number"),
-        ("expected u64", "expected a whole number, zero or more"),
+        ("expected u64", "expected a whole number, zero to 2^63 - 1"),
         ("expected u32", "expected a whole number, zero or more"),
         ("expected usize", "expected a whole number, zero or more"),
         ("expected a sequence", "expected a list"),

@@ -1,12 +1,13 @@
 //! Figures of a sweep: bands over one axis, maps over two, distributions over any.
 
+use super::Plan;
 use super::parts::Store;
 use super::spec::{Spacing, number};
 use super::summary::Spread;
 use super::table::{Cell, Kind, Reader};
-use super::{Plan, turn_of};
 use crate::draw::{Figure, Layer};
 use crate::statistics::{about_their_mean, nearest};
+use analyze::metrics::turn_of;
 use std::path::Path;
 
 /// What is drawn of a metric.

@@ -51,13 +51,6 @@ const LEAST_ABREAST: u64 = 16;
 /// Runs of more samples are computed one by one.
 const LONGEST_ABREAST: f64 = 20e3;
 
-/// The turn after which a metric's values are the same again; `None` for all but angles that its definition calls a circular mean.
-pub fn turn_of(metric: &str) -> Option<f64> {
-    let metric = find(metric)?;
-    let circular = metric.definition.starts_with("Circular mean") && metric.unit == "deg";
-    circular.then_some(360.0)
-}
-
 /// A study, ready to run: what run `k` is follows from `k` alone.
 pub struct Plan {
     /// The file, as it was read.

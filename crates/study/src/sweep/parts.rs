@@ -13,9 +13,10 @@ use super::summary::{Found, Summary};
 use super::table::{Cell, Notes, Reader, Writer};
 use crate::pool::{in_order, threads};
 use parquet::errors::ParquetError;
+use recording::read::ends_whole;
 use recording::whole::Sink;
 use sim::record::VERSION;
-use std::io::{BufWriter, Read, Seek, SeekFrom, Write};
+use std::io::{BufWriter, Write};
 use std::ops::Range;
 use std::path::{Path, PathBuf};
 use std::sync::atomic::AtomicBool;
@@ -198,6 +199,7 @@ impl<'p> Store<'p> {
                 let whole = match row[0] {
                     Cell::Whole(run) => {
                         ends_whole(&self.recordings().join(recording_name(run as u64)))
+                            .unwrap_or(false)
                     }
                     _ => true,
                 };
@@ -384,19 +386,6 @@ impl<'p> Store<'p> {
 /// Name of a run's recording.
 pub fn recording_name(run: u64) -> String {
     format!("run-{run:09}.mcap")
-}
-
-/// Whether a file ends as an MCAP file does.
-fn ends_whole(path: &Path) -> bool {
-    const MAGIC: [u8; 8] = *b"\x89MCAP0\r\n";
-    let last = || -> std::io::Result<[u8; 8]> {
-        let mut file = std::fs::File::open(path)?;
-        file.seek(SeekFrom::End(-8))?;
-        let mut last = [0; 8];
-        file.read_exact(&mut last)?;
-        Ok(last)
-    };
-    last().is_ok_and(|found| found == MAGIC)
 }
 
 /// [`recording::whole::write_whole`] with its errors as sentences.

@@ -9,9 +9,10 @@
 //! steadies its estimate (of angles about their circular mean). S_i ≤ T_i but for chance; T_i − S_i is what the axis does only together with others. A base point of which
 //! any run has no such metric is left out. Intervals: 95 %, from 500 bootstrap samples of the base points.
 
+use super::Plan;
 use super::summary::{Found, quantile};
-use super::{Plan, turn_of};
 use crate::statistics::about_their_mean;
+use analyze::metrics::turn_of;
 use serde_json::{Value, json};
 use sim::random::{Stream, uniform_pair};
 

@@ -1,8 +1,9 @@
 //! What a table of runs says, point by point and altogether, in one pass over its rows.
 
+use super::Plan;
 use super::table::{Cell, Kind};
-use super::{Plan, turn_of};
 use crate::statistics::{about_their_mean, nearest, summarise};
+use analyze::metrics::turn_of;
 use std::io::Write;
 
 /// Mean, spread and quantiles of one metric over some runs that have it.
