@@ -208,8 +208,18 @@ pub fn plots(a: &Analysis) -> Vec<Plot> {
 
     let mut forces = Panel::over_time("forces", "Normal forces of the handles", "force, N", a);
     forces.last_s = Some(LAST_S);
-    for (k, n) in i.normal_n.iter().enumerate() {
-        forces.line(format!("handle {}", k + 1), i.force_times(), n);
+    if i.normal_n.len() <= COLOURS.len() {
+        for (k, n) in i.normal_n.iter().enumerate() {
+            forces.line(format!("handle {}", k + 1), i.force_times(), n);
+        }
+    } else {
+        forces.note = format!(
+            "Of {} handles at each moment: the table of signals has each of them.",
+            i.normal_n.len()
+        );
+        for (name, x) in bundled(&i.normal_n) {
+            forces.line(name, i.force_times(), &x);
+        }
     }
     panel(forces);
 
@@ -304,6 +314,29 @@ pub fn plots(a: &Analysis) -> Vec<Plot> {
         out.insert(place, Plot::Image(image));
     }
     out
+}
+
+/// Mean, largest and smallest of some columns at each sample, of what is finite there; NaN where nothing is.
+fn bundled(columns: &[Vec<f64>]) -> [(&'static str, Vec<f64>); 3] {
+    let samples = columns.first().map_or(0, Vec::len);
+    let each = |f: fn(&[f64]) -> f64| -> Vec<f64> {
+        let at = |k: usize| {
+            let known = columns.iter().map(|c| c[k]).filter(|x| x.is_finite());
+            f(&known.collect::<Vec<_>>())
+        };
+        (0..samples).map(at).collect()
+    };
+    [
+        ("mean", each(|x| x.iter().sum::<f64>() / x.len() as f64)),
+        (
+            "largest",
+            each(|x| x.iter().copied().fold(f64::NAN, f64::max)),
+        ),
+        (
+            "smallest",
+            each(|x| x.iter().copied().fold(f64::NAN, f64::min)),
+        ),
+    ]
 }
 
 /// Onset, beat and locking always; other kinds while they are few.
@@ -584,6 +617,27 @@ fn roll_spectrogram(a: &Analysis) -> Option<Image> {
 
 #[cfg(test)]
 mod tests {
+    #[test]
+    fn many_columns_are_drawn_as_three() {
+        let columns = [
+            vec![1.0, f64::NAN, f64::NAN],
+            vec![2.0, 5.0, f64::NAN],
+            vec![6.0, -1.0, f64::NAN],
+        ];
+        for (name, expected) in [
+            ("mean", [3.0, 2.0]),
+            ("largest", [6.0, 5.0]),
+            ("smallest", [1.0, -1.0]),
+        ] {
+            let all = super::bundled(&columns);
+            let (_, found) = all.iter().find(|(n, _)| *n == name).unwrap();
+            assert!(
+                found[..2] == expected && found[2].is_nan(),
+                "{name}: {found:?}"
+            );
+        }
+    }
+
     #[test]
     fn units_are_written_as_people_do() {
         for (text, shown) in [
