@@ -247,3 +247,20 @@ fn what_is_logged_in_bursts_is_drawn_when_it_was_taken() {
         assert!((x - expected).abs() < 1e-4, "{t_s}: {x} {expected}");
     }
 }
+
+#[test]
+fn a_sensor_without_a_rate_is_named_too() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("imu.mcap");
+    let mut writer = RecordingWriter::create(&path, &WriterOptions::default()).unwrap();
+    let channel = writer.channel("/imu/s0", MessageKind::Imu).unwrap();
+    for k in 0..300 {
+        let t_ns = k * 10_000_000;
+        let imu = Imu::raw(t_ns, "imu", [0.0; 3], [0.0, 0.0, 9.81 + 0.01 * k as f64]);
+        writer.message(channel, t_ns, &imu).unwrap();
+    }
+    writer.finish().unwrap();
+    let (_, titles) = taken(&path);
+    let named = |title: &String| title.starts_with("/imu/s0 specific force");
+    assert!(titles.iter().any(named), "{titles:?}");
+}
