@@ -1,12 +1,14 @@
 //! When the messages of a topic that feeds metrics were taken: by the log, by their own stamps, or evenly where they came in packets.
 
+use recording::read::Batch;
+
 use crate::field::dates::{Dated, dated};
 use crate::inputs::{mean_step_in, stretches};
 use crate::summary::seconds;
 
 /// Log times and stamps of a topic's messages, in the order in which they came.
 #[derive(Clone, Debug, Default)]
-pub(crate) struct Arrivals {
+pub struct Arrivals {
     log_ns: Vec<i64>,
     /// As long as `log_ns` where every message has one.
     stamp_ns: Vec<i64>,
@@ -14,7 +16,7 @@ pub(crate) struct Arrivals {
 
 /// Messages in the order of their times, those that repeat another left out.
 #[derive(Clone, Debug, Default)]
-pub(crate) struct Axis {
+pub struct Axis {
     /// Times, ascending (s).
     pub t_s: Vec<f64>,
     /// The message at each time, counted as they came.
@@ -35,9 +37,21 @@ impl Arrivals {
         self.stamp_ns.extend(stamp_ns.unwrap_or_default());
     }
 
+    /// The messages of a batch, with their header stamps or what else says when they were taken, where that is among its columns: our own
+    /// messages' `time_s`, the first transform's stamp.
+    pub fn take(&mut self, batch: &Batch<'_>) {
+        let own = own_ns(batch);
+        self.push(batch.times_ns, batch.stamps_ns.or(own.as_deref()));
+    }
+
     /// How many.
     pub fn len(&self) -> usize {
         self.log_ns.len()
+    }
+
+    /// Whether there are none.
+    pub fn is_empty(&self) -> bool {
+        self.log_ns.is_empty()
     }
 
     /// Dates them, seconds since `start_ns`. Of those with one stamp the first counts; without useful stamps, of those with one log time whose
@@ -100,6 +114,39 @@ impl Axis {
         remarks.extend(uneven(&t_s));
         Axis { t_s, rows, remarks }
     }
+}
+
+/// Where our own messages say when they were taken, s.
+const TIME: &str = "time_s";
+/// Where transforms do, s and ns.
+const STAMP: [&str; 2] = [
+    "transforms[0].header.stamp.sec",
+    "transforms[0].header.stamp.nanosec",
+];
+
+/// Whether [`Arrivals::take`] looks for this field of a topic's messages.
+pub fn is_time(field: &str) -> bool {
+    field == TIME || STAMP.contains(&field)
+}
+
+/// When messages without a header say they were taken (ns), where all of the batch do.
+fn own_ns(batch: &Batch<'_>) -> Option<Vec<i64>> {
+    let column = |field: &str| {
+        let of = |path: &str| {
+            path.strip_prefix(batch.topic)
+                .and_then(|p| p.strip_prefix('.'))
+                == Some(field)
+        };
+        let found = batch.columns.iter().find(|c| of(c.path))?;
+        (found.rows.is_none() && found.finite).then_some(found.values)
+    };
+    if batch.schema.starts_with("rath.") {
+        let time_s = column(TIME)?;
+        return Some(time_s.iter().map(|t| (t * 1e9).round() as i64).collect());
+    }
+    let (sec, nanosec) = (column(STAMP[0])?, column(STAMP[1])?);
+    let ns = |(s, ns): (&f64, &f64)| (*s as i64).saturating_mul(1_000_000_000) + *ns as i64;
+    Some(sec.iter().zip(nanosec).map(ns).collect())
 }
 
 /// A remark where steps between holes are far from even.

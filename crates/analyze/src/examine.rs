@@ -468,8 +468,7 @@ impl<'a> Pass<'a> {
         if self.roles.feeds(batch.topic) {
             let arrivals = &mut self.arrivals[self.first[batch.channel]];
             self.row = arrivals.len();
-            let own = own_ns(batch);
-            arrivals.push(batch.times_ns, batch.stamps_ns.or(own.as_deref()));
+            arrivals.take(batch);
         }
         for column in batch.columns {
             if self.by_column.len() <= column.id {
@@ -1116,17 +1115,6 @@ fn by_row(kept: &[(usize, f64)], messages: usize) -> Vec<Option<f64>> {
     let mut x = vec![None; messages];
     kept.iter().for_each(|(row, value)| x[*row] = Some(*value));
     x
-}
-
-/// The times that the project's own messages carry instead of a header's stamp (ns).
-fn own_ns(batch: &Batch<'_>) -> Option<Vec<i64>> {
-    if !batch.schema.starts_with("rath.") {
-        return None;
-    }
-    let own = |path: &str| path.strip_prefix(batch.topic) == Some(".time_s");
-    let column = batch.columns.iter().find(|c| own(c.path))?;
-    let whole = column.rows.is_none() && column.finite;
-    whole.then(|| column.values.iter().map(|t| (t * 1e9) as i64).collect())
 }
 
 /// An angle (rad), wrapped or not, at other times, by the shorter way between samples; −π … π, NaN beyond the ends and in holes.

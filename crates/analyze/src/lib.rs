@@ -8,7 +8,7 @@
 //!
 //! [`examine`] puts them to work on a recording in one pass, [`report`] shows what came out.
 
-mod arrivals;
+pub mod arrivals;
 pub mod beat;
 pub mod clock;
 pub mod envelope;

@@ -16,8 +16,10 @@ pub struct Take {
     pub growing: bool,
     /// The columns that `analyze` computes from.
     pub inputs: Inputs,
-    /// Log times of height and angles, ns: what `inputs` has in seconds.
+    /// Times of the angles, ns: what `inputs` has in seconds.
     pub state_ns: Vec<i64>,
+    /// Times of the height, ns: those of the angles, unless it comes on a clock of its own.
+    pub height_ns: Vec<i64>,
     /// Log times of the forces, ns.
     pub force_ns: Vec<i64>,
     /// How far each handle is pressed into its shoulder, m, at the times of the forces; empty where that is not recorded.
@@ -173,6 +175,7 @@ impl Default for Take {
             growing: false,
             inputs: Inputs::default(),
             state_ns: Vec::new(),
+            height_ns: Vec::new(),
             force_ns: Vec::new(),
             compression_m: Vec::new(),
             phase_ns: Vec::new(),

@@ -2,7 +2,7 @@
 
 mod common;
 
-use common::{ROWS, imus, run, taken};
+use common::{ROWS, imus, imus_logged, run, run_logged, taken};
 use recording::cdr::Imu;
 use recording::topics::MessageKind;
 use recording::write::{RecordingWriter, WriterOptions};
@@ -201,4 +201,66 @@ fn many_samples_are_thinned_to_their_extremes() {
     // The true extremes of the samples, 9.81 ± 1 up to the nearest sample of a period of 250: half a sample away.
     let near = (std::f64::consts::TAU / 500.0).cos() - 1e-12;
     assert!(low <= 9.81 - near && high >= 9.81 + near, "{low} {high}");
+}
+
+/// The logger writes what has come every 0.3 s.
+fn in_bursts(t_ns: i64) -> i64 {
+    const EVERY_NS: i64 = 300_000_000;
+    (t_ns + EVERY_NS - 1) / EVERY_NS * EVERY_NS
+}
+
+#[test]
+fn what_is_logged_in_bursts_is_drawn_when_it_was_taken() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("run.mcap");
+    run_logged(&path, 2, in_bursts);
+    let (sent, _) = taken(&path);
+    for entity in [
+        "/world/rath",
+        "/world/carrier_2",
+        "/world/forces",
+        "/phases/carriers",
+        "/plots/angles/roll",
+        "/plots/energy/kinetic",
+    ] {
+        let times = sent.times_ns(entity);
+        assert_eq!(times.len(), ROWS, "{entity}");
+        for (k, t_ns) in times.iter().enumerate() {
+            let taken_ns = k as i64 * 1_000_000_000 / 30;
+            assert!((t_ns - taken_ns).abs() < 2_000, "{entity} {k}: {t_ns}");
+        }
+    }
+    imus_logged(&path, 2, 30, 100, in_bursts);
+    let (sent, _) = taken(&path);
+    for entity in ["/topics/imu/s0/gyro/x", "/topics/imu/s1/attitude/roll"] {
+        let times = sent.times_ns(entity);
+        assert_eq!(times.len(), 3000, "{entity}");
+        let uneven = times.windows(2).map(|w| (w[1] - w[0] - 10_000_000).abs());
+        assert!(uneven.max().unwrap() < 2_000, "{entity}");
+    }
+    // The sine of 2 Hz that was measured, from the moment of a zero on.
+    let rate = sent.scalars("/topics/imu/s1/gyro/x");
+    let zero_ns = rate[0].0;
+    for (t_ns, x) in rate {
+        let t_s = (t_ns - zero_ns) as f64 / 1e9;
+        let expected = 0.2 * (std::f64::consts::TAU * 2.0 * t_s).sin();
+        assert!((x - expected).abs() < 1e-4, "{t_s}: {x} {expected}");
+    }
+}
+
+#[test]
+fn a_sensor_without_a_rate_is_named_too() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("imu.mcap");
+    let mut writer = RecordingWriter::create(&path, &WriterOptions::default()).unwrap();
+    let channel = writer.channel("/imu/s0", MessageKind::Imu).unwrap();
+    for k in 0..300 {
+        let t_ns = k * 10_000_000;
+        let imu = Imu::raw(t_ns, "imu", [0.0; 3], [0.0, 0.0, 9.81 + 0.01 * k as f64]);
+        writer.message(channel, t_ns, &imu).unwrap();
+    }
+    writer.finish().unwrap();
+    let (_, titles) = taken(&path);
+    let named = |title: &String| title.starts_with("/imu/s0 specific force");
+    assert!(titles.iter().any(named), "{titles:?}");
 }

@@ -9,6 +9,8 @@ const HEADING_S: f64 = 1.0;
 const LEVEL_S: f64 = 0.25;
 /// Heights that differ by no more than this share one level, m.
 const LEVEL_M: f64 = 2.0;
+/// Who is slower stands, m/s.
+const WALKS_M_PER_S: f64 = 0.2;
 /// Below this share of its length the averaged axis of the body points nowhere.
 const SURE: f64 = 0.3;
 
@@ -37,6 +39,28 @@ pub fn headings(pose: &Pose) -> Vec<f64> {
         .collect()
 }
 
+/// Direction in which the party walks over the ground at every moment, rad; where it stands, that of the body.
+pub fn ways(pose: &Pose, headings: &[f64]) -> Vec<f64> {
+    let n = pose.position_m.len().min(pose.times_ns.len());
+    let smooth = |axis: usize| {
+        let x: Vec<f64> = pose.position_m.iter().map(|p| p[axis]).collect();
+        mean_around(&pose.times_ns, &x, HEADING_S)
+    };
+    let (x, y) = (smooth(0), smooth(1));
+    let reach = reach(&pose.times_ns, HEADING_S);
+    let way = |(k, heading): (usize, &f64)| {
+        let (from, to) = (k.saturating_sub(reach), k.saturating_add(reach).min(n - 1));
+        let span_s = pose.times_ns[to].saturating_sub(pose.times_ns[from]) as f64 / 1e9;
+        let (dx, dy) = (x[to] - x[from], y[to] - y[from]);
+        if dx.hypot(dy) > WALKS_M_PER_S * span_s {
+            dy.atan2(dx)
+        } else {
+            *heading
+        }
+    };
+    headings[..n].iter().enumerate().map(way).collect()
+}
+
 /// The one height of a body that stays about it; `None` where it climbs or falls.
 pub fn level_m(pose: &Pose) -> Option<f64> {
     let heights = || {
@@ -60,14 +84,20 @@ pub fn levels_m(pose: &Pose) -> Vec<f64> {
     mean_around(&pose.times_ns, &heights, LEVEL_S)
 }
 
+/// How many samples `half_s` is, at the mean rate.
+fn reach(times_ns: &[i64], half_s: f64) -> usize {
+    let (Some(first), Some(last)) = (times_ns.first(), times_ns.last()) else {
+        return 0;
+    };
+    let steps = times_ns.len().saturating_sub(1).max(1);
+    let step_s = last.saturating_sub(*first) as f64 / 1e9 / steps as f64;
+    (half_s / step_s) as usize
+}
+
 /// Mean of as many values before as after each, within `half_s`, so that what grows evenly stays as it is up to both ends.
 fn mean_around(times_ns: &[i64], x: &[f64], half_s: f64) -> Vec<f64> {
     let n = times_ns.len().min(x.len());
-    let (Some(first), Some(last)) = (times_ns.first(), times_ns.last()) else {
-        return Vec::new();
-    };
-    let step_s = last.saturating_sub(*first) as f64 / 1e9 / n.saturating_sub(1).max(1) as f64;
-    let most = (half_s / step_s) as usize;
+    let most = reach(times_ns, half_s);
     let mut sums = vec![(0.0, 0usize)];
     for x in &x[..n] {
         let (sum, count) = sums[sums.len() - 1];
@@ -135,6 +165,26 @@ mod tests {
         let falling = pose(|_| 0.0, |t_s| 2e4 - 4.9 * t_s * t_s);
         for (level, p) in levels_m(&falling).iter().zip(&falling.position_m) {
             assert!((level - p[2]).abs() < 0.15, "{level} {}", p[2]);
+        }
+    }
+
+    #[test]
+    fn who_walks_sideways_faces_where_he_goes_and_who_stands_faces_ahead() {
+        // Along y for half a minute, to and fro across it with every step; then it stands, the pole along x all the while.
+        let mut pose = pose(|_| 0.0, |_| 0.8);
+        for (p, t_ns) in pose.position_m.iter_mut().zip(&pose.times_ns) {
+            let t_s = *t_ns as f64 / 1e9;
+            let sway_m = 0.03 * (std::f64::consts::TAU * t_s).sin();
+            *p = [sway_m, 0.8 * t_s.min(30.0), 0.8];
+        }
+        let ways = ways(&pose, &headings(&pose));
+        for (k, way) in ways.iter().enumerate() {
+            let expected = match k {
+                0..850 => std::f64::consts::FRAC_PI_2,
+                950.. => 0.0,
+                _ => continue,
+            };
+            assert!((way - expected).abs() < 0.08, "{k}: {way}");
         }
     }
 }

@@ -65,7 +65,12 @@ fn sensor(
         (
             "accel",
             &sensor.accel,
-            format!("Specific force [m/s²] ({xyz})"),
+            // The first plot names the sensor.
+            if sensor.gyro.is_empty() {
+                format!("{} specific force [m/s²] ({xyz})", sensor.topic)
+            } else {
+                format!("Specific force [m/s²] ({xyz})")
+            },
         ),
         (
             "attitude",

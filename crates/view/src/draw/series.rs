@@ -148,12 +148,11 @@ fn spread_over(curves: &[Line<'_>], growing: bool, least: f64) -> Option<(f64, f
     let more = 0.5 * (least - (high - low)).max(0.0);
     let (low, high) = (low - more, high + more);
     let widened = |share: f64| (low - share * (high - low), high + share * (high - low));
-    let has_two = |&(low, high): &(f64, f64)| {
-        let (_, first, last) = numbers(low, high);
-        first < last
-    };
-    let range = ROOM.into_iter().map(widened).find(has_two);
-    let (low, high) = range.unwrap_or_else(|| widened(ROOM[1]));
+    let has_two = |&(low, high): &(f64, f64)| whole_numbers(low, high) >= 2.0;
+    if let Some(range) = ROOM.into_iter().map(widened).find(has_two) {
+        return Some(range);
+    }
+    let (low, high) = widened(ROOM[1]);
     let (step, mut first, mut last) = numbers(low, high);
     if first > last {
         // None: those on both sides.
@@ -168,6 +167,12 @@ fn spread_over(curves: &[Line<'_>], growing: bool, least: f64) -> Option<(f64, f
     }
     let margin = WHOLE * (high.max(last) - low.min(first));
     Some((low.min(first - margin), high.max(last + margin)))
+}
+
+/// How many numbers an axis has that are written whole.
+fn whole_numbers(low: f64, high: f64) -> f64 {
+    let (step, edge) = (numbers(low, high).0, WHOLE * (high - low));
+    ((high - edge) / step).floor() - ((low + edge) / step).ceil() + 1.0
 }
 
 /// Distance of the numbers on an axis, the first and the last of them; the first after the last where there are none.
@@ -283,8 +288,8 @@ fn estimated(source: &str) -> &'static str {
 }
 
 fn height(take: &Take) -> Option<(String, Vec<Line<'_>>)> {
-    let height = &take.inputs.height_m;
-    let line = Line::new("z", "height", palette::BLUE, &take.state_ns, &height[..])?.parted();
+    let (_, height_m) = take.inputs.height();
+    let line = Line::new("z", "height", palette::BLUE, &take.height_ns, height_m)?.parted();
     let title = match estimated(&take.inputs.sources.height) {
         "" => "Height of the centre of mass [m]".to_owned(),
         from => format!("Height about its mean [m]{from}"),
@@ -523,7 +528,7 @@ fn energies<'a>(
             &values[..],
         ) {
             names.push(format!("{name} ({word})"));
-            lines.push(line);
+            lines.push(line.parted());
         }
     }
     (!lines.is_empty()).then(|| (format!("{title}: {}", names.join(", ")), lines))
@@ -557,6 +562,9 @@ mod tests {
             (1.2, 8.8),
             (-3.6, 3.6),
             (-3.9, 3.9),
+            // Whole numbers at both ends of these would be more than fit.
+            (-6.33, 56.32),
+            (13.65, 76.33),
         ] {
             let ((from, to), numbers) = chosen(low, high, 0.0);
             assert!(from < low && to > high, "{low} {high}: {from} {to}");
@@ -603,6 +611,24 @@ mod tests {
         assert!(line.values[100].is_nan() && line.times_ns.is_sorted());
         let whole = Line::new("z", "z", 0, &times[..100], vec![1.0; 100]).unwrap();
         assert_eq!(whole.parted().values.len(), 100);
+    }
+
+    #[test]
+    fn a_height_with_a_clock_of_its_own_is_drawn_at_its_times() {
+        let take = Take {
+            state_ns: vec![0, 10],
+            height_ns: vec![0, 5, 10],
+            inputs: analyze::Inputs {
+                t_s: vec![0.0, 1e-8],
+                height_m: vec![0.8, 0.8],
+                height_alone: Some((vec![0.0, 5e-9, 1e-8], vec![0.8, 0.9, 0.8])),
+                ..analyze::Inputs::default()
+            },
+            ..Take::default()
+        };
+        let (_, lines) = height(&take).unwrap();
+        assert_eq!(lines[0].times_ns[..], [0, 5, 10]);
+        assert_eq!(lines[0].values[..], [0.8, 0.9, 0.8]);
     }
 
     #[test]

@@ -39,7 +39,7 @@ pub fn draw(store: &mut Store<'_>, take: &Take) -> anyhow::Result<Option<View>> 
     trail(store, pose)?;
     let headings = course::headings(pose);
     if let Some(carriers) = &take.carriers {
-        people(store, take, pose, &headings, carriers)?;
+        people(store, take, pose, &course::ways(pose, &headings), carriers)?;
     }
     let forces = forces(store, take, pose, bent.as_deref())?;
     let look_m = follow(store, pose, &headings)?;
@@ -296,8 +296,10 @@ fn poles(handles_m: &[[f64; 3]]) -> Vec<[[f32; 3]; 2]> {
 }
 
 fn trail(store: &mut Store<'_>, pose: &Pose) -> anyhow::Result<()> {
-    // Pieces of line, each from the last moment to this one: the view shows those of the last seconds.
-    let pairs: Vec<usize> = (1..pose.position_m.len()).collect();
+    // Pieces of line, each from the last moment to this one, but across holes: the view shows those of the last seconds.
+    let t_s = recording::signal::seconds_since(&pose.times_ns, pose.times_ns[0]);
+    let parts = analyze::inputs::stretches(&t_s, 0.0).into_iter();
+    let pairs: Vec<usize> = parts.flat_map(|part| part.start + 1..part.end).collect();
     let times: Vec<i64> = pairs.iter().map(|k| pose.times_ns[*k]).collect();
     let strips = pairs
         .iter()
@@ -325,7 +327,7 @@ fn people(
     store: &mut Store<'_>,
     take: &Take,
     pose: &Pose,
-    headings: &[f64],
+    ways: &[f64],
     carriers: &Carriers,
 ) -> anyhow::Result<()> {
     let (rows, count) = (carriers.times_ns.len(), carriers.points_m.len());
@@ -361,7 +363,7 @@ fn people(
         })
         .collect();
     let moments: Vec<usize> = carriers.times_ns.iter().map(|t| moment(pose, *t)).collect();
-    let headings: Vec<f64> = moments.iter().map(|at| headings[*at]).collect();
+    let ways: Vec<f64> = moments.iter().map(|at| ways[*at]).collect();
     let shoulder = |points: &[[f64; 3]], k: usize| {
         let [x, y, z] = points[k];
         [x, y, z + shift_m]
@@ -376,7 +378,7 @@ fn people(
     let mut legs: Vec<Vec<[f32; 3]>> = Vec::with_capacity(rows * count);
     for k in (0..rows).filter(|k| shown[*k]) {
         for (points, phase) in carriers.points_m.iter().zip(&phase_at) {
-            legs.push(legs_at(shoulder(points, k), headings[k], phase[k]));
+            legs.push(legs_at(shoulder(points, k), ways[k], phase[k]));
         }
     }
     let colors = || (0..count).map(|i| palette::carrier(i).0);
@@ -399,7 +401,7 @@ fn people(
         let places = (0..rows).map(|k| f32s(&shoulder(points, k)));
         let columns = Transform3D::update_fields()
             .with_many_translation(places)
-            .with_many_quaternion(headings.iter().map(about_z))
+            .with_many_quaternion(ways.iter().map(about_z))
             .columns_of_unit_batches()?;
         store.rows(&path, &carriers.times_ns, columns)?;
         let color = palette::carrier(i).0;
@@ -597,6 +599,18 @@ mod tests {
         assert_eq!(legs, [2, 2, 0]);
         let head = sent.lengths("/world/carrier_1/head", "Ellipsoids3D:half_sizes");
         assert_eq!(head, [1, 0]);
+    }
+
+    #[test]
+    fn the_trail_has_a_hole_where_the_recording_has_one() {
+        let mut pose = Pose::default();
+        for k in (0..100i64).chain(130..200) {
+            pose.times_ns.push(k * 33_000_000);
+            pose.position_m.push([0.03 * k as f64, 0.0, 0.8]);
+        }
+        let sent = sent::by(|store| trail(store, &pose).unwrap());
+        let pieces = sent.lengths("/world/trail", "LineStrips3D:strips");
+        assert_eq!(pieces.len(), 99 + 69);
     }
 
     #[test]

@@ -47,14 +47,15 @@ pub fn drive_hz(take: &Take) -> Option<f64> {
 pub fn draw(store: &mut Store<'_>, take: &Take) -> anyhow::Result<Option<View>> {
     let (inputs, f_hz) = (&take.inputs, drive_hz(take));
     let top_hz = f_hz.map_or(6.0, |f| (2.6 * f).max(LEAST_TOP_HZ));
-    let of = |x: &[f64]| -> Option<Spectrum> {
+    let of = |t_s: &[f64], x: &[f64]| -> Option<Spectrum> {
         let finite = || x.iter().copied().filter(|x| x.is_finite());
         let range = finite().fold(f64::MIN, f64::max) - finite().fold(f64::MAX, f64::min);
-        let found = SpectrumSummary::of(&inputs.t_s, x, take.window, f_hz, "")?.spectrum;
+        let found = SpectrumSummary::of(t_s, x, take.window, f_hz, "")?.spectrum;
         let told = bins(&found, top_hz).count() >= FEWEST_BINS && peak(&found, top_hz) > 0.0;
         (told && range > NOTHING).then_some(found)
     };
-    let (height, roll) = (of(&inputs.height_m), of(&inputs.roll_rad));
+    let (t_s, height_m) = inputs.height();
+    let (height, roll) = (of(t_s, height_m), of(&inputs.t_s, &inputs.roll_rad));
     let title = match (&height, &roll) {
         (Some(_), Some(_)) => "Spectra of height (blue), roll (vermilion)",
         (Some(_), None) => "Spectrum of the height",

@@ -3,6 +3,7 @@
 //! What metrics are made of comes from `analyze`, whole; the pose, the carriers and the ledger are collected; everything else streams
 //! through once and is thinned on the way, so that an hour of ten sensors fits into memory.
 
+mod dates;
 mod scene;
 mod sensor;
 mod stream;
@@ -50,13 +51,14 @@ pub fn load(
         examined(&mut take, recording)?;
     } else {
         take.notes.push(format!(
-            "{} messages: curves and spectra only, no metrics.",
+            "{} messages: curves and spectra only, at the times of the log; no metrics.",
             info.messages
         ));
     }
-    if !plan.ours.is_empty() {
-        let (signals, found) = recording.signals(&|path| plan.is_whole(path))?;
-        findings = found;
+    let mut dates = dates::Dates::default();
+    if whole {
+        let (signals, dated, found) = dates::collect(recording, &plan)?;
+        (dates, findings) = (dated, found);
         let signals: BTreeMap<&str, &Signal> =
             signals.iter().map(|s| (s.path.as_str(), s)).collect();
         take.pose = scene::pose(&signals);
@@ -65,8 +67,22 @@ pub fn load(
         take.compression_m = scene::compressions(&signals, &take);
         take.shape = scene::shape(recording, &take);
     }
-    stream::others(&mut take, recording, &plan, detail, &mut findings)?;
+    take.notes.append(&mut dates.notes);
+    stream::others(
+        &mut take,
+        recording,
+        &plan,
+        detail,
+        &mut dates,
+        &mut findings,
+    )?;
     Ok((take, findings))
+}
+
+/// Times in ns of seconds since `start_ns`. OK because the seconds came from nanoseconds of the recording.
+fn at_ns(start_ns: i64, t_s: &[f64]) -> Vec<i64> {
+    let at = |t: &f64| start_ns.saturating_add((t * 1e9).round() as i64);
+    t_s.iter().map(at).collect()
 }
 
 /// Metrics, events, remarks and the columns behind them, as `analyze` finds them.
@@ -77,13 +93,10 @@ fn examined(take: &mut Take, recording: &Recording) -> Result<(), ReadError> {
         ..Request::default()
     };
     let analysis = examine(&take.name, recording, &request)?;
-    // OK because the seconds came from nanoseconds of this recording.
-    let at = |t_s: &[f64]| {
-        t_s.iter()
-            .map(|t| take.start_ns.saturating_add((t * 1e9).round() as i64))
-            .collect::<Vec<i64>>()
-    };
+    let start_ns = take.start_ns;
+    let at = |t_s: &[f64]| at_ns(start_ns, t_s);
     take.state_ns = at(&analysis.inputs.t_s);
+    take.height_ns = at(analysis.inputs.height().0);
     take.force_ns = at(analysis.inputs.force_times());
     take.phase_ns = at(analysis.inputs.phase_times());
     take.window = analysis.window;

@@ -110,38 +110,47 @@ pub fn shape(recording: &Recording, take: &Take) -> Shape {
             })
             .collect()
     };
-    let beside = || -> Option<Vec<[f64; 3]>> {
-        let (carriers, pose) = (take.carriers.as_ref()?, take.pose.as_ref()?);
-        if carriers.times_ns != pose.times_ns {
-            return None;
-        }
-        let middle = |mut x: Vec<f64>| -> f64 {
-            x.retain(|x| x.is_finite());
-            x.sort_by(f64::total_cmp);
-            x.get(x.len() / 2).copied().unwrap_or(0.0)
-        };
-        let offset = |points: &Vec<[f64; 3]>, axis: usize| {
-            middle(
-                points
-                    .iter()
-                    .zip(&pose.position_m)
-                    .map(|(c, p)| c[axis] - p[axis])
-                    .collect(),
-            )
-        };
-        let round = |x: f64| (x * 100.0).round() / 100.0;
-        Some(
-            carriers
-                .points_m
-                .iter()
-                .map(|c| [round(offset(c, 0)), round(offset(c, 1)), HANDLE_HEIGHT_M])
-                .collect(),
-        )
-    };
     Shape {
-        handles_m: from_scene().or_else(beside).unwrap_or_default(),
+        handles_m: from_scene().or_else(|| beside(take)).unwrap_or_default(),
         box_m: BOX_M,
     }
+}
+
+/// Where the carriers are beside the body, at the middle of what they do.
+fn beside(take: &Take) -> Option<Vec<[f64; 3]>> {
+    let (carriers, pose) = (take.carriers.as_ref()?, take.pose.as_ref()?);
+    if carriers.times_ns != pose.times_ns {
+        return None;
+    }
+    // Beside the body: along its own x axis over the ground, and to the left of it.
+    let ahead: Vec<[f64; 2]> = (pose.orientation.iter())
+        .map(|[x, y, z, w]| {
+            let (cos, sin) = (1.0 - 2.0 * (y * y + z * z), 2.0 * (x * y + z * w));
+            let length = cos.hypot(sin);
+            [cos / length, sin / length]
+        })
+        .collect();
+    let middle = |mut x: Vec<f64>| -> f64 {
+        x.retain(|x| x.is_finite());
+        x.sort_by(f64::total_cmp);
+        x.get(x.len() / 2).copied().unwrap_or(0.0)
+    };
+    let offset = |points: &Vec<[f64; 3]>, axis: usize| {
+        let each = points.iter().zip(&pose.position_m).zip(&ahead);
+        let along = each.map(|((c, p), [cos, sin])| {
+            let (dx, dy) = (c[0] - p[0], c[1] - p[1]);
+            [dx * cos + dy * sin, dy * cos - dx * sin][axis]
+        });
+        middle(along.collect())
+    };
+    let round = |x: f64| (x * 100.0).round() / 100.0;
+    Some(
+        carriers
+            .points_m
+            .iter()
+            .map(|c| [round(offset(c, 0)), round(offset(c, 1)), HANDLE_HEIGHT_M])
+            .collect(),
+    )
 }
 
 /// The ledger; the potential, whose zero is arbitrary, is counted from its mean.
@@ -171,4 +180,38 @@ pub fn energy(signals: &BTreeMap<&str, &Signal>) -> Option<Ledger> {
         }
     }
     (!ledger.columns.is_empty()).then_some(ledger)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn carriers_are_beside_the_body_whichever_way_it_faces() {
+        // A walk along x, a quarter turn to the left, and on along y; two carriers 2 m ahead and behind, 0.3 m to the left.
+        let mut take = Take::default();
+        let (mut pose, mut points_m) = (Pose::default(), [Vec::new(), Vec::new()]);
+        for k in 0..100i64 {
+            let along_m = k as f64 / 10.0;
+            let (yaw_rad, place) = match k {
+                0..40 => (0.0f64, [along_m, 0.0, 0.8]),
+                _ => (0.5 * std::f64::consts::PI, [4.0, along_m - 4.0, 0.8]),
+            };
+            let ((sin, cos), (sin_half, cos_half)) = (yaw_rad.sin_cos(), (0.5 * yaw_rad).sin_cos());
+            for (points, ahead_m) in points_m.iter_mut().zip([2.0, -2.0]) {
+                let (x, y) = (ahead_m * cos - 0.3 * sin, ahead_m * sin + 0.3 * cos);
+                points.push([place[0] + x, place[1] + y, 0.9]);
+            }
+            pose.times_ns.push(k);
+            pose.position_m.push(place);
+            pose.orientation.push([0.0, 0.0, sin_half, cos_half]);
+        }
+        take.carriers = Some(Carriers {
+            times_ns: pose.times_ns.clone(),
+            points_m: points_m.to_vec(),
+        });
+        take.pose = Some(pose);
+        let expected = [2.0, -2.0].map(|x| [x, 0.3, HANDLE_HEIGHT_M]);
+        assert_eq!(beside(&take).unwrap(), expected);
+    }
 }

@@ -15,6 +15,8 @@ pub struct Stream {
     accel: [Thin; 3],
     gyro_spectra: [summary::Stream; 3],
     accel_spectra: [summary::Stream; 3],
+    /// Times of the values of those columns that not every message has.
+    own: [Option<Times>; 6],
     filter: Option<orientation::Causal>,
     /// Samples since it began.
     turned: u64,
@@ -34,6 +36,7 @@ impl Stream {
             accel: axes.map(&mut thin),
             gyro_spectra: axes.map(|_| spectrum()),
             accel_spectra: axes.map(|_| spectrum()),
+            own: Default::default(),
             filter: None,
             turned: 0,
             options: orientation::Options::default(),
@@ -63,12 +66,25 @@ impl Stream {
                 _ => (&mut self.accel[k - 3], &mut self.accel_spectra[k - 3]),
             };
             push(thin, batch.times_ns, column.rows, column.values, times);
-            match column.rows {
-                None => {
-                    spectrum.push(column.values, column.finite, times.gaps());
-                    columns[k] = Some(column.values);
+            if column.rows.is_some() {
+                self.own[k].get_or_insert_default();
+            }
+            let gaps = match (&mut self.own[k], column.rows) {
+                (None, _) => times.gaps(),
+                (Some(own), rows) => {
+                    match rows {
+                        None => own.push(batch.times_ns),
+                        Some(rows) => {
+                            let at = rows.iter().map(|row| batch.times_ns[*row as usize]);
+                            own.push(&at.collect::<Vec<i64>>());
+                        }
+                    }
+                    own.gaps()
                 }
-                Some(_) => spectrum.push(column.values, column.finite, &[]),
+            };
+            spectrum.push(column.values, column.finite, gaps);
+            if column.rows.is_none() {
+                columns[k] = Some(column.values);
             }
         }
         if let [Some(gx), Some(gy), Some(gz), Some(ax), Some(ay), Some(az)] = columns {
@@ -119,11 +135,11 @@ impl Stream {
                 Vec::new()
             }
         };
-        let spectra = |axes: [summary::Stream; 3]| -> Vec<Spectrum> {
-            let all: Option<Vec<Spectrum>> = axes
-                .into_iter()
-                .map(|axis| axis.finish(times, "", true).1)
-                .collect();
+        let spectra = |axes: [summary::Stream; 3], own: &[Option<Times>]| -> Vec<Spectrum> {
+            let spectrum = |(axis, own): (summary::Stream, &Option<Times>)| {
+                axis.finish(own.as_ref().unwrap_or(times), "", true).1
+            };
+            let all: Option<Vec<Spectrum>> = axes.into_iter().zip(own).map(spectrum).collect();
             all.unwrap_or_default()
         };
         let attitude: Vec<Curve> = self.attitude.into_iter().map(Thin::finish).collect();
@@ -135,8 +151,8 @@ impl Stream {
             gyro,
             accel,
             attitude: if none { Vec::new() } else { attitude },
-            gyro_spectra: spectra(self.gyro_spectra),
-            accel_spectra: spectra(self.accel_spectra),
+            gyro_spectra: spectra(self.gyro_spectra, &self.own[..3]),
+            accel_spectra: spectra(self.accel_spectra, &self.own[3..]),
         }
     }
 }
@@ -222,5 +238,41 @@ mod tests {
                 .fold(0.0, |m: f64, x| m.max(x.abs()));
             assert!((0.3..1.2).contains(&most), "{case}: {most}");
         }
+    }
+
+    #[test]
+    fn a_field_that_every_other_message_has_keeps_its_line() {
+        // Messages come at 100 Hz, the angular velocity in every other of them.
+        let times_ns: Vec<i64> = (0..6000).map(|k| k * 10_000_000).collect();
+        let rows: Vec<u32> = (0..3000).map(|k| 2 * k).collect();
+        let still = vec![0.0; 3000];
+        let rate: Vec<f64> = (0..3000)
+            .map(|k| 0.1 * (TAU * 1.3 * f64::from(k) / 50.0).cos())
+            .collect();
+        let paths = ["x", "y", "z"].map(|axis| format!("/imu.angular_velocity.{axis}"));
+        let columns: Vec<Column<'_>> = (0..3)
+            .map(|k| Column {
+                id: k,
+                path: &paths[k],
+                rows: Some(&rows),
+                values: if k == 0 { &rate } else { &still },
+                finite: true,
+            })
+            .collect();
+        let batch = Batch {
+            channel: 0,
+            topic: "/imu",
+            schema: "sensor_msgs/Imu",
+            times_ns: &times_ns,
+            stamps_ns: None,
+            columns: &columns,
+        };
+        let mut times = Times::default();
+        times.push(&times_ns);
+        let thin = |name: &str| Thin::new(name, 0, 60_000_000_000, 0, 1);
+        let mut sensor = Stream::new(100.0, 6000, thin);
+        sensor.push(&batch, &times);
+        let peak_hz = sensor.finish("/imu", &times).gyro_spectra[0].peak_hz();
+        assert!((peak_hz.unwrap() - 1.3).abs() < 0.01, "{peak_hz:?}");
     }
 }

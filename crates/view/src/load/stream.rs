@@ -7,6 +7,7 @@ use recording::Finding;
 use recording::read::{Batch, ReadError, Recording};
 use recording::signal::unit_of;
 
+use super::dates::Dates;
 use super::{Detail, Plan, sensor};
 use crate::take::{Curve, Sensor, Take, Topic};
 use crate::thin::Thin;
@@ -26,6 +27,7 @@ pub fn others(
     recording: &Recording,
     plan: &Plan<'_>,
     detail: Detail,
+    dates: &mut Dates,
     findings: &mut Vec<Finding>,
 ) -> Result<(), ReadError> {
     let info = recording.info();
@@ -73,6 +75,10 @@ pub fn others(
         }
         let Some(times) = times.get_mut(batch.topic) else {
             return;
+        };
+        let batch = &match dates.next(batch.topic, batch.times_ns.len()) {
+            Some(times_ns) => Batch { times_ns, ..*batch },
+            None => *batch,
         };
         times.push(batch.times_ns);
         if let Some(topic) = plan.imus.iter().find(|topic| **topic == batch.topic) {
@@ -173,17 +179,27 @@ pub fn push(
     values: &[f64],
     times: &Times,
 ) {
-    let Some(rows) = rows else {
-        let mut from = 0;
-        for gap in times.gaps() {
-            thin.push(&times_ns[from..gap.before], &values[from..gap.before]);
-            thin.push(&[times_ns[gap.before].saturating_sub(1)], &[f64::NAN]);
-            from = gap.before;
+    let own: Vec<i64>;
+    let times_ns = match rows {
+        None => times_ns,
+        Some(rows) => {
+            own = rows.iter().map(|row| times_ns[*row as usize]).collect();
+            &own
         }
-        return thin.push(&times_ns[from..], &values[from..]);
     };
-    let times: Vec<i64> = rows.iter().map(|row| times_ns[*row as usize]).collect();
-    thin.push(&times, values);
+    let mut from = 0;
+    for gap in times.gaps() {
+        let before = rows.map_or(gap.before, |rows| {
+            rows.partition_point(|row| (*row as usize) < gap.before)
+        });
+        let Some(next_ns) = times_ns.get(before) else {
+            break;
+        };
+        thin.push(&times_ns[from..before], &values[from..before]);
+        thin.push(&[next_ns.saturating_sub(1)], &[f64::NAN]);
+        from = before;
+    }
+    thin.push(&times_ns[from..], &values[from..]);
 }
 
 /// A plain topic: curves of one unit share a plot.
@@ -200,4 +216,22 @@ fn topic(name: String, curves: Vec<(String, String, Thin)>) -> Topic {
         }
     }
     Topic { name, plots }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_hole_breaks_a_curve_that_not_every_message_has_too() {
+        let times_ns: Vec<i64> = (0..100).chain(200..300).map(|k| k * 10_000_000).collect();
+        let rows: Vec<u32> = (0..100).map(|k| 2 * k).collect();
+        let mut times = Times::default();
+        times.push(&times_ns);
+        let mut thin = Thin::new("x", 0, 3_000_000_000, 0, 1);
+        push(&mut thin, &times_ns, Some(&rows), &[1.0; 100], &times);
+        let curve = thin.finish();
+        assert_eq!(curve.values.len(), 101);
+        assert!(curve.values[50].is_nan() && curve.times_ns.is_sorted());
+    }
 }

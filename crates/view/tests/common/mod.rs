@@ -20,6 +20,11 @@ pub const ROWS: usize = 601;
 
 /// A made run of `carriers` around a body that bobs at 2 Hz, rolls at 1 Hz and loses contact in every cycle.
 pub fn run(path: &Path, carriers: usize) {
+    run_logged(path, carriers, |t_ns| t_ns);
+}
+
+/// The same by a logger that gives a message of `t_ns` the time `logged(t_ns)`.
+pub fn run_logged(path: &Path, carriers: usize, logged: fn(i64) -> i64) {
     let mut writer = RecordingWriter::create(path, &WriterOptions::default()).unwrap();
     let meta = [
         ("scene", "made"),
@@ -83,7 +88,7 @@ pub fn run(path: &Path, carriers: usize) {
             pitch_rad: 0.01,
             ..rath::State::default()
         };
-        writer.message(state, t_ns, &message).unwrap();
+        writer.message(state, logged(t_ns), &message).unwrap();
         let phase_rad: Vec<f64> = (0..carriers)
             .map(|i| turn * 2.0 * t + 0.1 * i as f64)
             .collect();
@@ -96,21 +101,21 @@ pub fn run(path: &Path, carriers: usize) {
             order_parameter: 1.0,
             ..rath::Phases::default()
         };
-        writer.message(phases, t_ns, &message).unwrap();
+        writer.message(phases, logged(t_ns), &message).unwrap();
         let n = (60.0 * 9.81 / carriers as f64 * (1.0 + 1.3 * (turn * 2.0 * t).sin())).max(0.0);
         let message = rath::HandleForces {
             time_s: t,
             normal_n: vec![n; carriers],
             ..rath::HandleForces::default()
         };
-        writer.message(forces, t_ns, &message).unwrap();
+        writer.message(forces, logged(t_ns), &message).unwrap();
         let message = rath::Energy {
             time_s: t,
             kinetic_j: 10.0,
             potential_j: 500.0 + z,
             ..rath::Energy::default()
         };
-        writer.message(energy, t_ns, &message).unwrap();
+        writer.message(energy, logged(t_ns), &message).unwrap();
         let frame = |child: &str, [x, y, z]: [f64; 3]| TransformStamped {
             header: Header {
                 stamp: Time::from_ns(t_ns),
@@ -129,13 +134,19 @@ pub fn run(path: &Path, carriers: usize) {
                 [0.8 * t + h[0], h[1], 1.05],
             ));
         }
-        writer.message(tf, t_ns, &TfMessage { transforms }).unwrap();
+        let message = TfMessage { transforms };
+        writer.message(tf, logged(t_ns), &message).unwrap();
     }
     writer.finish().unwrap();
 }
 
 /// A log of `sensors` inertial sensors: `seconds` at `hz`, with real time stamps.
 pub fn imus(path: &Path, sensors: usize, seconds: usize, hz: usize) {
+    imus_logged(path, sensors, seconds, hz, |t_ns| t_ns);
+}
+
+/// The same by a logger that gives a message of `t_ns` the time `logged(t_ns)`.
+pub fn imus_logged(path: &Path, sensors: usize, seconds: usize, hz: usize, logged: fn(i64) -> i64) {
     let mut writer = RecordingWriter::create(path, &WriterOptions::default()).unwrap();
     let channels: Vec<_> = (0..sensors)
         .map(|i| {
@@ -154,7 +165,7 @@ pub fn imus(path: &Path, sensors: usize, seconds: usize, hz: usize) {
                 [0.2 * sin, 0.0, 0.0],
                 [0.0, 0.5 * cos, 9.81 + sin],
             );
-            writer.message(*channel, t_ns, &imu).unwrap();
+            writer.message(*channel, logged(t_ns), &imu).unwrap();
         }
     }
     writer.finish().unwrap();
@@ -208,6 +219,20 @@ impl Taken {
                     .collect::<Vec<_>>()
             })
             .collect()
+    }
+
+    /// Times of an entity's rows, in order.
+    pub fn times_ns(&self, entity: &str) -> Vec<i64> {
+        let chunks = self.chunks(false);
+        let of = chunks.filter(|c| c.entity_path().to_string() == entity && !c.is_static());
+        let times = |c: Chunk| {
+            c.timelines()[&view::store::TIME.into()]
+                .times_raw()
+                .to_vec()
+        };
+        let mut out: Vec<i64> = of.flat_map(times).collect();
+        out.sort_unstable();
+        out
     }
 
     /// Times and values of an entity's scalars, in order of time.

@@ -1,0 +1,142 @@
+//! When messages were taken: as `analyze` dates them, where the log only knows when they came.
+
+use std::collections::BTreeMap;
+
+use analyze::arrivals::{Arrivals, is_time};
+use recording::Finding;
+use recording::read::{Batch, ReadError, Recording};
+use recording::signal::Signal;
+
+use super::{Plan, at_ns, remark};
+
+/// Times of the messages of those topics whose log times are not when they were taken.
+#[derive(Debug, Default)]
+pub struct Dates {
+    topics: BTreeMap<String, Dated>,
+    /// What was done to which topic, in sentences.
+    pub notes: Vec<String>,
+}
+
+#[derive(Debug)]
+struct Dated {
+    /// Of every message in the order of the file, ns; ascending.
+    times_ns: Vec<i64>,
+    /// Those asked for so far.
+    asked: usize,
+}
+
+impl Dates {
+    /// Times of the next `count` messages of a topic, ns; `None` where the log's are good.
+    pub fn next(&mut self, topic: &str, count: usize) -> Option<&[i64]> {
+        let dated = self.topics.get_mut(topic)?;
+        let from = dated.asked;
+        dated.asked += count;
+        dated.times_ns.get(from..dated.asked)
+    }
+}
+
+/// A topic while its batches come in.
+#[derive(Default)]
+struct Gathered {
+    arrivals: Arrivals,
+    /// What tells the content of a message from that of others.
+    marks: Vec<u64>,
+    /// Columns that are collected: message and value.
+    columns: BTreeMap<String, Vec<(usize, f64)>>,
+}
+
+impl Gathered {
+    fn take(&mut self, batch: &Batch<'_>, plan: &Plan<'_>) {
+        let first = self.marks.len();
+        self.arrivals.take(batch);
+        self.marks.resize(self.arrivals.len(), 0);
+        for column in batch.columns {
+            let row = |k: usize| first + column.rows.map_or(k, |rows| rows[k] as usize);
+            for (k, x) in column.values.iter().enumerate() {
+                let mark = &mut self.marks[row(k)];
+                *mark = (mark.rotate_left(5) ^ column.id as u64 ^ x.to_bits())
+                    .wrapping_mul(0x9e37_79b9_7f4a_7c15);
+            }
+            if plan.is_whole(column.path) {
+                let kept = match self.columns.get_mut(column.path) {
+                    Some(kept) => kept,
+                    None => self.columns.entry(column.path.to_owned()).or_default(),
+                };
+                kept.extend(column.values.iter().enumerate().map(|(k, x)| (row(k), *x)));
+            }
+        }
+    }
+}
+
+/// Collects what is drawn of our own topics, and the times of all that are drawn.
+pub fn collect(
+    recording: &Recording,
+    plan: &Plan<'_>,
+) -> Result<(Vec<Signal>, Dates, Vec<Finding>), ReadError> {
+    let start_ns = recording.info().start_ns;
+    let mut topics: BTreeMap<String, Gathered> = BTreeMap::new();
+    let wanted = |path: &str| {
+        let own = |topic: &&str| {
+            let field = path.strip_prefix(*topic).and_then(|p| p.strip_prefix('.'));
+            field.is_some_and(is_time)
+        };
+        plan.is_whole(path) || plan.is_streamed(path) || plan.ours.iter().any(own)
+    };
+    let findings = recording.stream(&wanted, &mut |batch| {
+        let topic = match topics.get_mut(batch.topic) {
+            Some(topic) => topic,
+            None => topics.entry(batch.topic.to_owned()).or_default(),
+        };
+        topic.take(batch, plan);
+    })?;
+    let mut signals = Vec::new();
+    let mut dates = Dates::default();
+    for (name, topic) in topics {
+        let marks = &topic.marks;
+        let axis = topic.arrivals.dated(start_ns, |a, b| marks[a] == marks[b]);
+        let times_ns = at_ns(start_ns, &axis.t_s);
+        for (path, kept) in topic.columns {
+            let mut values = vec![None; marks.len()];
+            kept.into_iter().for_each(|(row, x)| values[row] = Some(x));
+            let each = times_ns.iter().zip(&axis.rows);
+            let (times_ns, values): (Vec<i64>, Vec<f64>) = each
+                .filter_map(|(t, row)| Some((*t, values[*row]?)))
+                .unzip();
+            signals.push(Signal {
+                path,
+                unit: String::new(),
+                times_ns: times_ns.into(),
+                values,
+            });
+        }
+        let Some((_, text)) = (axis.remarks.iter()).find(|(kind, _)| is_redated(kind)) else {
+            continue;
+        };
+        if axis.rows.is_sorted() {
+            dates.notes.push(remark(&name, text));
+            let times_ns = by_message(marks.len(), &axis.rows, &times_ns);
+            dates.topics.insert(name, Dated { times_ns, asked: 0 });
+        } else if !plan.is_ours(&name) {
+            dates.notes.push(format!("{name}: messages overtake each other; its own curves are drawn at the times of the log"));
+        }
+    }
+    Ok((signals, dates, findings))
+}
+
+/// Whether a remark says that the times are not those of the log.
+fn is_redated(kind: &str) -> bool {
+    ["by_stamps", "packets"].contains(&kind)
+}
+
+/// Times by message; one without is where the one before it is, or at the first.
+fn by_message(count: usize, rows: &[usize], times_ns: &[i64]) -> Vec<i64> {
+    let mut last = times_ns.first().copied().unwrap_or(0);
+    let mut known = rows.iter().zip(times_ns).peekable();
+    let each = (0..count).map(|row| {
+        if let Some((_, t)) = known.next_if(|(known, _)| **known == row) {
+            last = *t;
+        }
+        last
+    });
+    each.collect()
+}
