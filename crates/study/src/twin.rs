@@ -451,3 +451,44 @@ pub fn to_json(found: &[Found]) -> Value {
     let [all, held] = coverage(found);
     json!({"conditions": conditions, "intervals": all, "covered": held})
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn seen(settings: &'static [&'static str], seed: u64, name: &str) -> Seen {
+        let condition = Condition {
+            name: "test",
+            settings,
+            clocks_off: false,
+        };
+        let row = ROWS.iter().position(|row| row.name == name).unwrap();
+        twin(&condition, seed).unwrap().seen[row].clone()
+    }
+
+    #[test]
+    fn one_clock_seconds_off_does_not_make_a_wrong_synchrony() {
+        const ONE: &[&str] = &["epoch_s=1000.0", "effects.imu.sensors.1.clock_offset_s=1.0"];
+        const THREE: &[&str] = &["epoch_s=1000.0", "effects.imu.sensors.1.clock_offset_s=3.0"];
+        for settings in [ONE, THREE] {
+            let found = seen(settings, 1001, "synchrony");
+            assert_eq!(found.covered(), Some(true), "{found:?}");
+            assert_eq!(found.keeps(Bound::Within(0.02, 0.0)), Some(true));
+            // Against the beat nothing tells where a step of them lies.
+            assert_eq!(seen(settings, 1001, "beat_lead_deg").error, None);
+        }
+    }
+
+    #[test]
+    fn carriers_who_slip_past_the_beat_are_seen_as_they_are() {
+        for settings in [
+            &["effects.music.beat_hz=2.8"] as &[&str],
+            &["effects.music.beat_hz=1.7"],
+        ] {
+            for name in ["synchrony", "pull_rad_per_s"] {
+                let found = seen(settings, 2, name);
+                assert_eq!(found.covered(), Some(true), "{name}: {found:?}");
+            }
+        }
+    }
+}

@@ -117,6 +117,8 @@ impl Course {
     /// Beats per second over the part of a window in which they sound, and half its 95 % interval: advance over time. `None` below three beats.
     pub fn tempo(&self, window: Window) -> Option<(f64, f64)> {
         let (mut beats, mut sounds_s, mut parts) = (0.0, 0.0, 0.0);
+        // Tempo at each end of a run where what sounds beyond it, up to a beat, is not seen.
+        let mut ends_hz = Vec::new();
         for run in &self.runs {
             let from = window.start_s.max(self.due_s[run.start]);
             let to = window.end_s.min(self.due_s[run.end - 1]);
@@ -126,11 +128,22 @@ impl Course {
                 beats += b - a;
                 sounds_s += to - from;
                 parts += 1.0;
+                let tempo_hz = |k: usize| {
+                    (self.number[k + 1] - self.number[k]) / (self.due_s[k + 1] - self.due_s[k])
+                };
+                if window.start_s < from {
+                    ends_hz.push(tempo_hz(run.start));
+                }
+                if to < window.end_s {
+                    ends_hz.push(tempo_hz(run.end - 2));
+                }
             }
         }
         let tempo_hz = beats / sounds_s;
         // Both ends of each part err by no more than a beat does.
         let half = 1.96 * tempo_hz * self.error_s * f64::sqrt(2.0 * parts) / sounds_s;
+        let unseen: f64 = ends_hz.iter().map(|hz| (hz / tempo_hz - 1.0).abs()).sum();
+        let half = half + unseen / sounds_s;
         let enough = window.range(&self.due_s).len() >= 3 && tempo_hz.is_finite();
         enough.then_some((tempo_hz, half))
     }
@@ -219,6 +232,16 @@ mod tests {
             .unwrap();
         assert!(
             (hz - (2.0 + 25.0 / 60.0)).abs() < half && half < 0.001,
+            "{hz} ± {half}"
+        );
+        // 1 Hz up to 20 s, 2 Hz after it and up to 40.4 s: 60.8 beats in 40.4 s, the last of them heard at 40 s.
+        let beat_s: Vec<f64> = (0..20)
+            .map(f64::from)
+            .chain((0..=40).map(|k| 20.0 + 0.5 * f64::from(k)))
+            .collect();
+        let (hz, half) = Course::of(&beat_s, None).tempo(Window::ALL).unwrap();
+        assert!(
+            (hz - 60.8 / 40.4).abs() < half && half < 0.03,
             "{hz} ± {half}"
         );
     }

@@ -390,7 +390,21 @@ impl Field {
             let mut inputs = Inputs::default();
             self.fill_phases(&mut inputs, t_s, phases);
             let mut together = metrics_of(&inputs, window, carriers::gives);
-            self.carriers.interval(&mut together);
+            let as_of = |(t_s, phases), wanted: fn(&str) -> bool| {
+                let mut inputs = Inputs::default();
+                self.fill_phases(&mut inputs, t_s, phases);
+                metrics_of(&inputs, window, wanted)
+            };
+            let detected = self.carriers.detected();
+            let detected =
+                detected.map(|p| as_of(p, |n| n == "synchrony" || n == "pull_rad_per_s"));
+            let others: Vec<f64> = self
+                .carriers
+                .phases_else()
+                .filter_map(|p| as_of(p, |n| n == "synchrony").number("synchrony"))
+                .collect();
+            self.carriers
+                .interval(&mut together, &detected.unwrap_or_default(), &others);
             out.0.extend(together.0);
         }
         // Taps and talk before and behind the music are heard too.
