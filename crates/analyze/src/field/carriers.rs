@@ -1,5 +1,6 @@
 //! The carriers' own sensors: steps, gait phases on one clock, how sure they are.
 
+use super::align::{ALIGN_HZ, Match};
 use crate::events::Event;
 use crate::filter::{Band, butter, sosfiltfilt};
 use crate::imu::Track;
@@ -15,25 +16,16 @@ use crate::spectrum::Complex64;
 use crate::steps::{StepError, Steps, steps_in};
 use nalgebra::{UnitQuaternion, Vector3};
 
-/// How far clocks have to part to be put right, and half the 95 % interval of what is found (s), by twins: with the tilt of a pole that two
-/// carry, and with the heave alone. Less cannot be told from a true lag between steps.
-const TWO_S: (f64, f64) = (0.03, 0.02);
-const MANY_S: (f64, f64) = (0.04, 0.03);
+/// How far clocks have to part to be put right, s: less cannot be told from a true lag between steps.
+const LEAST_OFFSET_S: f64 = 0.03;
+/// Half the 95 % interval of what is found, s, by twins.
+const OFFSET_ERROR_S: f64 = 0.02;
 /// J below which the heaves are not taken for the rath's: on twins it is 0.98 and more.
 const MATCH: f64 = 0.8;
-/// Clocks are moved where that leaves at most this share of what is unexplained with the clocks as they are: of many carriers one tells little.
+/// Clocks are moved where that leaves at most this share of what is unexplained with the clocks as they are.
 const BETTER: f64 = 0.5;
-/// Rate at which heaves are compared, Hz.
-const ALIGN_HZ: f64 = 100.0;
-/// Each carrier's offset is looked for at most so often; two carriers need one round.
-const ROUNDS: usize = 6;
 /// How far the clocks of two are looked for either way, s, or so much of what they share.
 const REACH_S: (f64, f64) = (5.0, 1.0 / 6.0);
-/// Samples of a first look, and how far its maxima are looked about, both in samples of the grid.
-const COARSE: usize = 5;
-const ABOUT: i64 = 6;
-/// Offsets under which Σ −ln(1 − J) falls short of its maximum by no more than this are as good; at most so many are looked at.
-const AS_GOOD: (f64, usize) = (1.0, 12);
 /// A synchrony that such offsets change by more than this is not known.
 const VAGUE: f64 = 0.1;
 
@@ -50,129 +42,6 @@ struct Worn {
     ahead_s: f64,
     /// What else it may be ahead, as far as the motion tells, s; of all sensors the same number.
     or_ahead_s: Vec<f64>,
-}
-
-/// What is known of the clocks.
-struct Found {
-    /// Whether the load moves as the carriers do.
-    matches: bool,
-    /// o_j of everyone who walks, s.
-    offsets_s: Vec<Option<f64>>,
-    /// Others that are as good, s.
-    or_s: Vec<Vec<Option<f64>>>,
-    /// How far they have to part to be believed, s.
-    least_s: f64,
-    /// Half their 95 % interval, s.
-    error_s: f64,
-}
-
-/// One who walks, as the clocks are compared.
-struct Rider {
-    number: usize,
-    z: Vec<Complex64>,
-    /// Half a step, samples.
-    reach: i64,
-}
-
-impl Rider {
-    /// z(t + o) at sample `i` for o of `shift` samples.
-    fn at(&self, i: usize, shift: i64) -> Complex64 {
-        self.z[(i as i64 + shift) as usize]
-    }
-}
-
-/// J: how much of `x` is one complex number times the shifted, signed sum of the riders; at most a hair below 1.
-fn alike(
-    x: &[Complex64],
-    riders: &[Rider],
-    signs: &[f64],
-    shift: &[i64],
-    inner: &std::ops::Range<usize>,
-) -> f64 {
-    let (mut xs, mut ss, mut xx) = (Complex64::default(), 0.0, 0.0);
-    for i in inner.clone() {
-        let sum: Complex64 = riders
-            .iter()
-            .zip(signs)
-            .zip(shift)
-            .map(|((r, sign), s)| r.at(i, *s) * *sign)
-            .sum();
-        xs += x[i].conj() * sum;
-        ss += sum.norm_sqr();
-        xx += x[i].norm_sqr();
-    }
-    (xs.norm_sqr() / (ss * xx).max(f64::MIN_POSITIVE)).min(1.0 - 1e-12)
-}
-
-/// Σ_X −ln(1 − J_X) of two riders for all shifts on a coarse grid: maxima, best first, and the best with both shifted alike by a lag.
-struct Look {
-    maxima: Vec<(f64, [i64; 2])>,
-    alike: f64,
-}
-
-impl Look {
-    /// `felt`: what is felt and the sign of the second rider; shifts of up to `reach` samples, inside of which nothing leaves the record;
-    /// a lag of the load is at most `lag` samples.
-    fn new(felt: &[(Vec<Complex64>, f64)], z: [&[Complex64]; 2], reach: usize, lag: usize) -> Self {
-        let n = z[0].len();
-        let inner = reach..n - reach;
-        let count = 2 * reach + 1;
-        let dot = |x: &[Complex64], z: &[Complex64], s: usize| -> Complex64 {
-            let pairs = x[inner.clone()].iter().zip(&z[s..]);
-            pairs.map(|(x, z)| x.conj() * z).sum()
-        };
-        let power = |z: &[Complex64], s: usize| -> f64 {
-            z[s..s + inner.len()].iter().map(Complex64::norm_sqr).sum()
-        };
-        let powers = z.map(|z| (0..count).map(|s| power(z, s)).collect::<Vec<f64>>());
-        // Σ z₁(t + a) z₂*(t + b) depends on b − a but for its ends: running sums for each difference.
-        let mut cross = vec![0.0; count * count];
-        let mut sums = vec![0.0; n + 1];
-        for apart in -(2 * reach as i64)..=2 * reach as i64 {
-            for u in 0..n {
-                let other = z[1].get((u as i64 + apart) as usize);
-                sums[u + 1] = sums[u] + other.map_or(0.0, |other| (z[0][u] * other.conj()).re);
-            }
-            for a in 0..count {
-                let b = a as i64 + apart;
-                if (0..count as i64).contains(&b) {
-                    cross[a * count + b as usize] = sums[a + inner.len()] - sums[a];
-                }
-            }
-        }
-        let mut told = vec![0.0; count * count];
-        for (x, sign) in felt {
-            let with = z.map(|z| (0..count).map(|s| dot(x, z, s)).collect::<Vec<_>>());
-            let all: f64 = x[inner.clone()].iter().map(Complex64::norm_sqr).sum();
-            for (k, told) in told.iter_mut().enumerate() {
-                let (a, b) = (k / count, k % count);
-                let sum = powers[0][a] + powers[1][b] + 2.0 * sign * cross[k];
-                let same = (with[0][a] + with[1][b] * *sign).norm_sqr();
-                let share = same / (sum * all).max(f64::MIN_POSITIVE);
-                *told -= (1.0 - share.min(1.0 - 1e-12)).ln();
-            }
-        }
-        let top = |a: usize, b: usize| {
-            let about = (a - 1..=a + 1).flat_map(|i| (b - 1..=b + 1).map(move |j| (i, j)));
-            about.fold(f64::MIN, |most, (i, j)| most.max(told[i * count + j]))
-        };
-        let mut maxima = Vec::new();
-        for a in 1..count - 1 {
-            for b in 1..count - 1 {
-                let here = told[a * count + b];
-                if here >= top(a, b) {
-                    maxima.push((here, [a, b].map(|s| s as i64 - reach as i64)));
-                }
-            }
-        }
-        maxima.sort_by(|a, b| b.0.total_cmp(&a.0));
-        let lags = reach.saturating_sub(lag)..=(reach + lag).min(count - 1);
-        let alike = lags.map(|a| told[a * count + a]);
-        Self {
-            alike: alike.fold(f64::MIN, f64::max),
-            maxima,
-        }
-    }
 }
 
 /// Times (s) and the phases there (rad), one column for each who walks.
@@ -233,209 +102,59 @@ impl Carriers {
         });
     }
 
-    /// Puts the carriers on one clock: the offsets under which their heaves, added up, are the rath's heave, and, where two carry a pole, their
-    /// difference its tilt.
+    /// Puts two carriers on one clock: the offsets under which their heaves, added up, are the rath's heave, and their difference its tilt.
     ///
     /// ```text
-    /// H(t) ≈ γ Σ_j z_j(t + o_j),    P(t) ≈ κ (z_1(t + o_1) − z_2(t + o_2))
+    /// H(t) ≈ γ (z_1(t + o_1) + z_2(t + o_2)),    P(t) ≈ κ (z_1(t + o_1) − z_2(t + o_2))
     /// J_X = |⟨X, S⟩|² / (⟨X, X⟩⟨S, S⟩),    o = argmax Σ_X −ln(1 − J_X)
     /// ```
     /// H, P, z_j analytic signals of the rath's heave and tilt and of carrier j's heave, 1 to 5 Hz; S the sum or difference on the right; γ, κ one
-    /// complex number each: gain and lag of the load behind the shoulders, the same for all; o_j what carrier j's clock is ahead (s). It shows
-    /// where carriers fall in and out of step: the heave grows and fades, the tilt fades and grows. What all clocks have in common goes
-    /// into γ and κ and stays. Two are looked for within [`REACH_S`] of the rath's clock, more within half a step of each other: a whole number of
-    /// steps changes the phases of those whose pace does. Offsets of two that are as good are kept for the interval of the synchrony.
-    pub fn align(&mut self, motion: &Motion) -> Vec<Quality> {
-        let Some(Found {
-            matches,
-            offsets_s,
-            or_s,
-            least_s,
-            error_s,
-        }) = self.offsets(motion)
-        else {
-            return Vec::new();
+    /// complex number each: gain and lag of the load behind the shoulders, the same for both; o_j what carrier j's clock is ahead (s). It shows
+    /// where carriers fall in and out of step: the heave grows and fades, the tilt fades and grows. What both clocks have in common goes
+    /// into γ and κ and stays. They are looked for within [`REACH_S`] of the rath's clock: a whole number of steps changes the phases of those whose
+    /// pace does. Offsets that are as good are kept for the interval of the synchrony. Of more than two each is too small a part of what moves
+    /// the load: their clocks are left alone, and the synchrony is without an interval.
+    pub fn align(&mut self, motion: Option<&Motion>) -> Vec<Quality> {
+        let walking: Vec<&Worn> = self.worn.iter().filter(|w| w.steps.is_ok()).collect();
+        let topics: Vec<&str> = walking.iter().map(|w| &w.topic[..]).collect();
+        let apart = |why: &str| {
+            let text = format!(
+                "the clocks of {} could not be held against each other: {why}; a synchrony of theirs has no interval, tap the sensors together or say --one-clock",
+                topics.join(", ")
+            );
+            vec![Quality::remark("", "clocks_apart", text)]
         };
-        if !matches {
-            self.apart = true;
-            let topics: Vec<&str> = self.worn.iter().map(|w| &w.topic[..]).collect();
-            return vec![Quality::remark(
-                "",
-                "clocks_apart",
-                format!(
-                    "the clocks of {} could not be held against each other: their heaves, put together within half a step, are not the load's; a synchrony of theirs has no interval, tap the sensors together or say --one-clock",
-                    topics.join(", ")
-                ),
-            )];
-        }
-        let (low, high) = offsets_s
-            .iter()
-            .flatten()
-            .fold((f64::MAX, f64::MIN), |(a, b), o| (a.min(*o), b.max(*o)));
-        if high - low < least_s {
-            return Vec::new();
-        }
+        let found = match (&walking[..], motion) {
+            ([] | [_], _) => return Vec::new(),
+            ([one, other], Some(motion)) => offsets([one, other], motion),
+            ([_, _], None) => Err("no sensor tells how the load moves"),
+            _ => Err("of more than two each is too small a part of what moves the load"),
+        };
+        let (offsets_s, or_s) = match found {
+            Ok(Some(found)) => found,
+            Ok(None) => return Vec::new(),
+            Err(why) => {
+                let said = apart(why);
+                self.apart = true;
+                return said;
+            }
+        };
         let mut out = Vec::new();
-        for (k, (worn, offset_s)) in self.worn.iter_mut().zip(offsets_s).enumerate() {
-            let Some(offset_s) = offset_s else { continue };
+        let walking = self.worn.iter_mut().filter(|w| w.steps.is_ok());
+        for (k, (worn, offset_s)) in walking.zip(offsets_s).enumerate() {
             worn.ahead_s = offset_s;
-            worn.or_ahead_s = or_s.iter().filter_map(|or| or[k]).collect();
+            worn.or_ahead_s = or_s.iter().map(|or| or[k]).collect();
             out.push(Quality::remark(
                 &worn.topic,
                 "clock_offset",
                 format!(
                     "runs {:+.0} ± {:.0} ms off the carriers' common clock, or whole steps more; put right before comparing phases",
                     1e3 * offset_s,
-                    1e3 * error_s
+                    1e3 * OFFSET_ERROR_S
                 ),
             ));
         }
         out
-    }
-
-    /// `None` for fewer than two, or where the clocks do as they are.
-    fn offsets(&self, motion: &Motion) -> Option<Found> {
-        let seen = &motion.inputs;
-        let walks = |w: &&Worn| w.steps.is_ok();
-        let ends = |t: &[f64]| Some((*t.first()?, *t.last()?));
-        let (mut start, mut end) = ends(&seen.t_s)?;
-        for worn in self.worn.iter().filter(walks) {
-            let (a, b) = ends(&worn.t_s)?;
-            (start, end) = (start.max(a), end.min(b));
-        }
-        if self.worn.iter().filter(walks).count() < 2 || end - start < 10.0 {
-            return None;
-        }
-        let n = ((end - start) * ALIGN_HZ) as usize;
-        let grid: Vec<f64> = (0..n).map(|k| start + k as f64 / ALIGN_HZ).collect();
-        let analytic = |t_s: &[f64], x: &[f64]| -> Option<Vec<Complex64>> {
-            let band = gait_band(x, 1.0 / period_s(t_s)?)?;
-            Some(hilbert(&interpolate(t_s, &band, &grid)))
-        };
-        let mut riders = Vec::new();
-        for (k, worn) in self.worn.iter().enumerate() {
-            if let Ok(steps) = &worn.steps {
-                riders.push(Rider {
-                    number: k,
-                    z: analytic(&worn.t_s, &worn.heave)?,
-                    reach: (0.5 * ALIGN_HZ / steps.cadence_hz) as i64,
-                });
-            }
-        }
-        let mut felt = vec![(
-            analytic(&seen.t_s, &seen.support_ratio)?,
-            vec![1.0; riders.len()],
-        )];
-        let two = riders.len() == 2;
-        if two {
-            felt.push((analytic(&seen.t_s, &seen.pitch_rad)?, vec![1.0, -1.0]));
-        }
-        let reach = match two {
-            true => (REACH_S.0.min(REACH_S.1 * (end - start)) * ALIGN_HZ) as i64,
-            false => riders.iter().map(|r| r.reach).max()?,
-        };
-        // Shifted either way nothing may leave the record.
-        let margin = (reach + ABOUT) as usize + 2;
-        let inner = margin..n.checked_sub(margin)?;
-        let told = |shift: &[i64]| -> f64 {
-            felt.iter()
-                .map(|(x, signs)| -(1.0 - alike(x, &riders, signs, shift, &inner)).ln())
-                .sum()
-        };
-        // The best shift of rider j within a range, between samples too (s), and what it tells.
-        let along = |shift: &mut [i64], j: usize, range: std::ops::RangeInclusive<i64>| {
-            let mut score = |s: i64| {
-                shift[j] = s;
-                told(shift)
-            };
-            let (s, top) = range
-                .map(|s| (s, score(s)))
-                .max_by(|a, b| a.1.total_cmp(&b.1))?;
-            let (l, r) = (score(s - 1), score(s + 1));
-            shift[j] = s;
-            let bend = l - 2.0 * top + r;
-            let between = if bend < 0.0 {
-                (0.5 * (l - r) / bend).clamp(-0.5, 0.5)
-            } else {
-                0.0
-            };
-            Some(((s as f64 + between) / ALIGN_HZ, top))
-        };
-        let mut all: Vec<(f64, Vec<f64>)> = Vec::new();
-        let as_they_are;
-        if two {
-            let coarse = |x: &[Complex64]| x.iter().step_by(COARSE).copied().collect::<Vec<_>>();
-            let [a, b] = [0, 1].map(|j| coarse(&riders[j].z));
-            let felt: Vec<_> = felt.iter().map(|(x, s)| (coarse(x), s[1])).collect();
-            let look = Look::new(
-                &felt,
-                [&a, &b],
-                reach as usize / COARSE,
-                riders[0].reach as usize / COARSE,
-            );
-            let best = look.maxima.first()?.0;
-            for (_, at) in look
-                .maxima
-                .iter()
-                .take_while(|(told, _)| best - told < AS_GOOD.0)
-                .take(AS_GOOD.1)
-            {
-                let mut shift = at.map(|s| s * COARSE as i64);
-                let (mut found, mut top) = (vec![0.0; 2], 0.0);
-                for _ in 0..2 {
-                    for j in 0..2 {
-                        let about = (shift[j] - ABOUT).max(-reach)..=(shift[j] + ABOUT).min(reach);
-                        (found[j], top) = along(&mut shift, j, about)?;
-                    }
-                }
-                all.push((top, found));
-            }
-            all.sort_by(|a, b| b.0.total_cmp(&a.0));
-            // On the same grid as the best of it.
-            as_they_are = all[0].0 - (best - look.alike);
-        } else {
-            let mut shift = vec![0i64; riders.len()];
-            let mut found = vec![0.0; riders.len()];
-            as_they_are = told(&shift);
-            let mut best = 0.0;
-            for _ in 0..ROUNDS {
-                let before = shift.clone();
-                // The first stays: what all have in common cannot be told.
-                for j in 1..riders.len() {
-                    let reach = riders[j].reach;
-                    (found[j], best) = along(&mut shift, j, -reach..=reach)?;
-                }
-                if shift == before {
-                    break;
-                }
-            }
-            all.push((best, found));
-        }
-        let best = all[0].0;
-        let matches = best >= felt.len() as f64 * -(1.0 - MATCH).ln();
-        if matches && best - as_they_are < -BETTER.ln() {
-            return None;
-        }
-        let step_s = 2.0 * riders[0].reach as f64 / ALIGN_HZ;
-        let placed = |found: Vec<f64>| {
-            // The load's lag is less than half a step and no clock's.
-            let mean = found.iter().sum::<f64>() / found.len() as f64;
-            let lag = mean - (mean / step_s).round() * step_s;
-            let mut out = vec![None; self.worn.len()];
-            for (rider, o) in riders.iter().zip(found) {
-                out[rider.number] = Some(o - lag);
-            }
-            out
-        };
-        let (least_s, error_s) = if two { TWO_S } else { MANY_S };
-        let mut all = all.into_iter().map(|(_, found)| placed(found));
-        Some(Found {
-            matches,
-            offsets_s: all.next()?,
-            or_s: all.collect(),
-            least_s,
-            error_s,
-        })
     }
 
     /// Phases on one time axis, rad, for those who walk; `None` for fewer than two.
@@ -551,7 +270,7 @@ impl Carriers {
                 continue;
             };
             match (*name, ends) {
-                ("synchrony", _) if self.apart => {
+                ("synchrony" | "plv" | "beat_lead_deg", _) if self.apart => {
                     value.reason =
                         Some("if the carriers' clocks agree, which nothing tells".into());
                 }
@@ -637,6 +356,63 @@ impl Carriers {
     }
 }
 
+/// Offsets of two clocks, and others that go with the load's motion as well (s).
+type Offsets = ([f64; 2], Vec<[f64; 2]>);
+
+/// o_j of two who walk; `None` where the clocks do as they are.
+///
+/// # Errors
+/// Why that cannot be told.
+fn offsets(worn: [&Worn; 2], motion: &Motion) -> Result<Option<Offsets>, &'static str> {
+    let short = "they share less than 10 s with the load's motion";
+    let seen = &motion.inputs;
+    let ends = |t: &[f64]| Some((*t.first()?, *t.last()?));
+    let (mut start, mut end) = ends(&seen.t_s).ok_or(short)?;
+    for worn in worn {
+        let (a, b) = ends(&worn.t_s).ok_or(short)?;
+        (start, end) = (start.max(a), end.min(b));
+    }
+    if !(end - start >= 10.0) {
+        return Err(short);
+    }
+    let n = ((end - start) * ALIGN_HZ) as usize;
+    let grid: Vec<f64> = (0..n).map(|k| start + k as f64 / ALIGN_HZ).collect();
+    let analytic = |t_s: &[f64], x: &[f64]| -> Result<Vec<Complex64>, &'static str> {
+        let band = period_s(t_s).and_then(|step_s| gait_band(x, 1.0 / step_s));
+        let band = band.ok_or("they are sampled too slowly")?;
+        Ok(hilbert(&interpolate(t_s, &band, &grid)))
+    };
+    let [one, other] = worn.map(|worn| analytic(&worn.t_s, &worn.heave));
+    let compared = Match {
+        felt: [
+            (analytic(&seen.t_s, &seen.support_ratio)?, 1.0),
+            (analytic(&seen.t_s, &seen.pitch_rad)?, -1.0),
+        ],
+        riders: [one?, other?],
+    };
+    let cadence_hz = worn[0].steps.as_ref().map_or(1.0, |s| s.cadence_hz);
+    let half_step = (0.5 * ALIGN_HZ / cadence_hz) as i64;
+    let reach = (REACH_S.0.min(REACH_S.1 * (end - start)) * ALIGN_HZ) as i64;
+    let (all, as_they_are) = compared.best(reach, half_step).ok_or(short)?;
+    let best = all[0].0;
+    if best < 2.0 * -(1.0 - MATCH).ln() {
+        return Err("their heaves, put together, are not the load's");
+    }
+    let step_s = 2.0 * half_step as f64 / ALIGN_HZ;
+    let mut all = all.into_iter().map(|(_, found)| {
+        // The load's lag is less than half a step and no clock's.
+        let mean = 0.5 * (found[0] + found[1]);
+        let lag = mean - (mean / step_s).round() * step_s;
+        found.map(|o| o - lag)
+    });
+    let first = all.next().ok_or(short)?;
+    let little = (first[0] - first[1]).abs() < LEAST_OFFSET_S;
+    if best - as_they_are < -BETTER.ln() || little {
+        return Ok(None);
+    }
+    Ok(Some((first, all.collect())))
+}
+
 /// Half the 95 % interval of a synchrony from gait phases, 1: by simulated twins (docs/field.md).
 const PHASE_ERROR: f64 = 0.0020;
 /// What a detector leaves in a pull of carriers who slip past the beat, half the 95 % interval, of the pull: by twins.
@@ -649,4 +425,53 @@ const MOVED_ERROR: f64 = 0.013;
 fn gait_band(x: &[f64], rate_hz: f64) -> Option<Vec<f64>> {
     let sections = butter(2, Band::Pass(1.0, 5.0), rate_hz).ok()?;
     sosfiltfilt(&sections, x).ok()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::metrics::metrics_of;
+    use std::f64::consts::TAU;
+
+    /// Nothing tells whether the clocks of three agree, nor those of two without a load: then the synchrony has no interval, and that is said.
+    #[test]
+    fn a_synchrony_whose_clocks_nothing_tells_has_no_interval() {
+        for (count, why) in [(2, "no sensor tells"), (3, "of more than two")] {
+            let mut carriers = Carriers::default();
+            for k in 0..count {
+                let t_s: Vec<f64> = (0..4000).map(|k| 0.01 * f64::from(k)).collect();
+                let up = |t: &f64| 9.81 + 2.0 * (TAU * 2.0 * t + 0.2 * f64::from(k)).cos();
+                let accel = t_s.iter().map(|t| [0.0, 0.0, up(t)]);
+                let track = Track {
+                    accel_m_per_s2: accel.collect(),
+                    gyro_rad_per_s: vec![[0.0; 3]; t_s.len()],
+                    t_s,
+                    dropped: 0,
+                };
+                carriers.add(&format!("/imu/{k}"), &track, Options::default());
+            }
+            let said = carriers.align(None);
+            assert!(
+                said.len() == 1 && said[0].kind == "clocks_apart" && said[0].text.contains(why),
+                "{said:?}"
+            );
+            let (phase_t_s, phase_rad) = carriers.phases().unwrap();
+            let inputs = crate::inputs::Inputs {
+                phase_t_s,
+                phase_rad,
+                ..Default::default()
+            };
+            let mut metrics = metrics_of(&inputs, Window::ALL, |name| name == "synchrony");
+            carriers.interval(&mut metrics, &Metrics::default(), &[]);
+            let synchrony = metrics.get("synchrony").unwrap();
+            assert!(synchrony.as_f64().unwrap() > 0.9 && synchrony.ci95.is_none());
+            assert!(
+                synchrony
+                    .reason
+                    .as_deref()
+                    .unwrap()
+                    .contains("clocks agree")
+            );
+        }
+    }
 }

@@ -3,6 +3,7 @@
 //! [`Field::read`] takes what plays the roles `imu`, `carriers`, `beats` and `truth`; [`Field::fill`] gives the metrics' columns that
 //! nothing else gave; [`Field::finish`] adds intervals, step rates, clocks and, where asked, errors against the truth.
 
+mod align;
 mod carriers;
 mod clocks;
 pub(crate) mod dates;
@@ -269,11 +270,9 @@ impl Field {
 
     /// Puts the carriers' clocks on each other, by the motion of the rath that they all drive.
     fn align(&mut self, roles: &Roles) {
-        if roles.patterns(Role::Carriers).len() < 2 {
-            return;
-        }
-        if let Some(motion) = &self.motion {
-            self.quality.extend(self.carriers.align(motion));
+        if roles.patterns(Role::Carriers).len() >= 2 {
+            self.quality
+                .extend(self.carriers.align(self.motion.as_ref()));
         }
     }
 
