@@ -964,12 +964,11 @@ fn damage_is_said_and_survived() {
 
 /// The paper's runs through files: ingested, analysed, and every statistic found again.
 #[test]
+#[ignore = "needs the paper's archive, which is not shipped: see the head of archive.rs"]
 fn archive_logs_survive_being_ingested() {
-    let archive = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../../shared/reference/archive");
-    if !archive.is_dir() {
-        println!("skipped: no archive at {}", archive.display());
-        return;
-    }
+    let archive = std::env::var_os("RATH_ARCHIVE")
+        .map(PathBuf::from)
+        .expect("RATH_ARCHIVE names the folder of the archive, by an absolute path");
     let folder = tempfile::tempdir().unwrap();
     let mcap = folder.path().join("run.mcap");
     let mcap = mcap.to_str().unwrap();
