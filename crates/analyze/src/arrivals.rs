@@ -1,6 +1,7 @@
 //! When the messages of a topic that feeds metrics were taken: by the log, by their own stamps, or evenly where they came in packets.
 
 use recording::read::Batch;
+use recording::signal::field_of;
 
 use crate::field::dates::{Dated, dated};
 use crate::inputs::{mean_step_in, stretches};
@@ -132,12 +133,8 @@ pub fn is_time(field: &str) -> bool {
 /// When messages without a header say they were taken (ns), where all of the batch do.
 fn own_ns(batch: &Batch<'_>) -> Option<Vec<i64>> {
     let column = |field: &str| {
-        let of = |path: &str| {
-            path.strip_prefix(batch.topic)
-                .and_then(|p| p.strip_prefix('.'))
-                == Some(field)
-        };
-        let found = batch.columns.iter().find(|c| of(c.path))?;
+        let mut columns = batch.columns.iter();
+        let found = columns.find(|c| field_of(c.path, batch.topic) == Some(field))?;
         (found.rows.is_none() && found.finite).then_some(found.values)
     };
     if batch.schema.starts_with("rath.") {
@@ -145,7 +142,11 @@ fn own_ns(batch: &Batch<'_>) -> Option<Vec<i64>> {
         return Some(time_s.iter().map(|t| (t * 1e9).round() as i64).collect());
     }
     let (sec, nanosec) = (column(STAMP[0])?, column(STAMP[1])?);
-    let ns = |(s, ns): (&f64, &f64)| (*s as i64).saturating_mul(1_000_000_000) + *ns as i64;
+    let ns = |(s, ns): (&f64, &f64)| {
+        (*s as i64)
+            .saturating_mul(1_000_000_000)
+            .saturating_add(*ns as i64)
+    };
     Some(sec.iter().zip(nanosec).map(ns).collect())
 }
 

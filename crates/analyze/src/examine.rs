@@ -817,8 +817,7 @@ impl<'a> Pass<'a> {
         signals
     }
 
-    /// Outlines of moving signals without a role, those of one vector together.
-    /// What is drawn of signals that play no role, and how many of them are not.
+    /// Outlines of moving signals without a role, those of one vector together, and how many find no place.
     fn traces(&self) -> (Vec<Trace>, u64) {
         // Topics that play a role are drawn as that; transforms, scenes and joints repeat them.
         let known = |channel: usize| {

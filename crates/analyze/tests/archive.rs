@@ -12,9 +12,7 @@ use analyze::{Inputs, Metrics, Window, metrics};
 
 /// The folders of the runs.
 fn runs() -> Vec<PathBuf> {
-    let archive = std::env::var_os("RATH_ARCHIVE")
-        .map(PathBuf::from)
-        .expect("RATH_ARCHIVE names the folder of the archive, by an absolute path");
+    let archive = archive_names::folder();
     let mut runs = Vec::new();
     for condition in ["baseline", "music"] {
         let entries = std::fs::read_dir(archive.join(condition)).unwrap();

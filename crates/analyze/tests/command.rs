@@ -966,9 +966,7 @@ fn damage_is_said_and_survived() {
 #[test]
 #[ignore = "needs the paper's archive, which is not shipped: see the head of archive.rs"]
 fn archive_logs_survive_being_ingested() {
-    let archive = std::env::var_os("RATH_ARCHIVE")
-        .map(PathBuf::from)
-        .expect("RATH_ARCHIVE names the folder of the archive, by an absolute path");
+    let archive = archive_names::folder();
     let folder = tempfile::tempdir().unwrap();
     let mcap = folder.path().join("run.mcap");
     let mcap = mcap.to_str().unwrap();

@@ -32,6 +32,11 @@ pub fn seconds_since(times_ns: &[i64], start_ns: i64) -> Vec<f64> {
         .collect()
 }
 
+/// The field that a signal's path names, where it is one of `topic`. A topic may have dots of its own, so it is never cut out of a path.
+pub fn field_of<'a>(path: &'a str, topic: &str) -> Option<&'a str> {
+    path.strip_prefix(topic)?.strip_prefix('.')
+}
+
 /// The unit that a field's path implies: from a suffix of our own names (`_m_per_s`), or from the ROS convention of the message type.
 /// Empty where neither says.
 pub fn unit_of(schema: &str, field: &str) -> &'static str {
@@ -108,6 +113,15 @@ mod tests {
             ("sensor_msgs/Imu", "orientation.w", ""),
         ] {
             assert_eq!(unit_of(schema, field), unit, "{schema} {field}");
+        }
+    }
+
+    #[test]
+    fn a_field_is_one_of_its_topic_alone() {
+        assert_eq!(field_of("/a.b.c", "/a"), Some("b.c"));
+        assert_eq!(field_of("/a.b.c", "/a.b"), Some("c"));
+        for other in ["/ab.c", "/b.c", "/a"] {
+            assert_eq!(field_of(other, "/a"), None);
         }
     }
 

@@ -18,6 +18,12 @@ fn at(z: &[Complex64], i: usize, shift: i64) -> Complex64 {
     z[(i as i64 + shift) as usize]
 }
 
+/// −ln(1 − J) for J = |⟨X, S⟩|² / (⟨X, X⟩⟨S, S⟩), at most a hair below 1.
+fn told_by(xs: Complex64, xx: f64, ss: f64) -> f64 {
+    let share = xs.norm_sqr() / (ss * xx).max(f64::MIN_POSITIVE);
+    -(1.0 - share.min(1.0 - 1e-12)).ln()
+}
+
 /// Σ_X −ln(1 − J_X) of two riders for all shifts on a coarse grid: maxima, best first, and the best with both shifted alike by a lag.
 struct Look {
     maxima: Vec<(f64, [i64; 2])>,
@@ -61,9 +67,7 @@ impl Look {
             for (k, told) in told.iter_mut().enumerate() {
                 let (a, b) = (k / count, k % count);
                 let sum = powers[0][a] + powers[1][b] + 2.0 * sign * cross[k];
-                let same = (with[0][a] + with[1][b] * *sign).norm_sqr();
-                let share = same / (sum * all).max(f64::MIN_POSITIVE);
-                *told -= (1.0 - share.min(1.0 - 1e-12)).ln();
+                *told += told_by(with[0][a] + with[1][b] * *sign, all, sum);
             }
         }
         let top = |a: usize, b: usize| {
@@ -138,11 +142,11 @@ impl Match {
 
     fn told(&self, shift: [i64; 2], inner: &Range<usize>) -> f64 {
         let each = self.felt.iter();
-        each.map(|(x, sign)| -(1.0 - self.alike(x, *sign, shift, inner)).ln())
+        each.map(|(x, sign)| self.alike(x, *sign, shift, inner))
             .sum()
     }
 
-    /// J: how much of `x` is one complex number times the shifted sum or difference of the riders; at most a hair below 1.
+    /// How much of `x` is one complex number times the shifted sum or difference of the riders.
     fn alike(&self, x: &[Complex64], sign: f64, shift: [i64; 2], inner: &Range<usize>) -> f64 {
         let (mut xs, mut ss, mut xx) = (Complex64::default(), 0.0, 0.0);
         for i in inner.clone() {
@@ -151,7 +155,7 @@ impl Match {
             ss += sum.norm_sqr();
             xx += x[i].norm_sqr();
         }
-        (xs.norm_sqr() / (ss * xx).max(f64::MIN_POSITIVE)).min(1.0 - 1e-12)
+        told_by(xs, xx, ss)
     }
 
     /// The best shift of rider `j` within a range, between samples too (s), and what it tells; `shift` is left there.

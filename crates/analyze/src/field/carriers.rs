@@ -9,7 +9,7 @@ use crate::imu::rath::{ENDS, Motion};
 use crate::imu::track::{BRIDGED_S, period_s};
 use crate::imu::vertical::height;
 use crate::inputs::{Window, interpolate, mean_step_s, stretches};
-use crate::metrics::{Datum, Metrics, Value};
+use crate::metrics::{Datum, Metrics};
 use crate::phase::hilbert;
 use crate::quality::Quality;
 use crate::spectrum::Complex64;
@@ -116,14 +116,6 @@ impl Carriers {
     /// the load: their clocks are left alone, and the synchrony is without an interval.
     pub fn align(&mut self, motion: Option<&Motion>) -> Vec<Quality> {
         let walking: Vec<&Worn> = self.worn.iter().filter(|w| w.steps.is_ok()).collect();
-        let topics: Vec<&str> = walking.iter().map(|w| &w.topic[..]).collect();
-        let apart = |why: &str| {
-            let text = format!(
-                "the clocks of {} could not be held against each other: {why}; a synchrony of theirs has no interval, tap the sensors together or say --one-clock",
-                topics.join(", ")
-            );
-            vec![Quality::remark("", "clocks_apart", text)]
-        };
         let found = match (&walking[..], motion) {
             ([] | [_], _) => return Vec::new(),
             ([one, other], Some(motion)) => offsets([one, other], motion),
@@ -134,9 +126,13 @@ impl Carriers {
             Ok(Some(found)) => found,
             Ok(None) => return Vec::new(),
             Err(why) => {
-                let said = apart(why);
+                let topics: Vec<&str> = walking.iter().map(|w| &w.topic[..]).collect();
+                let text = format!(
+                    "the clocks of {} could not be held against each other: {why}; a synchrony of theirs has no interval, tap the sensors together or say --one-clock",
+                    topics.join(", ")
+                );
                 self.apart = true;
-                return said;
+                return vec![Quality::remark("", "clocks_apart", text)];
             }
         };
         let mut out = Vec::new();
@@ -275,22 +271,12 @@ impl Carriers {
                         Some("if the carriers' clocks agree, which nothing tells".into());
                 }
                 ("synchrony" | "plv", Some([low, high, apart])) if apart > VAGUE => {
-                    *value = Value {
-                        unit: value.unit,
-                        ..Value::missing(format!(
-                            "several offsets of the carriers' clocks go with the load's motion, and with them a synchrony from {low:.2} to {high:.2}: tap the sensors together"
-                        ))
-                        .source(value.source.clone())
-                    };
+                    value.withhold(format!(
+                        "several offsets of the carriers' clocks go with the load's motion, and with them a synchrony from {low:.2} to {high:.2}: tap the sensors together"
+                    ));
                 }
                 ("beat_lead_deg", _) if moved => {
-                    *value = Value {
-                        unit: value.unit,
-                        ..Value::missing(
-                            "the carriers' clocks were put on each other by motion, which does not tell their own lag from the load's: tap the sensors together",
-                        )
-                        .source(value.source.clone())
-                    };
+                    value.withhold("the carriers' clocks were put on each other by motion, which does not tell their own lag from the load's: tap the sensors together");
                 }
                 ("synchrony", Some([low, high, _])) => value.ci95 = Some([low, high]),
                 ("pull_rad_per_s", _) => {

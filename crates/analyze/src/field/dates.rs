@@ -129,13 +129,17 @@ fn on_the_logs_clock(log_s: &[f64], stamp_s: &[f64]) -> Vec<f64> {
 ///
 /// Of P packets alike with one time each, that line of n samples is too flat, by (1 − 1/P²)/(1 − 1/n²): the variance of stairs over that of a ramp.
 fn unpacked(log_s: &[f64]) -> Option<(Vec<f64>, f64, f64)> {
-    let packets = packets(log_s);
+    let usual = median(&mut log_s.windows(2).map(|w| w[1] - w[0]).collect::<Vec<_>>())?;
+    // Holes only make the mean over all of it longer.
+    if !(usual < PACKETS * mean_s(log_s)?) {
+        return None;
+    }
+    let packets = packets(log_s)?;
     let (parts, filled_s) = match long(log_s, &packets) {
         Some((parts, filled_s)) => (parts, Some(filled_s)),
         None => (stretches(log_s, 0.0), None),
     };
     let mean = filled_s.or_else(|| mean_step_in(log_s, &parts))?;
-    let usual = median(&mut log_s.windows(2).map(|w| w[1] - w[0]).collect::<Vec<_>>())?;
     if !(usual < PACKETS * mean) {
         return None;
     }
@@ -161,17 +165,22 @@ fn unpacked(log_s: &[f64]) -> Option<(Vec<f64>, f64, f64)> {
     Some((t_s, usual, mean))
 }
 
+/// Mean step, holes and all.
+fn mean_s(log_s: &[f64]) -> Option<f64> {
+    let span_s = log_s.last()? - log_s.first()?;
+    Some(span_s / (log_s.len() as f64 - 1.0))
+}
+
 /// Samples that follow each other much faster than the mean, as ranges.
-fn packets(log_s: &[f64]) -> Vec<Range<usize>> {
-    let Some(span_s) = log_s.last().zip(log_s.first()).map(|(b, a)| b - a) else {
-        return Vec::new();
-    };
-    let within_s = 0.1 * span_s / log_s.len() as f64;
+fn packets(log_s: &[f64]) -> Option<Vec<Range<usize>>> {
+    let within_s = 0.1 * mean_s(log_s)?;
     let ends = (1..log_s.len()).filter(|k| log_s[*k] - log_s[k - 1] > within_s);
     let mut start = 0;
-    ends.chain([log_s.len()])
-        .map(|end| std::mem::replace(&mut start, end)..end)
-        .collect()
+    let each = ends.chain([log_s.len()]);
+    Some(
+        each.map(|end| std::mem::replace(&mut start, end)..end)
+            .collect(),
+    )
 }
 
 /// Where packets are so long that the pauses between them look like holes: the parts between true holes, and the usual step within (s). A packet

@@ -146,7 +146,9 @@ impl Judge {
         let mut out: Vec<(&'static str, Value)> = Vec::new();
         let mut of_pose = Metrics::default();
         let mut slow_m = None;
-        if let (Some(motion), Some(sensor)) = (motion, &self.sensor) {
+        if let (Some(motion), Some(sensor)) = (motion, &self.sensor)
+            && !self.truth.t_s.is_empty()
+        {
             self.orientation(motion, sensor, window, &mut out);
             let heave = self.heave(motion);
             if let Some(heave) = &heave {
@@ -232,6 +234,7 @@ impl Judge {
         let mut heave = Heave {
             t_s,
             z_m,
+            sensor_m: motion.height_m(vertical::CORNER_HZ),
             clock: None,
         };
         if !self.of_body {
@@ -244,8 +247,7 @@ impl Judge {
             heave.z_m.iter_mut().zip(above).for_each(|(z, a)| *z -= a);
         }
         // How old the accelerometer's stamps are beside the truth's (the gyroscope's may be older): both heaved alike.
-        let own = motion.height_m(vertical::CORNER_HZ);
-        let own = (&motion.inputs.t_s[..], &own[..]);
+        let own = (&motion.inputs.t_s[..], &heave.sensor_m[..]);
         heave.clock = from_signals(own, (&heave.t_s, &heave.z_m), 0.1).ok();
         Some(heave)
     }
@@ -289,9 +291,6 @@ impl Judge {
         window: Window,
         out: &mut Vec<(&'static str, Value)>,
     ) {
-        if self.truth.t_s.is_empty() {
-            return;
-        }
         let spans = self.spans_s(window);
         let options = motion.settings.orientation;
         let body_from_true = self.body_from_true(motion);
@@ -343,9 +342,8 @@ impl Judge {
             .spans_s(window)
             .iter()
             .fold((f64::MAX, f64::MIN), |(a, b), s| (a.min(s.0), b.max(s.1)));
-        let height_m = motion.height_m(vertical::CORNER_HZ);
         let error = relative_error(
-            (&motion.inputs.t_s, &height_m),
+            (&motion.inputs.t_s, &heave.sensor_m),
             (&heave.t_s, &heave.z_m),
             vertical::VALID_BAND_HZ,
             heave.offset_s(),
@@ -390,7 +388,10 @@ fn unloading_agreement(
         .iter()
         .map(|a| 1.0 + a / g)
         .collect();
-    let support = [slower(t_s, &measured)?, heave.support_ratio(motion)?];
+    let support = [
+        slower(t_s, &measured, SUPPORT_HZ)?,
+        heave.support_ratio(motion)?,
+    ];
     let [found, truth] = support.map(|ratio| {
         let mut found = unloadings(t_s, &ratio);
         found.retain(|t| (from_s..=to_s).contains(t));
@@ -416,10 +417,12 @@ fn unloading_agreement(
     })
 }
 
-/// A true height over time.
+/// A true height over time, and what the sensor makes of it.
 struct Heave {
     t_s: Vec<f64>,
     z_m: Vec<f64>,
+    /// At the sensor's times.
+    sensor_m: Vec<f64>,
     /// From the sensor's clock to this one; `None` where they could not be compared.
     clock: Option<Clock>,
 }
@@ -433,8 +436,7 @@ impl Heave {
     fn slow_m(&self, motion: &Motion, window: Window) -> Option<f64> {
         let t_s = &motion.inputs.t_s;
         let z_m = interpolate(&self.t_s, &self.z_m, t_s);
-        let corner = Band::Low(motion.settings.height_corner_hz);
-        let slow = sosfiltfilt(&butter(2, corner, 1.0 / period_s(t_s)?).ok()?, &z_m).ok()?;
+        let slow = slower(t_s, &z_m, motion.settings.height_corner_hz)?;
         let sd = |x: &[f64]| {
             let mean = x.iter().sum::<f64>() / x.len() as f64;
             (x.iter().map(|x| (x - mean).powi(2)).sum::<f64>() / x.len() as f64).sqrt()
@@ -458,13 +460,13 @@ impl Heave {
         let mut all: Vec<f64> = z_m.windows(3).map(ratio).collect();
         all.insert(0, all[0]);
         all.push(all[all.len() - 1]);
-        slower(t_s, &all)
+        slower(t_s, &all, SUPPORT_HZ)
     }
 }
 
-/// What of `x` is slower than [`SUPPORT_HZ`].
-fn slower(t_s: &[f64], x: &[f64]) -> Option<Vec<f64>> {
-    let sections = butter(2, Band::Low(SUPPORT_HZ), 1.0 / period_s(t_s)?).ok()?;
+/// What of `x` is slower than a corner.
+fn slower(t_s: &[f64], x: &[f64], corner_hz: f64) -> Option<Vec<f64>> {
+    let sections = butter(2, Band::Low(corner_hz), 1.0 / period_s(t_s)?).ok()?;
     sosfiltfilt(&sections, x).ok()
 }
 

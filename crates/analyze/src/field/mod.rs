@@ -16,7 +16,7 @@ use std::collections::BTreeMap;
 use std::f64::consts::FRAC_PI_2;
 
 use recording::read::{ReadError, Recording};
-use recording::signal::{Signal, seconds_since};
+use recording::signal::{Signal, field_of, seconds_since};
 use recording::text::counted;
 
 use crate::beat::lock::Course;
@@ -124,9 +124,9 @@ impl Field {
         };
         let thinned = |topic: &str| factors.get(topic).is_some_and(|factor| *factor > 1);
         let wanted = |path: &str| {
-            let of = |t: &&str| path.strip_prefix(*t).and_then(|p| p.strip_prefix('.'));
             let mut whole = topics.iter().filter(|t| !thinned(t));
-            whole.find_map(of).is_some_and(|field| {
+            let field = whole.find_map(|topic| field_of(path, topic));
+            field.is_some_and(|field| {
                 GYRO.contains(&field)
                     || ACCEL.contains(&field)
                     || field == GYRO_MARK
@@ -384,16 +384,14 @@ impl Field {
             out = interval::metrics(motion, window);
         }
         if (self.filled.phases || self.judge.is_some())
-            && let Some((t_s, phases)) = self.carriers.phases()
+            && let Some(phases) = self.carriers.phases()
         {
-            let mut inputs = Inputs::default();
-            self.fill_phases(&mut inputs, t_s, phases);
-            let mut together = metrics_of(&inputs, window, carriers::gives);
             let as_of = |(t_s, phases), wanted: fn(&str) -> bool| {
                 let mut inputs = Inputs::default();
                 self.fill_phases(&mut inputs, t_s, phases);
                 metrics_of(&inputs, window, wanted)
             };
+            let mut together = as_of(phases, carriers::gives);
             let detected = self.carriers.detected();
             let detected =
                 detected.map(|p| as_of(p, |n| n == "synchrony" || n == "pull_rad_per_s"));
@@ -490,7 +488,7 @@ impl Columns {
     fn get(&self, topic: &str, field: &str) -> Option<&Signal> {
         self.signals
             .iter()
-            .find(|s| s.path.strip_prefix(topic).and_then(|p| p.strip_prefix('.')) == Some(field))
+            .find(|s| field_of(&s.path, topic) == Some(field))
     }
 
     fn values<const N: usize>(&self, topic: &str, fields: [&str; N]) -> Option<[&[f64]; N]> {
@@ -562,12 +560,8 @@ impl Columns {
     }
 
     fn any(&self, topic: &str) -> Option<&Signal> {
-        let of = |s: &&Signal| {
-            s.path
-                .strip_prefix(topic)
-                .is_some_and(|p| p.starts_with('.'))
-        };
-        self.signals.iter().find(of)
+        let mut all = self.signals.iter();
+        all.find(|s| field_of(&s.path, topic).is_some())
     }
 
     /// Times of a topic's messages, s.

@@ -4,6 +4,7 @@ use std::collections::BTreeMap;
 
 use recording::Signal;
 use recording::read::{Batch, ReadError, Recording};
+use recording::signal::field_of;
 
 use super::{ACCEL, GYRO, GYRO_MARK, STAMP};
 use crate::roles::{Role, Roles};
@@ -68,10 +69,9 @@ pub fn read(
         return Ok(Vec::new());
     }
     let wanted = |path: &str| {
-        let of = |topic: &&str| path.strip_prefix(*topic).and_then(|p| p.strip_prefix('.'));
         topics
             .iter()
-            .find_map(of)
+            .find_map(|topic| field_of(path, topic))
             .is_some_and(|f| COLUMNS.contains(&f) || f == GYRO_MARK)
     };
     let mut sensors: BTreeMap<&str, Sensor> = topics

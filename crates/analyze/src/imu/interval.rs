@@ -7,7 +7,7 @@ use super::rath::{Motion, Mounting};
 use super::unloading::unloadings;
 use crate::inputs::{Inputs, Window, between};
 use crate::median::median;
-use crate::metrics::{Datum, Metrics, Value, metrics_of, rival_hz};
+use crate::metrics::{Datum, Metrics, metrics_of, rival_hz};
 use crate::random::Random;
 use std::ops::Range;
 
@@ -70,10 +70,8 @@ pub fn metrics(motion: &Motion, window: Window) -> Metrics {
     let rate_hz = super::track::period_s(&motion.inputs.t_s).map_or(f64::INFINITY, |s| 1.0 / s);
     for (name, value) in &mut out.0 {
         if let Some((_, why)) = BEYOND.iter().find(|(n, _)| n == name) {
-            *value = Value {
-                unit: value.unit,
-                ..Value::missing(*why).source("imu")
-            };
+            value.withhold(*why);
+            value.source = "imu".into();
             continue;
         }
         let Datum::Number(x) = value.datum else {
@@ -134,13 +132,10 @@ pub fn metrics(motion: &Motion, window: Window) -> Metrics {
     ];
     for (_, what, names) in unseen.into_iter().filter(|(small, ..)| *small) {
         for (_, value) in out.0.iter_mut().filter(|(name, _)| names.contains(name)) {
-            *value = Value {
-                unit: value.unit,
-                ..Value::missing(format!(
-                    "so small a {what} has no line that the sensor could tell from its own wandering"
-                ))
-                .source("imu")
-            };
+            value.withhold(format!(
+                "so small a {what} has no line that the sensor could tell from its own wandering"
+            ));
+            value.source = "imu".into();
         }
     }
     out

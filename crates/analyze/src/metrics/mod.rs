@@ -109,6 +109,15 @@ impl Value {
         self
     }
 
+    /// Takes the result back and says why; unit and source stay.
+    pub fn withhold(&mut self, reason: impl Into<String>) {
+        let kept = std::mem::take(&mut self.source);
+        *self = Value {
+            unit: self.unit,
+            ..Value::missing(reason).source(kept)
+        };
+    }
+
     /// With a 95 % interval.
     pub fn ci95(mut self, low: f64, high: f64) -> Self {
         self.ci95 = (low.is_finite() && high.is_finite()).then_some([low, high]);

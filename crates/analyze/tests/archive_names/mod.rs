@@ -1,4 +1,13 @@
-//! What the archive's `stats.json` calls the metrics.
+//! Where the archive is, and what its `stats.json` calls the metrics.
+
+use std::path::PathBuf;
+
+/// The archive's folder.
+pub fn folder() -> PathBuf {
+    std::env::var_os("RATH_ARCHIVE")
+        .map(PathBuf::from)
+        .expect("RATH_ARCHIVE names the folder of the archive, by an absolute path")
+}
 
 /// Our name and the archive's.
 pub const NUMBERS: [(&str, &str); 11] = [

@@ -7,6 +7,7 @@ use crate::scene::{Scene, check};
 use crate::spline::Spline;
 use recording::Signal;
 use recording::read::{ReadError, Recording};
+use recording::signal::field_of;
 use recording::topics::{BEAT, FORCES, PHASES, STATE, TF};
 use std::collections::BTreeMap;
 use std::f64::consts::{PI, TAU};
@@ -111,13 +112,12 @@ impl Take {
             .into_iter()
             .flatten()
             .collect();
-        let of =
-            |path: &str, topic: &str| path.strip_prefix(topic).is_some_and(|p| p.starts_with('.'));
-        let (signals, findings) = recording.signals(&|path| topics.iter().any(|t| of(path, t)))?;
+        let of_one = |path: &str| topics.iter().any(|topic| field_of(path, topic).is_some());
+        let (signals, findings) = recording.signals(&of_one)?;
         let get = |topic: &str, field: &str| {
-            signals.iter().find(|s| {
-                s.path.strip_prefix(topic).and_then(|p| p.strip_prefix('.')) == Some(field)
-            })
+            signals
+                .iter()
+                .find(|s| field_of(&s.path, topic) == Some(field))
         };
         let course = |s: &Signal| {
             let (t_s, x) = s

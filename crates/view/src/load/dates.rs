@@ -5,7 +5,7 @@ use std::collections::BTreeMap;
 use analyze::arrivals::{Arrivals, is_time};
 use recording::Finding;
 use recording::read::{Batch, ReadError, Recording};
-use recording::signal::Signal;
+use recording::signal::{Signal, field_of};
 
 use super::{Plan, at_ns, remark};
 
@@ -76,10 +76,7 @@ pub fn collect(
     let start_ns = recording.info().start_ns;
     let mut topics: BTreeMap<String, Gathered> = BTreeMap::new();
     let wanted = |path: &str| {
-        let own = |topic: &&str| {
-            let field = path.strip_prefix(*topic).and_then(|p| p.strip_prefix('.'));
-            field.is_some_and(is_time)
-        };
+        let own = |topic: &&str| field_of(path, topic).is_some_and(is_time);
         plan.is_whole(path) || plan.is_streamed(path) || plan.ours.iter().any(own)
     };
     let findings = recording.stream(&wanted, &mut |batch| {

@@ -12,7 +12,7 @@ use std::collections::BTreeMap;
 
 use analyze::examine::{Request, examine};
 use recording::read::{Info, ReadError, Recording};
-use recording::signal::Signal;
+use recording::signal::{Signal, field_of};
 use recording::{Finding, topics};
 
 use crate::take::Take;
@@ -191,11 +191,9 @@ impl<'a> Plan<'a> {
     }
 }
 
-/// Whether a path is `TOPIC.FIELD…`. A topic may have dots of its own, so it is never cut out of a path.
+/// Whether a path is `TOPIC.FIELD…`.
 fn within(path: &str, topic: &str, field: &str) -> bool {
-    path.strip_prefix(topic)
-        .and_then(|rest| rest.strip_prefix('.'))
-        .is_some_and(|rest| rest.starts_with(field))
+    field_of(path, topic).is_some_and(|rest| rest.starts_with(field))
 }
 
 /// Stamps, covariances and status fields are no curves that anybody wants to see.

@@ -4,6 +4,7 @@ use analyze::imu::orientation;
 use analyze::spectrum::{DEFAULT_SEGMENT_S, Spectrum};
 use analyze::summary::{self, Times};
 use recording::read::Batch;
+use recording::signal::field_of;
 
 use super::stream::push;
 use crate::take::{Curve, Sensor};
@@ -50,11 +51,7 @@ impl Stream {
         let mut columns: [Option<&[f64]>; 6] = [None; 6];
         for column in batch.columns {
             let of = |field: &str, base: usize| {
-                let axis = column
-                    .path
-                    .strip_prefix(batch.topic)?
-                    .strip_prefix('.')?
-                    .strip_prefix(field)?;
+                let axis = field_of(column.path, batch.topic)?.strip_prefix(field)?;
                 Some(base + ["x", "y", "z"].iter().position(|a| *a == axis)?)
             };
             let Some(k) = of("angular_velocity.", 0).or_else(|| of("linear_acceleration.", 3))
