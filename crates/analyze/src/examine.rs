@@ -237,7 +237,7 @@ pub fn examine(
     quality.extend(pass.coverage(window));
     quality.extend(field.quality());
     let mut metrics = metrics::metrics(&inputs, window);
-    field.finish(&mut metrics, window);
+    field.finish(&inputs, &mut metrics, window);
     let f_hz = metrics
         .number("beat_hz")
         .or_else(|| metrics.number("peak_hz"));

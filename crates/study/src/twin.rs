@@ -480,6 +480,19 @@ mod tests {
     }
 
     #[test]
+    fn one_carrier_with_a_sensor_tells_the_pull_but_nothing_of_all() {
+        const ONE: &[&str] =
+            &[r#"effects.imu.sensors=[{on="rath", place_m=[0.5, 0.0, 0.3]}, {on="carrier_2"}]"#];
+        for seed in [1001, 1002] {
+            let found = seen(ONE, seed, "pull_rad_per_s");
+            assert_eq!(found.covered(), Some(true), "{found:?}");
+            for name in ["synchrony", "beat_lead_deg"] {
+                assert_eq!(seen(ONE, seed, name).error, None, "{name}");
+            }
+        }
+    }
+
+    #[test]
     fn carriers_who_slip_past_the_beat_are_seen_as_they_are() {
         for settings in [
             &["effects.music.beat_hz=2.8"] as &[&str],

@@ -71,6 +71,11 @@ pub fn gives(name: &str) -> bool {
     .contains(&name)
 }
 
+/// Whether a metric is one of all carriers together: some of them do not tell it.
+pub fn of_all(name: &str) -> bool {
+    gives(name) && name != "beat_hz" && name != "pull_rad_per_s"
+}
+
 impl Carriers {
     /// Takes one sensor.
     pub fn add(&mut self, topic: &str, track: &Track, options: Options) {
@@ -153,7 +158,7 @@ impl Carriers {
         out
     }
 
-    /// Phases on one time axis, rad, for those who walk; `None` for fewer than two.
+    /// Phases on one time axis, rad, for those who walk; `None` where nobody does.
     pub fn phases(&self) -> Option<Phases> {
         self.phases_as(|steps| steps.phase_rad.clone(), |worn| worn.ahead_s)
     }
@@ -186,9 +191,7 @@ impl Carriers {
             .iter()
             .filter_map(|w| Some((w, w.steps.as_ref().ok()?)))
             .collect();
-        if walking.len() < 2 {
-            return None;
-        }
+        let first = walking.first()?;
         let times: Vec<Vec<f64>> = walking
             .iter()
             .map(|(worn, s)| s.t_s.iter().map(|t| t - ahead_s(worn)).collect())
@@ -198,7 +201,7 @@ impl Carriers {
             .iter()
             .map(|t| t[t.len() - 1])
             .fold(f64::MAX, f64::min);
-        let step = period_s(&walking[0].1.t_s)?;
+        let step = period_s(&first.1.t_s)?;
         if end - start < 1.0 {
             return None;
         }

@@ -17,7 +17,7 @@ use crate::metrics::{Datum, Metrics, Value, metrics_of};
 use crate::roles::{Role, Roles};
 use crate::steps::agreement;
 
-use super::carriers::Carriers;
+use super::carriers::{self, Carriers};
 use crate::inputs::{Inputs, Window, interpolate};
 
 /// Where a recording holds the moments of true steps.
@@ -134,13 +134,14 @@ impl Judge {
     /// Adds errors to the metrics.
     ///
     /// `NAME_error` is estimate minus truth; of words and yes-or-no, 0 for the same and 1 for different. Its interval is the
-    /// estimate's, moved along: it covers 0 when the estimate's covers the truth.
+    /// estimate's, moved along: it covers 0 when the estimate's covers the truth. `recorded` carriers have true phases.
     pub fn errors(
         &self,
         motion: Option<&Motion>,
         carriers: &Carriers,
         estimated: &Metrics,
         metrics: &mut Metrics,
+        recorded: usize,
         window: Window,
     ) {
         let mut out: Vec<(&'static str, Value)> = Vec::new();
@@ -167,6 +168,12 @@ impl Judge {
                 continue;
             };
             let mut error_of = difference(estimate, truth);
+            let walking = carriers.step_s().len();
+            if walking != recorded && carriers::of_all(name) {
+                error_of.withhold(format!(
+                    "{walking} of {recorded} carriers walk with a sensor; the truth is that of all"
+                ));
+            }
             if let (Some(sd_m), None, true) = (slow_m, beside, interval::is_of_height(name)) {
                 let said = error_of.reason.take().map(|r| format!("{r}; "));
                 error_of.reason = Some(format!(
@@ -625,7 +632,14 @@ mod tests {
         // As in a field log: what the recording has comes from the sensor.
         let mut metrics = estimated.clone();
         let carriers = Carriers::default();
-        judge.errors(Some(&motion), &carriers, &estimated, &mut metrics, window);
+        judge.errors(
+            Some(&motion),
+            &carriers,
+            &estimated,
+            &mut metrics,
+            0,
+            window,
+        );
         let floating = (PI - 2.0 * (0.95f64 / 1.4).asin()) / TAU;
         for (name, error, truth, within) in [
             (

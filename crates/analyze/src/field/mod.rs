@@ -330,8 +330,8 @@ impl Field {
         inputs.phase_t_s = t_s;
     }
 
-    /// Adds to the metrics what only the sensors know: intervals, reasons, and errors against the truth.
-    pub fn finish(&self, metrics: &mut Metrics, window: Window) {
+    /// Adds to the metrics of `inputs` what only the sensors know: intervals, reasons, and errors against the truth.
+    pub fn finish(&self, inputs: &Inputs, metrics: &mut Metrics, window: Window) {
         let asked = self.filled.motion
             || self.filled.phases
             || self.judge.is_some()
@@ -372,6 +372,7 @@ impl Field {
                 &self.carriers,
                 &estimated,
                 metrics,
+                inputs.phase_rad.len(),
                 window,
             );
         }

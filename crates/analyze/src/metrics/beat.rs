@@ -226,6 +226,18 @@ mod tests {
         assert_eq!(slips.get("captured").unwrap().as_bool(), Some(false));
     }
 
+    #[test]
+    fn one_carrier_stands_to_the_beat_but_not_in_step() {
+        let mut alone = walk(1.0, 0.0);
+        alone.phase_rad.truncate(1);
+        let m = metrics(&alone, Window::ALL);
+        assert!((m.number("beat_lead_deg").unwrap() - 30.0).abs() < 1e-6);
+        for name in ["synchrony", "synchrony_chance", "plv"] {
+            let value = m.get(name).unwrap();
+            assert!(value.as_f64().is_none() && value.reason.is_some(), "{name}");
+        }
+    }
+
     /// Two carriers of their own frequencies, pulled from 10 s on without noise: Adler's equation by small steps.
     fn pulled(pull: f64, detuning: [f64; 2]) -> Inputs {
         let (dt, omega) = (1.0 / 300.0, TAU * 2.0);

@@ -262,7 +262,7 @@ pub const METRICS: &[Metric] = &[
         needs: &[Need::Phases],
         compute: together::synchrony,
         origin: "Acebrón et al. 2005",
-        definition: "Mean over W of Kuramoto's order parameter r(t) = |(1/N) Σ exp(iφ_j)|.",
+        definition: "Mean over W of Kuramoto's order parameter r(t) = |(1/N) Σ exp(iφ_j)| of N ≥ 2 carriers.",
     },
     Metric {
         name: "synchrony_chance",

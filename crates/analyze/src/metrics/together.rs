@@ -12,13 +12,21 @@ use std::f64::consts::TAU;
 /// How many surrogates the chance level of measured phases is made from.
 const SURROGATES: usize = 400;
 
+const ALONE: &str = "one carrier alone is always in step";
+
 pub fn synchrony(c: &Context) -> Value {
-    Value::number(mean(&phase::order_parameter(&c.phases().slices())))
+    match &c.phases().slices()[..] {
+        [_] => Value::missing(ALONE),
+        phases => Value::number(mean(&phase::order_parameter(phases))),
+    }
 }
 
 pub fn synchrony_chance(c: &Context) -> Value {
     let phases = c.phases();
-    if c.inputs.phases_are_measured && phases.columns.len() > 1 && phases.len() >= 20 {
+    if phases.columns.len() == 1 {
+        return Value::missing(ALONE);
+    }
+    if c.inputs.phases_are_measured && phases.len() >= 20 {
         // Seeded by a constant: the same recording gives the same chance level every time.
         let means = phase::surrogate_synchrony(&phases.slices(), SURROGATES, 1);
         let at = |share: f64| means[((means.len() - 1) as f64 * share).round() as usize];
