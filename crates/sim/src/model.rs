@@ -632,6 +632,11 @@ impl Model {
         w.pair = pairs;
     }
 
+    /// Whether the right-hand side leaves the handles in the workspace where its state has them, as [`Self::forces`] always does.
+    pub fn places_handles(&self) -> bool {
+        self.carried
+    }
+
     /// The right-hand side where [`Self::forces`] has just been called.
     pub fn rates(&self, y: &[f64], dy: &mut [f64], w: &mut Workspace) {
         self.motion(y, dy, w);

@@ -11,9 +11,9 @@ mod table;
 pub use table::CASES;
 
 use crate::model::Model;
-use crate::run::{Sample, run_model, settings};
+use crate::run::{Listener, Sample, run_model, settings};
 use crate::scene::{Scene, parse};
-use crate::solve::{METHODS, Method, Settings, Stats};
+use crate::solve::{Event, METHODS, Method, Settings, Stats};
 use check::Checks;
 use std::sync::Mutex;
 use std::sync::atomic::{AtomicUsize, Ordering};
@@ -36,9 +36,27 @@ struct Run {
     method: &'static Method,
     scene: Scene,
     samples: Vec<Sample>,
+    events: Vec<Event>,
     stats: Stats,
     /// Why it stopped early.
     stopped: Option<String>,
+}
+
+/// What a run tells as it goes.
+#[derive(Default)]
+struct Heard {
+    samples: Vec<Sample>,
+    events: Vec<Event>,
+}
+
+impl Listener for Heard {
+    fn sample(&mut self, sample: &Sample) -> bool {
+        self.samples.push(sample.clone());
+        true
+    }
+    fn event(&mut self, event: &Event) {
+        self.events.push(event.clone());
+    }
 }
 
 /// How a method did in a case.
@@ -62,15 +80,13 @@ impl Run {
             most_evaluations: MOST_EVALUATIONS,
             ..settings(&scene)
         };
-        let mut samples = Vec::new();
+        let mut heard = Heard::default();
         let model = Model::new(&scene);
-        let (stats, outcome) = run_model(&model, method, &settings, &mut |s: &Sample| {
-            samples.push(s.clone());
-            true
-        });
+        let (stats, outcome) = run_model(&model, method, &settings, &mut heard);
         Ok(Self {
             method,
-            samples,
+            samples: heard.samples,
+            events: heard.events,
             stats,
             stopped: outcome.err().map(|e| e.to_string()),
             scene,

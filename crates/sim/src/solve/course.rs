@@ -224,6 +224,8 @@ impl<'m> Course<'m> {
             observer.tick(who - 1, tick, t_s, y, &mut self.w);
             return Ok(false);
         }
+        // Where nothing acts on the handles, an evaluation of the step has not placed them.
+        let evaluated = evaluated && self.model.places_handles();
         let forces = evaluated || observer.looks_at_forces();
         if forces && !evaluated {
             self.model.forces(t_s, y, &mut self.w);
