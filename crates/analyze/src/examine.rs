@@ -20,6 +20,18 @@ use crate::quaternion::Quaternions;
 use crate::roles::{AngleUnit, Role, Roles, RolesFile, matches, of_topic};
 use crate::summary::{Stream, Summary, Times, segment};
 
+/// What is done about the clocks of sensors that differ.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum DeviceClocks {
+    /// They are put right, and it is said how.
+    #[default]
+    PutRight,
+    /// They are left as they are, and it is said how they differ.
+    Told,
+    /// Nothing: all sensors were stamped by one clock, and what looks like an offset between carriers is theirs.
+    One,
+}
+
 /// What is asked of a recording.
 #[derive(Clone, Debug, Default)]
 pub struct Request {
@@ -33,8 +45,8 @@ pub struct Request {
     pub roles: Option<RolesFile>,
     /// Judge estimates by the recorded truth.
     pub truth: bool,
-    /// All sensors were stamped by one clock: what looks like an offset between carriers is theirs.
-    pub one_clock: bool,
+    /// What is done about the clocks of sensors.
+    pub clocks: DeviceClocks,
     /// Keep the outlines of signals for drawing.
     pub traces: bool,
 }
@@ -224,7 +236,7 @@ pub fn examine(
             &roles,
             inputs.gravity_m_per_s2,
             request.truth,
-            request.one_clock,
+            request.clocks,
             window,
         )?,
         Err(why) => {

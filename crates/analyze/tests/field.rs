@@ -3,7 +3,7 @@
 //!
 //!     IMU_RECORDINGS=FOLDER cargo test --release -p analyze --test field -- --ignored
 
-use analyze::examine::{Analysis, Request, examine};
+use analyze::examine::{Analysis, DeviceClocks, Request, examine};
 use analyze::quality::Quality;
 use recording::import::{ImportOptions, ingest};
 use recording::read::{ReadOptions, Recording};
@@ -112,16 +112,16 @@ fn raw_phone_files_become_the_papers_metrics() {
     writer.finish().unwrap();
     let recording = Recording::open(&path, &ReadOptions::default()).unwrap();
     let roles = std::fs::read_to_string(folder.join("roles.toml")).unwrap();
-    let examined = |one_clock: bool| {
+    let examined = |clocks: DeviceClocks| {
         let request = Request {
             roles: Some(toml::from_str(&roles).unwrap()),
             window: (None, Some(53.0)),
-            one_clock,
+            clocks,
             ..Request::default()
         };
         examine("walk.mcap", &recording, &request).unwrap()
     };
-    let found = examined(false);
+    let found = examined(DeviceClocks::PutRight);
     // True values: the metrics of the simulated recording from 15 to 41 s.
     for (name, truth, within) in [
         ("rms_roll_deg", 18.344, 0.3),
@@ -157,5 +157,11 @@ fn raw_phone_files_become_the_papers_metrics() {
     let first = found.events.iter().find(|e| e.kind == "beat").unwrap();
     assert!(first.t_s > 16.9, "{}", first.t_s);
     // Left as they are they make nonsense of the carriers' synchrony.
-    assert!(examined(true).metrics.number("synchrony").unwrap() < 0.6);
+    assert!(
+        examined(DeviceClocks::One)
+            .metrics
+            .number("synchrony")
+            .unwrap()
+            < 0.6
+    );
 }

@@ -128,6 +128,7 @@ fn field_of(scene: &sim::scene::Scene) -> Field {
     Field {
         inputs,
         compression_m,
+        pairs: (scene.effects.coupling.as_ref()).and_then(|c| c.graph.pairs(&scene.carriers)),
         onset_s,
         build_up_s,
         ..Field::default()
@@ -225,6 +226,70 @@ fn the_recorder_s_rate_does_not_decide_whether_there_is_a_pull() {
             assert_holds(find(&found, "phase noise"), 0.01, 1.5e-3);
         }
     }
+}
+
+/// A pull of 20 rad/s takes back much of the noise within a sample of 33 ms, and nearly all of it within 100 ms, which tell none.
+#[test]
+fn a_strong_pull_does_not_make_noise_of_what_it_takes_back() {
+    for rate in [10, 30, 100] {
+        for seed in 301..306 {
+            let scene = format!(
+                "music effects.music.strength_rad_per_s=20 log_rate_hz={rate} effects.noise.grid_hz=300 seed={seed}"
+            );
+            let found = found_in(&scene, false);
+            match rate {
+                10 => assert!(reason(&found, "phase noise").contains("0.10 s apart")),
+                _ => assert_holds(find(&found, "phase noise"), 0.01, 1e-3),
+            }
+        }
+    }
+}
+
+/// Eight carriers who mind their neighbours along two poles.
+#[test]
+fn who_minds_whom_is_told_by_the_scene() {
+    let scene = scene_of("eight-carriers seed=5001");
+    let own = sim::model::Model::new(&scene).natural_rad_per_s().to_vec();
+    let mut field = field_of(&scene);
+    let window = analyze::Window::from(15.0);
+    let found = fit(&field, window);
+    assert_holds(find(&found, "coupling"), 0.3, 0.04);
+    assert_holds(find(&found, "pull"), 2.7, 0.04);
+    assert_holds(find(&found, "phase noise"), 0.01, 6e-4);
+    for (c, w) in own.iter().enumerate() {
+        let e = find(&found, &format!("gait {}", c + 1));
+        assert!(
+            (e.value - w / std::f64::consts::TAU).abs() < 1.5e-3,
+            "{e:?}"
+        );
+    }
+    field.pairs = None;
+    let found = fit(&field, window);
+    assert!(!reason(&found, "pull").is_empty());
+}
+
+/// The load that a carrier feels shifts his phase once a step: over a second that leaves next to nothing, and is no noise.
+#[test]
+fn what_comes_back_with_every_step_is_no_noise() {
+    for seed in 5001..5006 {
+        let found = found_in(&format!("music effects.feedback={{}} seed={seed}"), false);
+        let why = reason(&found, "pull");
+        assert!(why.contains("do more than follow a beat"), "{why}");
+    }
+}
+
+/// With phases that jitter, the rate of a compression between two samples is not that of its spline: an error in x, which makes the damping small.
+#[test]
+fn an_error_of_the_compression_is_in_the_interval() {
+    let mut held = 0;
+    for seed in 5001..5021 {
+        let scene = format!("music effects.noise.phase_rad_per_sqrt_s=0.3 seed={seed}");
+        let found = found_in(&scene, false);
+        let e = find(&found, "damping");
+        held += usize::from(e.interval[0] <= 400.0 && 400.0 <= e.interval[1]);
+        assert!(e.interval[1] - e.interval[0] < 100.0, "{e:?}");
+    }
+    assert!(held >= 18, "{held} of 20");
 }
 
 #[test]
@@ -488,6 +553,24 @@ fn field_twins_lie_within_their_intervals() {
             "{name}: intervals of {width} of the value say nothing"
         );
     }
+}
+
+/// In step to and fro, so that the load hardly moves: the sensors' noise is as large as what they measure.
+#[test]
+fn a_load_that_hardly_moves_tells_no_stiffness() {
+    let folder = tempfile::tempdir().unwrap();
+    let scene = scene_of(
+        "field-imu effects.drum=false effects.music=false effects.lift=false effects.gait.sway_m=0.005 seed=5018",
+    );
+    let path = folder.path().join("baseline.mcap");
+    field_log(&scene, &path);
+    let (mut field, told) = Field::read(&path, None, false).unwrap();
+    assert!(told.clocks_apart.is_empty(), "{:?}", told.clocks_apart);
+    field.handles_m.clone_from(&scene.carriers.handles_m);
+    let found = fit(&field, told.window);
+    let why = reason(&found, "stiffness");
+    assert!(why.contains("hardly move apart"), "{why}");
+    assert_holds(find(&found, "damping"), 400.0, 400.0);
 }
 
 /// a = 0.0474 ± 0.0005 and the beat 2.150 ± 0.002 Hz, in each of the archive's ten music logs. (The second derivative of a spline through samples

@@ -3,7 +3,7 @@
 use std::io::Write;
 use std::path::Path;
 
-use analyze::examine::{Analysis, Request, examine};
+use analyze::examine::{Analysis, DeviceClocks, Request, examine};
 use analyze::quality::Quality;
 use analyze::report;
 use analyze::roles::RolesFile;
@@ -80,7 +80,10 @@ fn request(args: &AnalyzeArgs) -> anyhow::Result<Request> {
         topics: args.topic.clone(),
         roles,
         truth: args.truth,
-        one_clock: args.one_clock,
+        clocks: match args.one_clock {
+            true => DeviceClocks::One,
+            false => DeviceClocks::PutRight,
+        },
         traces: args.draws(),
     })
 }

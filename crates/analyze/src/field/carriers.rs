@@ -119,7 +119,9 @@ impl Carriers {
     /// into γ and κ and stays. They are looked for within [`REACH_S`] of the rath's clock: a whole number of steps changes the phases of those whose
     /// pace does. Offsets that are as good are kept for the interval of the synchrony. Of more than two each is too small a part of what moves
     /// the load: their clocks are left alone, and the synchrony is without an interval.
-    pub fn align(&mut self, motion: Option<&Motion>) -> Vec<Quality> {
+    ///
+    /// With `leave` it is only said how they differ.
+    pub fn align(&mut self, motion: Option<&Motion>, leave: bool) -> Vec<Quality> {
         let walking: Vec<&Worn> = self.worn.iter().filter(|w| w.steps.is_ok()).collect();
         let found = match (&walking[..], motion) {
             ([] | [_], _) => return Vec::new(),
@@ -143,13 +145,19 @@ impl Carriers {
         let mut out = Vec::new();
         let walking = self.worn.iter_mut().filter(|w| w.steps.is_ok());
         for (k, (worn, offset_s)) in walking.zip(offsets_s).enumerate() {
-            worn.ahead_s = offset_s;
-            worn.or_ahead_s = or_s.iter().map(|or| or[k]).collect();
+            let done = match leave {
+                true => "left as it is",
+                false => "put right before comparing phases",
+            };
+            if !leave {
+                worn.ahead_s = offset_s;
+                worn.or_ahead_s = or_s.iter().map(|or| or[k]).collect();
+            }
             out.push(Quality::remark(
                 &worn.topic,
                 "clock_offset",
                 format!(
-                    "runs {:+.0} ± {:.0} ms off the carriers' common clock, or whole steps more; put right before comparing phases",
+                    "runs {:+.0} ± {:.0} ms off the carriers' common clock, or whole steps more; {done}",
                     1e3 * offset_s,
                     1e3 * OFFSET_ERROR_S
                 ),
@@ -439,7 +447,7 @@ mod tests {
                 };
                 carriers.add(&format!("/imu/{k}"), &track, Options::default());
             }
-            let said = carriers.align(None);
+            let said = carriers.align(None, false);
             assert!(
                 said.len() == 1 && said[0].kind == "clocks_apart" && said[0].text.contains(why),
                 "{said:?}"

@@ -35,16 +35,19 @@ pub struct Clocks {
     tap_s: Vec<f64>,
     /// When and how fast it turns, s and rad/s.
     turning: (Vec<f64>, Vec<f64>),
-    /// Whether any other clock was set.
+    /// Clocks are left as they are; it is only said how they differ.
+    leave: bool,
+    /// Whether taps tell how any other clock goes.
     pub any_set: bool,
     /// What there is to say.
     pub remarks: Vec<Quality>,
 }
 
 impl Clocks {
-    /// The clock of the rath's sensor.
-    pub fn of_rath(topic: &str, track: &Track) -> Self {
+    /// The clock of the rath's sensor; with `leave` the others are left as they are, and it is only said how they differ.
+    pub fn of_rath(topic: &str, track: &Track, leave: bool) -> Self {
         Self {
+            leave,
             rath: topic.to_owned(),
             tap_s: felt(track),
             turning: (track.t_s.clone(), norms(&track.gyro_rad_per_s)),
@@ -66,6 +69,9 @@ impl Clocks {
             let floor_s = sampled_s / (clock.points as f64).sqrt();
             clock.offset_sd_s = clock.offset_sd_s.max(floor_s);
             self.say(topic, &clock, clock.ahead());
+            if self.leave {
+                return;
+            }
             for t in &mut track.t_s {
                 *t = clock.reference_s(*t);
             }
@@ -111,6 +117,9 @@ impl Clocks {
                 ..clock
             };
             self.say(topic, &clock, clock.ahead().map(|of_rath| -of_rath));
+            if self.leave {
+                return;
+            }
             for t in &mut *heard_s {
                 *t = clock.device_s(*t);
             }
@@ -188,9 +197,13 @@ impl Clocks {
             topic,
             "clock_offset",
             format!(
-                "{}, by {} taps; put right",
+                "{}, by {} taps; {}",
                 self.against(clock, ahead),
-                clock.points
+                clock.points,
+                match self.leave {
+                    true => "left as it is",
+                    false => "put right",
+                }
             ),
         ));
         self.any_set = true;
@@ -254,7 +267,7 @@ mod tests {
 
     #[test]
     fn sensors_on_one_body_tell_each_others_clocks() {
-        let mut clocks = Clocks::of_rath("/imu/rath", &seen(0.0, 0.0, false));
+        let mut clocks = Clocks::of_rath("/imu/rath", &seen(0.0, 0.0, false), false);
         clocks.hold_against("/imu/rath_2", &seen(0.12, 80.0, true));
         let mut still = seen(0.0, 0.0, false);
         still.gyro_rad_per_s.fill([0.0; 3]);

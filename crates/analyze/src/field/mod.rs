@@ -21,6 +21,7 @@ use recording::text::counted;
 
 use crate::beat::lock::Course;
 use crate::events::Event;
+use crate::examine::DeviceClocks;
 use crate::imu::Track;
 use crate::imu::interval;
 use crate::imu::orientation::Options;
@@ -83,7 +84,7 @@ struct Filled {
 
 impl Field {
     /// Reads the sensors' topics; nothing when the recording has none. Clocks are put on the rath's by taps, or the carriers' on each other by
-    /// their motion, unless they are `one_clock`.
+    /// their motion, as `devices` says.
     ///
     /// # Errors
     /// Where the file cannot be read.
@@ -92,7 +93,7 @@ impl Field {
         roles: &Roles,
         gravity_m_per_s2: f64,
         truth: bool,
-        one_clock: bool,
+        devices: DeviceClocks,
         window: Window,
     ) -> Result<Self, ReadError> {
         let topics: Vec<&str> = [Role::Imu, Role::Carriers, Role::Beats, Role::Truth]
@@ -148,6 +149,8 @@ impl Field {
         let columns = Columns { signals, start_ns };
         let places = place::places(recording);
         let options = options(place::is_simulated(recording), &roles.sensors);
+        let one_clock = devices == DeviceClocks::One;
+        let leave = devices == DeviceClocks::Told;
         let mut clocks = Clocks::default();
         for topic in imus {
             let Some(Sensor {
@@ -170,7 +173,7 @@ impl Field {
             }
             if !one_clock {
                 if is_rath {
-                    clocks = Clocks::of_rath(topic, &track);
+                    clocks = Clocks::of_rath(topic, &track, leave);
                 } else {
                     clocks.put_right(topic, &mut track);
                 }
@@ -212,7 +215,7 @@ impl Field {
             clocks.put_sound_right(&topic, &onset_s, &mut field.beat_s);
         }
         if !one_clock && !clocks.any_set {
-            field.align(roles);
+            field.align(roles, leave);
         }
         field.quality.append(&mut clocks.remarks);
         if truth {
@@ -268,11 +271,11 @@ impl Field {
         }
     }
 
-    /// Puts the carriers' clocks on each other, by the motion of the rath that they all drive.
-    fn align(&mut self, roles: &Roles) {
+    /// Puts the carriers' clocks on each other, by the motion of the rath that they all drive, or says how with `leave`.
+    fn align(&mut self, roles: &Roles, leave: bool) {
         if roles.patterns(Role::Carriers).len() >= 2 {
             self.quality
-                .extend(self.carriers.align(self.motion.as_ref()));
+                .extend(self.carriers.align(self.motion.as_ref(), leave));
         }
     }
 

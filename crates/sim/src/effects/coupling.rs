@@ -40,7 +40,7 @@ pub enum Graph {
 
 impl Graph {
     /// The pairs, each once; `None` for all-to-all.
-    fn pairs(&self, carriers: &Carriers) -> Option<Vec<[usize; 2]>> {
+    pub fn pairs(&self, carriers: &Carriers) -> Option<Vec<[usize; 2]>> {
         match self {
             Self::All => None,
             Self::Edges(list) => Some(list.clone()),

@@ -62,15 +62,14 @@ pub fn run(args: &Args) -> Result<Input> {
             Some(music) => (music.onset_s, music.build_up_s),
             None => (0.0, 0.0),
         };
+        let coupling = scene.effects.coupling.as_ref();
+        field.pairs = coupling.and_then(|c| c.graph.pairs(&scene.carriers));
         field.handles_m.clone_from(&scene.carriers.handles_m);
         if known.is_some() {
             field.inputs.mass_kg.get_or_insert(scene.body.mass_kg);
         }
         for clock in &told.clocks_apart {
-            recording::note!(
-                "study: {name}: {}; here clocks are left as they are: --put-clocks-right",
-                clock.trim_end_matches("; put right")
-            );
+            recording::note!("study: {name}: {clock}: --put-clocks-right");
         }
         for hole in holes(&field) {
             recording::note!("study: {name}: {hole}");

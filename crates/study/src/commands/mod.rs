@@ -170,3 +170,17 @@ fn write_whole(path: &Path, bytes: &[u8]) -> Result<()> {
     study::sweep::parts::write_whole(path, |file| Ok(file.write_all(bytes)?))
         .map_err(anyhow::Error::msg)
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn seeds_that_cannot_be_counted_up_to_are_refused() {
+        let parsed = |seeds: &str| Args::try_parse_from(["study", "paper", "--seeds", seeds]);
+        for absurd in ["0", "-1", "nan", "1000000000000", "18446744073709551615"] {
+            assert!(parsed(absurd).is_err(), "{absurd}");
+        }
+        assert!(parsed("100").is_ok());
+    }
+}

@@ -13,7 +13,7 @@ use study::paper::{CONDITIONS, Condition, FIRST_SEED, RUNS, figures, table, to_j
 #[command(after_help = EXAMPLES)]
 pub struct Args {
     /// Seeds per condition, from 1001 on.
-    #[arg(long, value_name = "N", allow_negative_numbers = true, value_parser = clap::value_parser!(u64).range(1..))]
+    #[arg(long, value_name = "N", allow_negative_numbers = true, value_parser = clap::value_parser!(u64).range(1..=100_000))]
     seeds: Option<u64>,
     /// Threads; 0 is one per core. The result does not depend on it.
     #[arg(long, value_name = "N", default_value_t = 0)]

@@ -1,6 +1,6 @@
 //! What the body feels: stiffness and damping at the handles, and the pendulum of its roll.
 
-use super::squares::{Block, bootstrapped, solve, unexplained};
+use super::squares::{Block, bootstrapped, solve, unexplained, whoever_errs};
 use super::{BLOCK_S, CARRIES, EDGE, Field, KEPT_S, Outcome, budgeted, even, pair};
 use analyze::imu::budget::Budget;
 use analyze::inputs::{Window, about_mean, mean_step_s};
@@ -85,12 +85,40 @@ pub(super) fn contact(field: &Field) -> Result<Vec<Outcome>, String> {
         ));
     }
     let coarse = solve(&sums(2).0, |k| k).map_or(value, |p| [p[0], p[1]]);
+    let erring = whoever_errs(&blocks);
     let interval = std::array::from_fn(|p| {
         let sampling = (coarse[p] - value[p]).abs();
-        [interval[p][0] - sampling, interval[p][1] + sampling]
+        let [low, high] = among(value[p], interval[p], erring.iter().flatten().map(|e| e[p]));
+        [low - sampling, high + sampling]
     });
+    Ok(spring_and_damper(value, interval))
+}
+
+/// Both, where the interval is not wider than the value.
+fn spring_and_damper(value: [f64; 2], interval: [[f64; 2]; 2]) -> Vec<Outcome> {
     let names = [("stiffness", "N/m"), ("damping", "N·s/m")];
-    Ok(pair(names, value, interval))
+    let told = |found: Outcome| {
+        let e = found?;
+        let [low, high] = e.interval;
+        match high - low < e.value.abs() {
+            true => Ok(e),
+            false => Err((
+                e.name,
+                format!(
+                    "handles and shoulders hardly move apart: it may be anything from {low:.0} to {high:.0} {}",
+                    e.unit
+                ),
+            )),
+        }
+    };
+    pair(names, value, interval).into_iter().map(told).collect()
+}
+
+/// An interval about a value, stretched by how far other values lie beyond that one.
+fn among(value: f64, [low, high]: [f64; 2], others: impl Iterator<Item = f64>) -> [f64; 2] {
+    others.fold([low, high], |[a, b], x| {
+        [a.min(low - (value - x)), b.max(high + (x - value))]
+    })
 }
 
 /// Stiffness and damping from the body's specific force and everybody's heave, while all handles carry.
@@ -189,22 +217,20 @@ pub(super) fn contact_from_sensors(field: &Field, window: Window) -> Result<Vec<
                 means[b][2] > 0.0 && gaps.iter().all(|g| share(g) + offset[b] > least)
             });
         }
-        bootstrapped(&rows, |p| [p[0], p[1]])
+        let (value, interval) = bootstrapped(&rows, |p| [p[0], p[1]])?;
+        Some((value, interval, whoever_errs(&rows)?))
     };
     let why = || "all handles never carry long enough".to_owned();
-    let (value, interval) = found(1).ok_or_else(why)?;
-    let coarse = found(2).map_or(value, |(coarse, _)| coarse);
+    let (value, interval, erring) = found(1).ok_or_else(why)?;
+    let coarse = found(2).map_or(value, |(coarse, ..)| coarse);
     let budget = Budget::default();
     let scale = budget.height_scale.hypot(budget.support_scale);
-    Ok(pair(
-        [("stiffness", "N/m"), ("damping", "N·s/m")],
-        value,
-        std::array::from_fn(|p| {
-            let sampling = (coarse[p] - value[p]).abs();
-            let wide = [interval[p][0] - sampling, interval[p][1] + sampling];
-            budgeted(value[p], wide, scale)
-        }),
-    ))
+    let interval = std::array::from_fn(|p| {
+        let sampling = (coarse[p] - value[p]).abs();
+        let [low, high] = among(value[p], interval[p], erring.iter().map(|e| e[p]));
+        budgeted(value[p], [low - sampling, high + sampling], scale)
+    });
+    Ok(spring_and_damper(value, interval))
 }
 
 /// a and b of the roll's pendulum.

@@ -42,6 +42,7 @@ pub(super) fn gait(field: &Field) -> Result<Vec<Outcome>, String> {
         heard,
         grown: grown.collect(),
         parts: stretches(t_s, 0.0),
+        pairs: field.pairs.clone(),
     };
     // Noise that was drawn for a coarser clock than the recorder's goes on from one increment to the next: thinned until it does not.
     let step_s = whole.step_s().ok_or("no phases follow each other")?;
@@ -79,6 +80,8 @@ struct Increments {
     grown: Vec<f64>,
     /// The parts between holes: no increment spans one.
     parts: Vec<Range<usize>>,
+    /// Who minds whom; `None` where everybody minds everybody.
+    pairs: Option<Vec<[usize; 2]>>,
 }
 
 /// The pull, as parts that go with the sine and the cosine of the beat, rad/s; the own frequencies, rad/s; how the carriers pull each
@@ -134,8 +137,7 @@ impl Solved {
     /// Whether what is missed looks like noise: the one increment says nothing of the next. What is missed next to nothing of need not.
     fn is_white(&self, dt: f64) -> bool {
         let n = &self.normal;
-        let missed = (n.squares / (n.rows as f64 * dt)).sqrt();
-        n.likeness().abs() < ALIKE || missed < 0.01 * self.answer.pull.0.abs()
+        n.likeness().abs() < ALIKE || n.misses_nothing(dt, self.answer.pull.0)
     }
 }
 
@@ -145,10 +147,14 @@ struct Normal {
     right: DVector<f64>,
     /// Sum of squares of what is missed, times dt.
     squares: f64,
-    /// Share of the noise's power that the pull leaves within an increment, summed.
-    kept: f64,
+    /// Share of the noise's power that the pull leaves within an increment, summed: of white noise, and of noise that is even within it.
+    kept_white: f64,
+    kept_even: f64,
     /// Σ e_k e_{k+1} of what is missed, a carrier's increment by the next.
     with_next: f64,
+    /// Σ (Σ e_k)² / n over a carrier's increments of [`RUN_S`], n of them; and how many such runs there are.
+    run: f64,
+    runs: usize,
     rows: usize,
 }
 
@@ -159,6 +165,22 @@ impl Normal {
     /// How alike neighbouring increments of what is missed are, −1 … 1.
     fn likeness(&self) -> f64 {
         self.with_next / self.squares
+    }
+
+    /// Whether what is missed is next to nothing beside the pull (rad/s), in increments of `dt` (s).
+    fn misses_nothing(&self, dt: f64, pull: f64) -> bool {
+        (self.squares / (self.rows as f64 * dt)).sqrt() < 0.01 * pull.abs()
+    }
+
+    /// How strong what is missed is over [`RUN_S`] beside white noise that misses as much over an increment: more where it goes on, less where it
+    /// comes back. `None` where that may be chance, or the recorder's clock against the noise's.
+    fn is_no_noise(&self) -> Option<f64> {
+        let runs = self.runs as f64;
+        let times = self.run / runs / (self.squares / self.rows as f64);
+        // The spread of Σ χ²/n.
+        let spread = (2.0 / runs).sqrt();
+        let goes_on = times > self.shared() + 0.5 && times > 1.0 + 5.0 * spread;
+        (goes_on || times < 1.0 - 3.0 * spread).then_some(times)
     }
 
     /// By how much what neighbours share makes noise over a long time stronger than over one increment: where the recorder's clock is not the noise's,
@@ -200,6 +222,8 @@ impl Normal {
     }
 }
 
+/// What is missed over so long shows whether anything but noise is, s.
+const RUN_S: f64 = 1.0;
 /// Likeness of neighbouring residuals that white noise does not show.
 const ALIKE: f64 = 0.2;
 /// A pull or a coupling that is not so many standard errors is none: the best of many frequencies has some by chance.
@@ -221,12 +245,32 @@ impl Increments {
             heard: thin(&self.heard),
             grown: thin(&self.grown),
             parts,
+            pairs: self.pairs.clone(),
         }
     }
 
     /// Mean step within the parts, s.
     fn step_s(&self) -> Option<f64> {
         mean_step_in(&self.t_s, &self.parts)
+    }
+
+    /// What the others do to each carrier, for a coupling of 1: (1/N) Σ_j sin(φ_j − φ_c), or 1/(d + 1) times the sum over his d neighbours.
+    fn others(&self, phases: &[f64]) -> Vec<f64> {
+        let n = phases.len();
+        let Some(pairs) = &self.pairs else {
+            let (s, c) = phases
+                .iter()
+                .fold((0.0, 0.0), |(s, c), p| (s + p.sin(), c + p.cos()));
+            let of = |p: &f64| (s * p.cos() - c * p.sin()) / n as f64;
+            return phases.iter().map(of).collect();
+        };
+        let mut sums = vec![(0.0, 1.0); n];
+        for &[a, b] in pairs.iter().filter(|pair| pair.iter().all(|c| *c < n)) {
+            let toward = (phases[b] - phases[a]).sin();
+            sums[a] = (sums[a].0 + toward, sums[a].1 + 1.0);
+            sums[b] = (sums[b].0 - toward, sums[b].1 + 1.0);
+        }
+        sums.into_iter().map(|(sum, count)| sum / count).collect()
     }
 
     /// The later end of every increment.
@@ -252,7 +296,10 @@ impl Increments {
             gram: DMatrix::zeros(size, size),
             right: DVector::zeros(size),
             squares: 0.0,
-            kept: 0.0,
+            kept_white: 0.0,
+            kept_even: 0.0,
+            run: 0.0,
+            runs: 0,
             with_next: 0.0,
             rows: 0,
         };
@@ -261,23 +308,34 @@ impl Increments {
         let mut row = DVector::<f64>::zeros(size);
         for part in &self.parts {
             let mut before = vec![0.0; carriers];
+            // Sum, number and end of each carrier's run of increments.
+            let mut runs = vec![(0.0, 0.0); carriers];
+            let mut run_ends_s = f64::NEG_INFINITY;
             for k in part.clone().skip(1) {
                 if !(psi(k - 1) + psi(k)).is_finite() {
                     before.fill(0.0);
                     continue;
                 }
+                if self.t_s[k] > run_ends_s {
+                    for (sum, count) in runs.iter_mut().filter(|r| r.1 > 0.0) {
+                        out.run += *sum * *sum / *count;
+                        out.runs += 1;
+                        (*sum, *count) = (0.0, 0.0);
+                    }
+                    run_ends_s = self.t_s[k] + RUN_S;
+                }
                 let dt = self.t_s[k] - self.t_s[k - 1];
                 // At the end of the increment the phases that are to be expected from its beginning. Those that were observed hold the
                 // increment's own noise, which on both sides took half of a pull of 2.7 rad/s away at 0.3 rad/√s.
                 let begun: Vec<f64> = self.phases.iter().map(|p| p[k - 1]).collect();
-                let beside = others(&begun);
+                let beside = self.others(&begun);
                 let expected = (0..carriers).map(|c| {
                     let (sin, cos) = (psi(k - 1) - begun[c]).sin_cos();
                     let pull = self.grown[k - 1] * (a * sin + b * cos);
                     begun[c] + (drive.own[c] + pull + drive.coupling * beside[c]) * dt
                 });
                 let expected: Vec<f64> = expected.collect();
-                let beside_then = others(&expected);
+                let beside_then = self.others(&expected);
                 for c in 0..carriers {
                     let rate = (self.phases[c][k] - begun[c]) / dt;
                     let (mut s, mut co, mut turn, mut back) = (0.0, 0.0, 0.0, 0.0);
@@ -301,8 +359,10 @@ impl Increments {
                     out.squares += dt * miss * miss;
                     out.with_next += before[c] * dt.sqrt() * miss;
                     before[c] = dt.sqrt() * miss;
-                    // Less what the pull takes back of the noise within dt.
-                    out.kept += (1.0 - back * dt).max(0.1);
+                    runs[c] = (runs[c].0 + before[c], runs[c].1 + 1.0);
+                    let taken = taken_back(back * dt);
+                    out.kept_white += taken[0];
+                    out.kept_even += taken[1];
                     out.rows += 1;
                 }
             }
@@ -454,6 +514,12 @@ impl Increments {
                 found.likeness()
             ));
         }
+        let no_noise = found.is_no_noise();
+        if let Some(times) = no_noise.filter(|_| !found.misses_nothing(step_s, pull)) {
+            return Err(format!(
+                "carriers do more than follow a beat and mind each other: what that leaves is {times:.1} times what noise would be over a second"
+            ));
+        }
         // What the mean of both ends of an increment is off, where a carrier runs at another rate than the beat.
         let off = |w: f64| pull * ((w - answer.rate) * step_s).powi(2) / 12.0;
         let rough = answer.own.iter().map(|(w, _)| off(*w)).fold(0.0, f64::max);
@@ -497,10 +563,21 @@ impl Increments {
         }
         // The noise: its variance has itself a known spread; what neighbours share has twice that of its own.
         let rows = found.rows as f64;
-        let sigma = (found.variance(unknowns) * rows / found.kept).sqrt();
+        let noise = |of: &Normal, kept: f64| (of.variance(unknowns) * of.rows as f64 / kept).sqrt();
+        let sigma = noise(&found, found.kept_white);
+        let even = (noise(&found, found.kept_even) - sigma).abs();
+        let sparse = coarse.map_or(0.0, |s| {
+            (noise(&s.normal, s.normal.kept_white) - sigma).abs()
+        });
         let count = (rows - unknowns as f64) / if found.shared() > 1.0 { 3.0 } else { 1.0 };
-        let spread = 1.96 * sigma / (2.0 * count).sqrt();
-        out.push(estimate("phase noise", "rad/√s", sigma, spread));
+        let half = (1.96 * sigma / (2.0 * count).sqrt()).max(0.5 * sparse) + even;
+        out.push(match half < sigma {
+            true => estimate("phase noise", "rad/√s", sigma, half),
+            false => Err((
+                "phase noise".into(),
+                format!("samples {step_s:.2} s apart are too few for a pull that takes noise back so soon"),
+            )),
+        });
         Ok(out)
     }
 }
@@ -525,14 +602,12 @@ fn coupling_of(drive: &Drive, cover: &DMatrix<f64>) -> (f64, f64) {
     (drive.coupling, cover[(last, last)])
 }
 
-/// (1/N) Σ_j sin(φ_j − φ_c) for every c: what the others do to a carrier who minds them all.
-fn others(phases: &[f64]) -> Vec<f64> {
-    let n = phases.len() as f64;
-    let (s, c) = phases
-        .iter()
-        .fold((0.0, 0.0), |(s, c), p| (s + p.sin(), c + p.cos()));
-    let of = |p: &f64| (s * p.cos() - c * p.sin()) / n;
-    phases.iter().map(of).collect()
+/// Shares that the pull leaves of the noise's power within an increment, by `x`, the rate of its relaxation times the increment: of white noise,
+/// ∫e^(−2xu)du, and of noise that is even within it, (∫e^(−xu)du)², u from 0 to 1. Who is driven apart is so for less than an increment.
+fn taken_back(x: f64) -> [f64; 2] {
+    let mean = |x: f64| if x == 0.0 { 1.0 } else { -(-x).exp_m1() / x };
+    let x = x.max(-1.0);
+    [mean(2.0 * x), mean(x).powi(2)]
 }
 
 /// Why beat and gait give no answer.

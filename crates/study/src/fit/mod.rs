@@ -14,7 +14,11 @@
 //! hold the increment's own noise), an error of (ω_i − Ω)²Δt²/12 of K, which the interval holds, with half of what K and ω_i change by when
 //! every other sample is left out, and all of what they change by when a coupling K_c is allowed for that does not show by itself (six standard
 //! errors). Where neighbouring increments share noise, because it was drawn on a coarser clock than the recorder's, samples are left
-//! out until less than a fifth is shared, up to steps of 0.1 s, and what is shared is counted: σ² Δt = Σ e_k² + 2 Σ e_k e_{k+1}.
+//! out until less than a fifth is shared, up to steps of 0.1 s, and what is shared is counted: σ² Δt = Σ e_k² + 2 Σ e_k e_{k+1}. What the pull
+//! takes back of the noise within an increment, at the rate λ = K m cos(Ωt + ψ₀ − φ), is put back: white noise is left with a share (1 − e^(−2λΔt))/(2λΔt)
+//! of its variance, noise that is even over Δt with the square of (1 − e^(−λΔt))/(λΔt), and the interval holds both. Where what is missed is not as strong
+//! over a second as white noise would be (stronger by half and five standard errors, or weaker by three), carriers do what the model does not know, and
+//! nothing is told. On a graph, the scene's, the coupling is K_c/(d_i + 1) times the sum over the d_i neighbours.
 //! Nothing reaches across a hole of the record: no increment, no spline, no straight line through a beat.
 //! k, c, a, b: linear least squares on derivatives of the not-a-knot spline, their intervals from a moving-block bootstrap (500
 //! draws, blocks of two roll periods), because neighbours are alike. θ̈ stands as a second difference, and the other side as Numerov's mean
@@ -22,7 +26,8 @@
 //! ([`analyze::beat::adler`]), which knows that a step detector smooths them and finds τ by itself. Contact and pendulum add what they change by when every other
 //! sample is left out: a bound, 15 times over, of what the sampling does. From sensors z_i is the shoulder's and the body's motion about
 //! their slow course, δ_i = z_i − (body's height + (R p_i)_z), N_tot the body's specific force times its mass; a handle carries where
-//! k δ_i + c δ̇_i + e/N, its share of the load, is above a seventh of the weight over N. Source: Seber & Wild, Nonlinear Regression (1989);
+//! k δ_i + c δ̇_i + e/N, its share of the load, is above a seventh of the weight over N. The intervals of k and c reach to what they would be if all
+//! that is missed were an error of δ, or of δ̇, and not of the force (Frisch 1934); one that is wider than its value tells none. Source: Seber & Wild, Nonlinear Regression (1989);
 //! Künsch, Ann. Stat. 17 (1989); docs/reproduction.md.
 
 mod contact;
@@ -46,6 +51,8 @@ pub struct Field {
     pub compression_m: Vec<Vec<f64>>,
     /// Handles in the body's axes, m: what compression from inertial sensors needs.
     pub handles_m: Vec<[f64; 3]>,
+    /// Pairs of carriers (from 0) that mind each other; `None` where everybody minds everybody.
+    pub pairs: Option<Vec<[usize; 2]>>,
     /// When the music begins, s.
     pub onset_s: f64,
     /// How long it builds up, s.

@@ -2,7 +2,7 @@
 
 use super::Field;
 use analyze::Window;
-use analyze::examine::{Request, examine};
+use analyze::examine::{DeviceClocks, Request, examine};
 use analyze::quality::Quality;
 use analyze::roles::RolesFile;
 use anyhow::{Result, anyhow};
@@ -20,7 +20,7 @@ pub struct Told {
     pub scene: Option<Scene>,
     /// What is lost, where it is damaged: one sentence.
     pub damage: Option<String>,
-    /// What `analyze` would put right in the clocks of sensors, where that was not asked for.
+    /// How the clocks of sensors differ, where it was not asked to put them right.
     pub clocks_apart: Vec<String>,
 }
 
@@ -52,7 +52,10 @@ impl Field {
         };
         // To put clocks right by the carriers' own lags would take away what the pull is seen by.
         let request = Request {
-            one_clock: !put_clocks_right,
+            clocks: match put_clocks_right {
+                true => DeviceClocks::PutRight,
+                false => DeviceClocks::Told,
+            },
             roles: roles.cloned(),
             ..Request::default()
         };
@@ -79,12 +82,7 @@ impl Field {
         let clocks_apart = match put_clocks_right || analysis.inputs.heave_m.is_empty() {
             true => Vec::new(),
             false => {
-                let request = Request {
-                    one_clock: false,
-                    ..request
-                };
-                let found = examine(&name, &recording, &request)?;
-                let clocks = found.quality.iter().filter(|q| q.kind == "clock_offset");
+                let clocks = analysis.quality.iter().filter(|q| q.kind == "clock_offset");
                 clocks.map(Quality::told).collect()
             }
         };

@@ -60,6 +60,20 @@ pub(super) fn unexplained<const N: usize>(blocks: &[Block<N>]) -> Option<f64> {
     Some(1.0 - p.dot(&right) / square)
 }
 
+/// The parameters if all that is missed were an error of y, and if it were one of x_j, for every j. The truth lies among them where all may
+/// err and the parameters have their signs in all of them. With x_j erring, p + G⁻¹e_j r/p_j, r the sum of squares that is missed: the regression
+/// of x_j on y and the other x. Source: Frisch, Statistical Confluence Analysis (1934); Klepper & Leamer, Econometrica 52 (1984) 163.
+pub(super) fn whoever_errs<const N: usize>(blocks: &[Block<N>]) -> Option<Vec<SVector<f64, N>>> {
+    let p = solve(blocks, |k| k)?;
+    let gram: SMatrix<f64, N, N> = blocks.iter().map(|b| b.gram).sum();
+    let right: SVector<f64, N> = blocks.iter().map(|b| b.right).sum();
+    let square: f64 = blocks.iter().map(|b| b.square).sum();
+    let missed = (square - p.dot(&right)).max(0.0);
+    let inverse = gram.try_inverse()?;
+    let erring = (0..N).map(|j| p + inverse.column(j) * (missed / p[j]));
+    Some([p].into_iter().chain(erring).collect())
+}
+
 /// What `of` makes of the parameters, with intervals by the bootstrap.
 pub(super) fn bootstrapped<const N: usize, const M: usize>(
     blocks: &[Block<N>],
@@ -84,4 +98,22 @@ pub(super) fn bootstrapped<const N: usize, const M: usize>(
         [0.025, 0.975].map(|q| crate::sweep::summary::quantile(&d, q))
     });
     Some((value, interval))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Points (x, y) whose regressions are known by hand: of y on x 15/14, of x on y 15/17, so that y/x is 17/15.
+    #[test]
+    fn the_other_regression_is_found() {
+        let mut block = Block::<1>::empty();
+        for (x, y) in [(1.0, 2.0), (2.0, 2.0), (3.0, 3.0)] {
+            block.add([x], y);
+        }
+        let found = whoever_errs(&[block]).unwrap();
+        for (p, known) in found.iter().zip([15.0 / 14.0, 17.0 / 15.0]) {
+            assert!((p[0] - known).abs() < 1e-14, "{found:?}");
+        }
+    }
 }
