@@ -10,7 +10,7 @@ use recording::text::counted;
 use crate::arrivals::{Arrivals, Axis};
 use crate::envelope::Envelope;
 use crate::events::{Event, events};
-use crate::field::Field;
+use crate::field::{DeviceClocks, Field};
 use crate::inputs::{Inputs, Window, between};
 use crate::metrics::{self, Metrics};
 use crate::peaks::SpectrumSummary;
@@ -19,18 +19,6 @@ use crate::quality::Quality;
 use crate::quaternion::Quaternions;
 use crate::roles::{AngleUnit, Role, Roles, RolesFile, matches, of_topic};
 use crate::summary::{Stream, Summary, Times, segment};
-
-/// What is done about the clocks of sensors that differ.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub enum DeviceClocks {
-    /// They are put right, and it is said how.
-    #[default]
-    PutRight,
-    /// They are left as they are, and it is said how they differ.
-    Told,
-    /// Nothing: all sensors were stamped by one clock, and what looks like an offset between carriers is theirs.
-    One,
-}
 
 /// What is asked of a recording.
 #[derive(Clone, Debug, Default)]

@@ -3,7 +3,8 @@
 //!
 //!     IMU_RECORDINGS=FOLDER cargo test --release -p analyze --test field -- --ignored
 
-use analyze::examine::{Analysis, DeviceClocks, Request, examine};
+use analyze::examine::{Analysis, Request, examine};
+use analyze::field::DeviceClocks;
 use analyze::quality::Quality;
 use recording::import::{ImportOptions, ingest};
 use recording::read::{ReadOptions, Recording};

@@ -3,7 +3,8 @@
 use std::io::Write;
 use std::path::Path;
 
-use analyze::examine::{Analysis, DeviceClocks, Request, examine};
+use analyze::examine::{Analysis, Request, examine};
+use analyze::field::DeviceClocks;
 use analyze::quality::Quality;
 use analyze::report;
 use analyze::roles::RolesFile;

@@ -21,7 +21,6 @@ use recording::text::counted;
 
 use crate::beat::lock::Course;
 use crate::events::Event;
-use crate::examine::DeviceClocks;
 use crate::imu::Track;
 use crate::imu::interval;
 use crate::imu::orientation::Options;
@@ -57,6 +56,18 @@ const STAMP: [&str; 2] = ["header.stamp.sec", "header.stamp.nanosec"];
 const BEAT: [&str; 2] = ["number", "time_s"];
 /// More samples than this share left out are worth a word.
 const MANY: f64 = 0.01;
+
+/// What is done about the clocks of sensors that differ.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum DeviceClocks {
+    /// They are put right, and it is said how.
+    #[default]
+    PutRight,
+    /// They are left as they are, and it is said how they differ.
+    Told,
+    /// Nothing: all sensors were stamped by one clock, and what looks like an offset between carriers is theirs.
+    One,
+}
 
 /// What a recording's sensors say.
 #[derive(Default)]

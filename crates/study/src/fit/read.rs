@@ -2,7 +2,8 @@
 
 use super::Field;
 use analyze::Window;
-use analyze::examine::{DeviceClocks, Request, examine};
+use analyze::examine::{Request, examine};
+use analyze::field::DeviceClocks;
 use analyze::quality::Quality;
 use analyze::roles::RolesFile;
 use anyhow::{Result, anyhow};
