@@ -45,6 +45,9 @@ pub fn unit_of(schema: &str, field: &str) -> &'static str {
         ("_rad_per_s", "rad/s"),
         ("_m_per_s2", "m/s^2"),
         ("_m_per_s", "m/s"),
+        ("_n_per_m", "N/m"),
+        ("_n_s_per_m", "N.s/m"),
+        ("_kg_m2", "kg.m^2"),
         ("_deg", "deg"),
         ("_rad", "rad"),
         ("_hz", "Hz"),
@@ -88,8 +91,11 @@ pub fn unit_of(schema: &str, field: &str) -> &'static str {
     // A part of the path may carry the suffix: `velocity_m_per_s.x`, `normal_n[0]`.
     for part in field.rsplit('.') {
         let part = part.split('[').next().unwrap_or(part);
+        // What is per second is no time: `drift_per_s`, `noise_rad_per_sqrt_s`.
+        let per = part.rsplit_once("_per_").map_or("", |(_, of)| of);
+        let per = per.strip_prefix("sqrt_").unwrap_or(per);
         for (suffix, unit) in SUFFIXES {
-            if part.ends_with(suffix) {
+            if part.ends_with(suffix) && (suffix.contains("_per_") || suffix[1..] != *per) {
                 return unit;
             }
         }
@@ -111,6 +117,12 @@ mod tests {
             ("sensor_msgs/msg/Imu", "linear_acceleration.z", "m/s^2"),
             ("sensor_msgs/Imu", "angular_velocity.z", "rad/s"),
             ("sensor_msgs/Imu", "orientation.w", ""),
+            ("x/Y", "spring.stiffness_n_per_m", "N/m"),
+            ("x/Y", "damping_n_s_per_m[1]", "N.s/m"),
+            ("x/Y", "bristle_stiffness_per_m", ""),
+            ("x/Y", "phase_rad_per_sqrt_s", ""),
+            ("x/Y", "drift_per_s", ""),
+            ("x/Y", "load_per_handle_n", "N"),
         ] {
             assert_eq!(unit_of(schema, field), unit, "{schema} {field}");
         }

@@ -62,6 +62,21 @@ fn a_row_of_values_is_a_slip_only_where_none_can_be() {
 }
 
 #[test]
+fn an_axis_has_the_unit_of_its_key() {
+    for (key, values, unit) in [
+        ("effects.contact.stiffness_n_per_m", "[1e3, 2e3]", "N/m"),
+        ("effects.noise.phase_rad_per_sqrt_s", "[0.01, 0.02]", ""),
+        ("effects.music.beat_hz", "[2.0, 2.1]", "Hz"),
+        ("effects.friction.law", r#"["regularised", "bristle"]"#, ""),
+    ] {
+        let text = format!("axes = [{{ key = \"{key}\", name = \"it\", values = {values} }}]");
+        let plan = plan(&text).unwrap();
+        let column = plan.columns().iter().find(|c| c.name == "it").unwrap();
+        assert_eq!(column.unit, unit, "{key}");
+    }
+}
+
+#[test]
 fn a_run_without_a_window_says_so() {
     let study = plan(
         "metrics = [\"dz_pp_m\", \"rms_roll_deg\"]\n[set]\nduration_s = 1.0\nanalysis_start_s = 15.0",

@@ -579,7 +579,11 @@ fn columns(spec: &Spec, metrics: &[&Metric]) -> Vec<Column> {
             values if values.iter().all(toml::Value::is_bool) => Kind::Truth,
             _ => Kind::Text,
         };
-        out.push(column(&axis.name, kind, ""));
+        let unit = match kind {
+            Kind::Real => recording::signal::unit_of("", &axis.key),
+            _ => "",
+        };
+        out.push(column(&axis.name, kind, unit));
     }
     out.push(column("seed", Kind::Whole, ""));
     for metric in metrics {
