@@ -158,6 +158,7 @@ impl Judge {
             slow_m = heave.as_ref().and_then(|h| h.slow_m(motion, window));
             of_pose = self.metrics(motion, heave, window);
         }
+        let walking = carriers.step_s().len();
         for (name, error) in ERRORS {
             // A metric that came from the sensors itself has no truth beside it, but in the true pose.
             let beside = metrics
@@ -168,7 +169,6 @@ impl Judge {
                 continue;
             };
             let mut error_of = difference(estimate, truth);
-            let walking = carriers.step_s().len();
             if walking != recorded && carriers::of_all(name) {
                 error_of.withhold(format!(
                     "{walking} of {recorded} carriers walk with a sensor; the truth is that of all"

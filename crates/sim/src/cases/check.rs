@@ -13,8 +13,14 @@ pub struct Checks {
     pub broken: Option<String>,
 }
 
+/// World from body, as logged.
+pub fn attitude(s: &Sample) -> UnitQuaternion<f64> {
+    let [x, y, z, w] = s.pose.orientation;
+    UnitQuaternion::new_unchecked(Quaternion::new(w, x, y, z))
+}
+
 /// Kinetic energy, and potential energy in gravity, of a body that nobody walks with, J.
-fn body_j(run: &Run, s: &Sample) -> [f64; 2] {
+pub fn body_j(run: &Run, s: &Sample) -> [f64; 2] {
     let (body, pose) = (&run.scene.body, &s.pose);
     let (i, [x, y, z]) = (&body.inertia_kg_m2, pose.spin_rad_per_s);
     let products = i.xy * x * y + i.xz * x * z + i.yz * y * z;
@@ -109,8 +115,7 @@ impl Checks {
                 .contact
                 .as_ref()
                 .is_some_and(|c| c.bilateral);
-            let [x, y, z, w] = s.pose.orientation;
-            let turn = UnitQuaternion::new_unchecked(Quaternion::new(w, x, y, z));
+            let turn = attitude(s);
             let centre = Vector3::from(s.pose.position_m);
             for (i, handle) in run.scene.carriers.handles_m.iter().enumerate() {
                 let place = centre + turn * Vector3::from(*handle);
@@ -168,7 +173,8 @@ impl Checks {
         let pieces = load.course(start, run.scene.duration_s);
         let most = |of: fn(&Sample) -> f64| run.samples.iter().map(of).fold(1.0, f64::max);
         let size_m = most(|s| s.pose.position_m[2].abs());
-        let within_m = 10.0 * run.scene.solver.tolerance * size_m * load.growth(start, &times);
+        let within_m =
+            10.0 * run.scene.solver.tolerance * size_m * load.growth(&pieces, start, &times);
         let rate = load.natural();
         let within_n = (load.k + load.c * rate) * within_m;
         let law = |s: &Sample| load.at(&pieces, s.t_s);

@@ -186,13 +186,12 @@ impl Carried {
         [z, v, n]
     }
 
-    /// By how much a hair at the start has grown at most, at `times_s`.
-    pub fn growth(&self, start: [f64; 2], times_s: &[f64]) -> f64 {
+    /// By how much a hair at the start of a course has grown at most, at `times_s`.
+    pub fn growth(&self, pieces: &[Piece], start: [f64; 2], times_s: &[f64]) -> f64 {
         const HAIR_M: f64 = 1e-9;
         let until_s = times_s.last().copied().unwrap_or(0.0);
         let beside = self.course([start[0] + HAIR_M, start[1]], until_s);
-        let pieces = self.course(start, until_s);
-        let apart = |&t: &f64| (self.at(&pieces, t)[0] - self.at(&beside, t)[0]).abs() / HAIR_M;
+        let apart = |&t: &f64| (self.at(pieces, t)[0] - self.at(&beside, t)[0]).abs() / HAIR_M;
         times_s.iter().map(apart).fold(1.0, f64::max)
     }
 

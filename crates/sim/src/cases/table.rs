@@ -1,12 +1,12 @@
 //! The table of hard cases.
 
-use super::check::Checks;
+use super::check::{Checks, attitude, body_j};
 use super::closed_forms::{Carried, G, adler, follows, grazing_amplitude_m, sinking, turned};
 use super::{Case, Run};
 use crate::random::{Stream, normal};
 use crate::run::Sample;
 use crate::solve::Method;
-use nalgebra::{Complex, Quaternion, UnitQuaternion, Vector3};
+use nalgebra::{Complex, UnitQuaternion, Vector3};
 use std::f64::consts::{PI, TAU};
 
 // Who claims a case.
@@ -59,14 +59,7 @@ fn conserved(run: &Run, c: &mut Checks, part: f64) {
         [i.xx * w[0], i.yy * w[1], i.zz * w[2]]
     };
     let momentum = |s: &Sample| spin(s).iter().map(|x| x * x).sum::<f64>().sqrt();
-    let kinetic = |s: &Sample| {
-        let sum: f64 = spin(s)
-            .iter()
-            .zip(s.pose.spin_rad_per_s)
-            .map(|(l, w)| l * w)
-            .sum();
-        0.5 * sum
-    };
+    let kinetic = |s: &Sample| body_j(run, s)[0];
     let (e0, l0) = (kinetic(&run.samples[0]), momentum(&run.samples[0]));
     c.every("kinetic energy", &run.samples, part, |s| {
         (kinetic(s) / e0, 1.0)
@@ -75,20 +68,7 @@ fn conserved(run: &Run, c: &mut Checks, part: f64) {
         (momentum(s) / l0, 1.0)
     });
     // Its direction in the world stays too: R·L of the body.
-    let world = |s: &Sample| {
-        let [x, y, z, w] = s.pose.orientation;
-        let l = spin(s);
-        let cross = |a: [f64; 3], b: [f64; 3]| {
-            [
-                a[1] * b[2] - a[2] * b[1],
-                a[2] * b[0] - a[0] * b[2],
-                a[0] * b[1] - a[1] * b[0],
-            ]
-        };
-        let t = cross([x, y, z], l).map(|v| 2.0 * v);
-        let u = cross([x, y, z], t);
-        [0, 1, 2].map(|a| l[a] + w * t[a] + u[a])
-    };
+    let world = |s: &Sample| attitude(s) * Vector3::from(spin(s));
     let start = world(&run.samples[0]);
     for a in 0..3 {
         c.every("angular momentum in the world", &run.samples, part, |s| {
@@ -116,11 +96,8 @@ fn rests(run: &Run, c: &mut Checks) {
 
 /// By what angle a sample's orientation is off, rad.
 fn turned_off(s: &Sample, truth: UnitQuaternion<f64>) -> f64 {
-    let [x, y, z, w] = s.pose.orientation;
     // Twice the vector part, since the scalar part hides an angle in its square.
-    2.0 * (truth.inverse().into_inner() * Quaternion::new(w, x, y, z))
-        .imag()
-        .norm()
+    2.0 * (truth.inverse() * attitude(s)).imag().norm()
 }
 
 /// A pair of phases obeys Adler's equation: every sample's `of` against d(t) from d₀ = 0.
@@ -469,8 +446,7 @@ pub const CASES: &[Case] = &[
         |r, c| {
             c.ledger(r, 1e-8);
             for s in &r.samples {
-                let [x, y, z, w] = s.pose.orientation;
-                let turn = UnitQuaternion::new_unchecked(Quaternion::new(w, x, y, z));
+                let turn = attitude(s);
                 let (v, spin) = (Vector3::from(s.pose.velocity_m_per_s), turn * Vector3::from(s.pose.spin_rad_per_s));
                 for (i, (t, n)) in s.tangential_n.iter().zip(&s.normal_n).enumerate() {
                     c.at_most("friction above μN, N", t[0].hypot(t[1]) - 0.2 * n, 1e-12);
