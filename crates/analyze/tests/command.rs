@@ -31,6 +31,10 @@ fn json(args: &[&str]) -> Value {
 
 /// A minute of a rath that swings at half its drive's frequency: what the phases, forces and angles do is known.
 fn recording(folder: &Path) -> PathBuf {
+    carried_by(2, folder)
+}
+
+fn carried_by(carriers: usize, folder: &Path) -> PathBuf {
     let path = folder.join("swing.mcap");
     let mut w = RecordingWriter::create(&path, &WriterOptions::default()).unwrap();
     let metadata = [
@@ -81,14 +85,14 @@ fn recording(folder: &Path) -> PathBuf {
             t_ns,
             &rath::HandleForces {
                 time_s: t,
-                normal_n: vec![n, n],
+                normal_n: vec![n; carriers],
                 ..Default::default()
             },
         )
         .unwrap();
         let message = rath::Phases {
             time_s: t,
-            phase_rad: vec![beat, beat + 0.2],
+            phase_rad: (0..carriers).map(|c| beat + 0.2 * c as f64).collect(),
             beat_phase_rad: (t >= 5.0).then_some(beat),
             ..Default::default()
         };
@@ -393,6 +397,27 @@ fn annotate_keeps_every_message_and_adds_findings() {
         messages(&after, "/findings/events"),
         Some(before["events"].as_array().unwrap().len() as u64)
     );
+}
+
+#[test]
+fn who_walks_alone_gets_no_order_parameter() {
+    let folder = tempfile::tempdir().unwrap();
+    let file = carried_by(1, folder.path());
+    let seen = folder.path().join("seen.mcap");
+    let out = analyze(&[file.to_str().unwrap(), "--annotate", seen.to_str().unwrap()]);
+    assert!(out.status.success(), "{}", text(&out.stderr));
+    let after = json(&[seen.to_str().unwrap(), "--format", "json"]);
+    let names: Vec<&str> = after["recording"]["topics"]
+        .as_array()
+        .unwrap()
+        .iter()
+        .filter_map(|t| t["name"].as_str())
+        .collect();
+    assert!(
+        names.contains(&"/findings/events") && names.contains(&"/carriers/phases"),
+        "{names:?}"
+    );
+    assert!(!names.contains(&"/findings/order_parameter"), "{names:?}");
 }
 
 #[test]

@@ -162,11 +162,14 @@ fn own(a: &Analysis, start_ns: i64) -> Vec<Message> {
         }));
     };
     let phases: Vec<&[f64]> = i.phase_rad.iter().map(|p| &p[..]).collect();
-    series(
-        "/findings/order_parameter",
-        i.phase_times(),
-        &phase::order_parameter(&phases),
-    );
+    // Who walks alone is in step with nobody.
+    if phases.len() > 1 {
+        series(
+            "/findings/order_parameter",
+            i.phase_times(),
+            &phase::order_parameter(&phases),
+        );
+    }
     if let Some(mass_kg) = i.mass_kg {
         let ratio: Vec<f64> = i
             .total_force_n()
