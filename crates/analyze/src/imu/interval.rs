@@ -110,8 +110,8 @@ pub fn metrics(motion: &Motion, window: Window) -> Metrics {
             format!("of what heaves faster than {corner_hz} Hz: an inertial sensor loses a slower course of the height")
         });
         let of_place = (OF_PLACE.contains(name) && !motion.settings.lever_is_known).then(|| "as if the sensor sat at the centre of mass, and the interval knows no better, for nobody says where it sits; give imu_place_m in a roles file".to_owned());
-        let of_rate = (OF_EDGES.contains(name) && rate_hz < ENOUGH_HZ).then(|| {
-            format!("at {rate_hz:.0} Hz touch-downs fall between samples, of which the interval knows a part only; 100 Hz or more are wanted")
+        let of_rate = (OF_EDGES.contains(name) && is_slow(&motion.inputs)).then(|| {
+            format!("at {rate_hz:.0} Hz touch-downs fall between samples, and their overtones onto slower lines; 100 Hz or more are wanted")
         });
         let reasons: Vec<String> = of_height
             .into_iter()
@@ -144,9 +144,14 @@ pub fn metrics(motion: &Motion, window: Window) -> Metrics {
 /// What a sensor off the centre of mass feels otherwise, by its lever.
 const OF_PLACE: &[&str] = &["dz_pp_m", "rms_z_m", "t_float"];
 
-/// What the moments of touch-down decide, and the rate from which samples tell them: at 50 Hz intervals of Δz miss the truth by millimetres.
+/// What the moments of touch-down decide, and the rate from which samples tell them.
 const OF_EDGES: &[&str] = &["dz_pp_m", "t_float"];
 const ENOUGH_HZ: f64 = 90.0;
+
+/// Whether touch-downs fall between samples.
+fn is_slow(inputs: &Inputs) -> bool {
+    super::track::period_s(&inputs.t_s).is_some_and(|s| 1.0 / s < ENOUGH_HZ)
+}
 
 /// What a slow course of the height is part of.
 const OF_COURSE: &[&str] = &["dz_pp_m", "rms_z_m"];
@@ -218,8 +223,8 @@ const OF_HEAVE: &[&str] = &[
 const SEEN: f64 = 5.0;
 
 /// How far an edge of the support is moved by what smooths it, samples: 0.14 on twelve twins at 100 Hz, 0.28 in the worked example of
-/// docs/field.md, 0.2 to 0.5 on four at 50 Hz.
-const EDGE_SAMPLES: f64 = 0.3;
+/// docs/field.md; below [`ENOUGH_HZ`] 0.2 to 0.65 on twenty at 50 Hz.
+const EDGE_SAMPLES: [f64; 2] = [0.3, 0.35];
 
 /// So much of its SD has a wandering of [`WANDER_S`] between 0.2 and 0.4 Hz, as [`slow_course_m`] sees it: ∫ of its spectrum times the difference
 /// of the two gains 1/(1 + (f₀/f)⁴), squared.
@@ -261,7 +266,8 @@ fn beyond_the_budget(name: &str, motion: &Motion, window: Window) -> f64 {
             let (t_s, ratio) = (&inputs.t_s[range.clone()], &inputs.support_ratio[range]);
             let length_s = t_s.len().max(1) as f64 * period_s;
             let edges = 2 * unloadings(t_s, ratio).len();
-            EDGE_SAMPLES * edges as f64 * period_s / length_s
+            let samples = EDGE_SAMPLES[usize::from(is_slow(inputs))];
+            samples * edges as f64 * period_s / length_s
         }
         // The transform has no taper: each line is as high as it falls on a bin of 1/T, and the estimate's T is not the window's. While an end
         // moves through a period, both fall everywhere.
@@ -305,17 +311,26 @@ fn beyond_the_budget(name: &str, motion: &Motion, window: Window) -> f64 {
     }
 }
 
-/// Largest minus smallest of a course below the corner that is as large as what [`slow_course_m`] finds above it beyond the budget's own
-/// wandering, m.
+/// Largest minus smallest of a course below the corner f₀ that is as large as what is found between it and 2f₀ beyond the budget's own wandering, m.
+///
+/// Samples too slow for touch-downs fold a gait's overtones: n f comes out at |n f − f_s|, and weighs in a height as 1/f² does. So all that is
+/// slower than a quarter of a step counts then.
 fn lost_course_m(motion: &Motion, range: Range<usize>) -> f64 {
+    let corner_hz = motion.settings.height_corner_hz;
     let of_budget = ABOVE_CORNER * motion.settings.budget.height_wander_m;
-    let excess = slow_course_m(motion, range).powi(2) - of_budget.powi(2);
+    let step_hz = || metrics_of(&motion.inputs, Window::ALL, |n| n == "peak_hz").number("peak_hz");
+    let quarter_hz = is_slow(&motion.inputs)
+        .then(step_hz)
+        .flatten()
+        .map_or(0.0, |hz| 0.25 * hz);
+    let course_m = slow_course_m(motion, range, quarter_hz.max(2.0 * corner_hz));
+    let excess = course_m.powi(2) - of_budget.powi(2);
     RANGE_OF_WANDER * excess.max(0.0).sqrt()
 }
 
-/// SD of the height between its corner f₀ and 2f₀, m: of what the window knows of it.
-fn slow_course_m(motion: &Motion, range: Range<usize>) -> f64 {
-    let faster = motion.height_m(2.0 * motion.settings.height_corner_hz);
+/// SD of the height between its corner and `to_hz`, m: of what the window knows of it.
+fn slow_course_m(motion: &Motion, range: Range<usize>, to_hz: f64) -> f64 {
+    let faster = motion.height_m(to_hz);
     let both = motion.inputs.height_m[range.clone()]
         .iter()
         .zip(&faster[range]);

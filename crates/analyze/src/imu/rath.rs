@@ -695,6 +695,32 @@ mod tests {
         );
     }
 
+    /// A rattle of 49.5 Hz moves nothing by a micrometre, but at 50 Hz looks like a course of 0.5 Hz.
+    #[test]
+    fn what_folds_onto_a_slow_course_is_less_sure() {
+        let (settings, window) = most();
+        let (mut track, _, height, _) = twin([0.0; 3], UnitQuaternion::identity());
+        for (t, felt) in track.t_s.iter().zip(&mut track.accel_m_per_s2) {
+            felt[2] += 0.05 * (TAU * 49.5 * t).sin();
+        }
+        let mut slow = Track::default();
+        for k in (0..track.len()).step_by(4) {
+            slow.append(track.part(k..k + 1));
+        }
+        let height = &height[window.range(&track.t_s)];
+        let (least, most) =
+            (height.iter()).fold((f64::MAX, f64::MIN), |(a, b), z| (a.min(*z), b.max(*z)));
+        let [fast, slow] = [track, slow].map(|track| {
+            let found = metrics(&motion(&track, &settings).unwrap(), window);
+            let found = found.get("dz_pp_m").unwrap();
+            let [low, high] = found.ci95.unwrap();
+            assert!(low <= most - least && most - least <= high, "{found:?}");
+            (found.as_f64().unwrap() - (most - least), high - low)
+        });
+        assert!(fast.0.abs() < 0.001 && fast.1 < 0.012, "{fast:?}");
+        assert!(slow.0 > 0.005, "{slow:?}");
+    }
+
     /// Most of a twin, whose samples are true at their stamps.
     fn most() -> (Settings, Window) {
         let settings = Settings {
