@@ -241,6 +241,9 @@ mod tests {
             let turns = beat.phase_at(s.t_s) / TAU;
             assert!((turns - turns.round()).abs() < 1e-9, "{s:?}");
             assert!(s.t_s >= 1.0 && !(2.0..3.0).contains(&s.t_s));
+            // Tempo is how fast the phase goes on from there.
+            let turned = (beat.phase_at(s.t_s + 1e-6) - beat.phase_at(s.t_s)) / TAU;
+            assert!((turned * 1e6 - s.tempo_hz).abs() < 1e-5, "{s:?}");
         }
         // 1 s to 2 s: 1.0, 1.5; 3 s to 4 s: 3.0, 3.5; then 5 turns in the ramp, 6 to 8 s, and 2 in the last 2 s.
         assert_eq!(strokes.len(), 2 + 2 + 5 + 6 + 3, "{strokes:?}");

@@ -4,6 +4,7 @@ mod common;
 
 use common::{rates_at_start, readings, samples, scene};
 use sim::model::Model;
+use sim::solve::METHODS;
 use std::f64::consts::{FRAC_PI_2, TAU};
 
 /// Carriers that all mind each other on a graph are the mean field; a chain of three has the links it should have.
@@ -405,6 +406,57 @@ fn val_straps_swing_and_slip() {
                 }
             }
             assert_eq!(all[30].pose.position_m[1] == 0.3, mu == 0.0, "{more}{mu}");
+        }
+    }
+}
+
+/// Handles that hang from ties, not on straps, feel no straps: the load goes straight on, by any method.
+#[test]
+fn straps_of_a_load_that_pulls_are_slack() {
+    for method in METHODS {
+        let mut s = scene(
+            "name = \"hung\"\nduration_s = 3.0\nfreedom = [\"y\"]\n[start]\nheight_m = 1.0\nposition_m = [0.0, 0.3]\nvelocity_m_per_s = [0.0, 0.1, 0.0]\n\
+             [effects.contact]\nbilateral = true\n[effects.sling]",
+        );
+        s.solver.method = method.name.into();
+        for s in samples(&s) {
+            assert!(s.normal_n[0] < 0.0 && s.tangential_n[0] == [0.0; 2]);
+            let off = s.pose.position_m[1] - (0.3 + 0.1 * s.t_s);
+            assert!(off.abs() < 1e-12, "{}: {off:e} m", method.name);
+        }
+    }
+}
+
+/// Who walks sees the same motion as who stands, and carries it along.
+#[test]
+fn a_walk_is_a_galilean_shift() {
+    let with = |walk: &str| {
+        samples(&scene(&format!(
+            "name = \"walk\"\nduration_s = 5.0\n[carriers]\n{walk}initial_phase_rad = [0.0, 1.0]\n[effects.contact]\n[effects.hold]\n[effects.gait]\nsway_m = 0.02"
+        )))
+    };
+    let walk = [0.8, -0.3, 0.1];
+    let shifted = |a: f64, b: f64, by: f64| (b - a - by).abs() < 1e-14 * (1.0 + b.abs());
+    for (a, b) in with("")
+        .iter()
+        .zip(&with(&format!("walk_m_per_s = {walk:?}\n")))
+    {
+        assert_eq!(
+            (&a.normal_n, &a.tangential_n),
+            (&b.normal_n, &b.tangential_n)
+        );
+        assert_eq!(
+            (a.energy, a.pose.orientation),
+            (b.energy, b.pose.orientation)
+        );
+        for (k, v) in walk.into_iter().enumerate() {
+            let (p, q) = (a.pose, b.pose);
+            assert!(shifted(p.position_m[k], q.position_m[k], v * a.t_s));
+            assert!(shifted(p.velocity_m_per_s[k], q.velocity_m_per_s[k], v));
+            for i in 0..2 {
+                assert!(shifted(a.shoulder_m[i][k], b.shoulder_m[i][k], v * a.t_s));
+                assert!(shifted(a.handle_m[i][k], b.handle_m[i][k], v * a.t_s));
+            }
         }
     }
 }

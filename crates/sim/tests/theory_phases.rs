@@ -91,6 +91,8 @@ fn val_two_kuramoto_oscillators_lock() {
         2.0 + difference / TAU
     ));
     let all = samples(&scene);
+    let apart = all[0].order_parameter().unwrap();
+    assert!((apart - 1f64.cos()).abs() < 1e-15, "|1 + e^2i|/2: {apart}");
     let last = all.last().unwrap();
     let lag = last.phase_rad[1] - last.phase_rad[0];
     assert!(

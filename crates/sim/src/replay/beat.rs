@@ -92,6 +92,15 @@ mod tests {
             .filter(|t| !(4.2..6.0).contains(t))
             .collect();
         let music = follow(&Music::default(), &uneven, 0.0, 15.0).unwrap();
+        // Between two that were heard, m beats apart, it is silent but for half a beat at either end.
+        let gap = uneven.windows(2).find(|w| w[1] - w[0] > 1.0).unwrap();
+        let missed = ((gap[1] - gap[0]) / 0.5).round();
+        let half_s = 0.5 * (gap[1] - gap[0]) / missed;
+        let [pause] = music.pauses[..] else {
+            panic!("{:?}", music.pauses)
+        };
+        assert!((pause.from_s - gap[0] - half_s).abs() < 1e-12);
+        assert!((gap[1] - pause.to_s - half_s).abs() < 1e-12);
         let strokes = beat(&music).strokes(15.0);
         let heard: Vec<f64> = uneven
             .into_iter()
