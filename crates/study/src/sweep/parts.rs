@@ -16,8 +16,7 @@ use parquet::errors::ParquetError;
 use recording::read::ends_whole;
 use recording::whole::Sink;
 use sim::record::VERSION;
-use std::error::Error as _;
-use std::io::{BufWriter, Write};
+use std::io::{BufWriter, ErrorKind, Write};
 use std::ops::Range;
 use std::path::{Path, PathBuf};
 use std::sync::atomic::AtomicBool;
@@ -408,8 +407,14 @@ pub fn write_whole(
     }
     recording::whole::write_whole(path, |file| fill(file).map_err(Trouble::Table)).map_err(|t| {
         // Without the temporary name, which is nobody's.
-        let plain =
-            |e: &std::io::Error| e.source().map_or_else(|| e.to_string(), |s| s.to_string());
+        let plain = |e: &std::io::Error| match e.kind() {
+            kind @ (ErrorKind::PermissionDenied | ErrorKind::StorageFull)
+                if e.get_ref().is_some() =>
+            {
+                std::io::Error::from(kind).to_string()
+            }
+            _ => e.to_string(),
+        };
         let why = match &t {
             Trouble::Io(e) => plain(e),
             Trouble::Table(ParquetError::External(e)) => {
