@@ -108,6 +108,9 @@ mod tests {
         assert!((three.ci95.unwrap() - 2.4841).abs() < 1e-3);
         assert!((correlation(&[1.0, 2.0, 3.0], &[6.0, 4.0, 2.0]).unwrap() + 1.0).abs() < 1e-15);
         assert!(correlation(&[1.0, 1.0], &[1.0, 2.0]).is_none());
+        // scipy.stats.pearsonr([1, 2, 4, 7, 8], [2, 1, 5, 6, 11]).statistic
+        let r = correlation(&[1.0, 2.0, 4.0, 7.0, 8.0], &[2.0, 1.0, 5.0, 6.0, 11.0]);
+        assert!((r.unwrap() - 0.916_189_608_780_249_2).abs() < 1e-14);
         // scipy.stats.t.ppf(0.975, n)
         for (n, t) in [
             (1, 12.7062),

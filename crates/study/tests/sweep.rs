@@ -1,9 +1,10 @@
 //! What a study file may ask for, and what its table, summary and folder say.
 
+use std::io::Write;
 use std::path::Path;
 use std::sync::atomic::AtomicBool;
 use study::statistics::about_their_mean;
-use study::sweep::parts::Store;
+use study::sweep::parts::{Store, write_whole};
 use study::sweep::shard::Shard;
 use study::sweep::summary::{Found, Summary};
 use study::sweep::table::Cell;
@@ -52,6 +53,24 @@ fn what_cannot_count_is_refused() {
     }
     assert!(refused("first_seed = 9223372036854775807\nseeds = 2").contains("first_seed"));
     plan("first_seed = 9223372036854775807\nseeds = 1").unwrap();
+}
+
+/// Without the first every point is the same; the second overflows on the way, and the scene was blamed for a NaN that nobody wrote.
+#[test]
+fn a_range_has_an_extent_that_a_number_can_say() {
+    let axis = |ends: &str| format!("axes = [{{ key = \"body.mass_kg\", {ends} }}]");
+    let design = "design = { kind = \"sobol\", points = 4 }";
+    let same = refused(&format!("{design}\n{}", axis("from = 60, to = 60")));
+    assert!(
+        same.contains("axes.0 (`body.mass_kg`)") && same.contains("both 60"),
+        "{same}"
+    );
+    let wide = refused(&axis("from = -1e308, to = 1e308, count = 3"));
+    assert!(
+        wide.contains("`from` -1e308 and `to` 1e308 are further apart"),
+        "{wide}"
+    );
+    plan(&axis("from = 60, to = 60, count = 1")).unwrap();
 }
 
 #[test]
@@ -175,4 +194,30 @@ fn a_recording_that_is_lost_is_made_again_and_another_study_s_table_is_none_of_o
     assert!(store.is_merged());
     let other = plan(&text("rms_roll_deg")).unwrap();
     assert!(!Store::new(&other, folder.path()).is_merged());
+}
+
+/// The file that cannot be written is named, once and by its own name, with what the system says of it.
+#[test]
+fn what_cannot_be_written_is_named_as_it_is() {
+    let folder = tempfile::tempdir().unwrap();
+    let ours = plan("seeds = 1\nset = { duration_s = 1.0, analysis_start_s = 0.0 }").unwrap();
+    let store = Store::new(&ours, folder.path());
+    store.create().unwrap();
+    let stop = AtomicBool::new(false);
+    store.compute(&[0], 1, &stop, || ()).unwrap();
+    let table = store.table();
+    std::fs::create_dir(&table).unwrap();
+    assert_eq!(
+        store.merge().unwrap_err(),
+        format!("{}: cannot be written: it is a folder", table.display())
+    );
+    assert!(!folder.path().join("summary.csv").exists());
+    if cfg!(target_os = "linux") {
+        let full = Path::new("/dev/full");
+        let said = write_whole(full, |file| Ok(file.write_all(&[0; 1 << 20])?)).unwrap_err();
+        assert_eq!(
+            said,
+            "/dev/full: cannot be written: No space left on device (os error 28)"
+        );
+    }
 }

@@ -156,11 +156,12 @@ fn progress(runs: u64) -> Result<ProgressBar> {
 
 /// Prints a result; a closed pipe is no error of ours.
 fn print(text: &str) -> Result<()> {
-    match std::io::stdout()
-        .lock()
-        .write_all(recording::text::plain(text).as_bytes())
-    {
-        Err(e) if e.kind() != std::io::ErrorKind::BrokenPipe => Err(e.into()),
+    let mut out = std::io::stdout().lock();
+    let plain = recording::text::plain(text);
+    match out.write_all(plain.as_bytes()).and_then(|()| out.flush()) {
+        Err(e) if e.kind() != std::io::ErrorKind::BrokenPipe => {
+            Err(anyhow::Error::new(e).context("standard output takes no more"))
+        }
         _ => Ok(()),
     }
 }

@@ -1,6 +1,6 @@
 //! What the carriers do: beat, pull, frequencies, amplitudes.
 
-use super::squares::{Block, bootstrapped};
+use super::squares::{Block, bootstrapped, unexplained};
 use super::{BLOCK_S, Estimate, Field, Outcome, budgeted, estimate, unwrapped};
 use analyze::beat::adler::Adler;
 use analyze::imu::budget::Budget;
@@ -155,6 +155,8 @@ struct Normal {
     /// Σ (Σ e_k)² / n over a carrier's increments of [`RUN_S`], n of them; and how many such runs there are.
     run: f64,
     runs: usize,
+    /// Sums for each carrier's √dt·e_k over what comes back with his steps: cos φ, sin φ, cos 2φ, sin 2φ.
+    with_steps: Vec<Block<4>>,
     rows: usize,
 }
 
@@ -181,6 +183,15 @@ impl Normal {
         let spread = (2.0 / runs).sqrt();
         let goes_on = times > self.shared() + 0.5 && times > 1.0 + 5.0 * spread;
         (goes_on || times < 1.0 - 3.0 * spread).then_some(times)
+    }
+
+    /// Share of what one carrier's increments miss that comes back with his steps, where that is no chance: white noise gives n of them
+    /// n times that share as χ² of four degrees of freedom.
+    fn comes_back_with_steps(&self) -> Option<f64> {
+        let rows = (self.rows / self.with_steps.len().max(1)) as f64;
+        let told = |block: &Block<4>| Some(1.0 - unexplained(std::slice::from_ref(block))?);
+        let most = self.with_steps.iter().filter_map(told).fold(0.0, f64::max);
+        (most * rows > BY_CHANCE && most > OF_STEPS).then_some(most)
     }
 
     /// By how much what neighbours share makes noise over a long time stronger than over one increment: where the recorder's clock is not the noise's,
@@ -224,6 +235,10 @@ impl Normal {
 
 /// What is missed over so long shows whether anything but noise is, s.
 const RUN_S: f64 = 1.0;
+/// Share of the noise that may come back with the steps: no more than moves its strength by a twentieth.
+const OF_STEPS: f64 = 0.1;
+/// A χ² of four degrees of freedom that chance reaches once in 10⁹.
+const BY_CHANCE: f64 = 48.0;
 /// Likeness of neighbouring residuals that white noise does not show.
 const ALIKE: f64 = 0.2;
 /// A pull or a coupling that is not so many standard errors is none: the best of many frequencies has some by chance.
@@ -300,6 +315,7 @@ impl Increments {
             kept_even: 0.0,
             run: 0.0,
             runs: 0,
+            with_steps: vec![Block::empty(); self.phases.len()],
             with_next: 0.0,
             rows: 0,
         };
@@ -360,6 +376,9 @@ impl Increments {
                     out.with_next += before[c] * dt.sqrt() * miss;
                     before[c] = dt.sqrt() * miss;
                     runs[c] = (runs[c].0 + before[c], runs[c].1 + 1.0);
+                    let middle = 0.5 * (begun[c] + expected[c]);
+                    let ((s1, c1), (s2, c2)) = (middle.sin_cos(), (2.0 * middle).sin_cos());
+                    out.with_steps[c].add([c1, s1, c2, s2], before[c]);
                     let taken = taken_back(back * dt);
                     out.kept_white += taken[0];
                     out.kept_even += taken[1];
@@ -518,6 +537,13 @@ impl Increments {
         if let Some(times) = no_noise.filter(|_| !found.misses_nothing(step_s, pull)) {
             return Err(format!(
                 "carriers do more than follow a beat and mind each other: what that leaves is {times:.1} times what noise would be over a second"
+            ));
+        }
+        let with_steps = found.comes_back_with_steps();
+        if let Some(share) = with_steps.filter(|_| !found.misses_nothing(step_s, pull)) {
+            return Err(format!(
+                "carriers do more than follow a beat and mind each other: {:.0} % of what that leaves comes back with their steps",
+                100.0 * share
             ));
         }
         // What the mean of both ends of an increment is off, where a carrier runs at another rate than the beat.

@@ -16,7 +16,7 @@ use parquet::errors::ParquetError;
 use recording::read::ends_whole;
 use recording::whole::Sink;
 use sim::record::VERSION;
-use std::io::{BufWriter, Write};
+use std::io::{BufWriter, ErrorKind, Write};
 use std::ops::Range;
 use std::path::{Path, PathBuf};
 use std::sync::atomic::AtomicBool;
@@ -330,18 +330,18 @@ impl<'p> Store<'p> {
             ));
         }
         let mut found = Err("nothing was merged".to_owned());
-        let mut damaged = None;
+        let mut said = None;
         let written = write_whole(&self.folder.join("summary.csv"), |csv| {
             let mut summary = Summary::new(self.plan, BufWriter::new(csv))?;
             write_whole(&self.table(), |file| {
-                self.merge_into(file, &mut summary, &mut damaged)
+                self.merge_into(file, &mut summary, &mut said)
             })
-            .map_err(ParquetError::General)?;
+            .map_err(|why| ParquetError::General(said.get_or_insert(why).clone()))?;
             found = Ok(summary.finish()?);
             Ok(())
         });
-        match damaged {
-            Some(part) => Err(part),
+        match said {
+            Some(why) => Err(why),
             None => written.and(found),
         }
     }
@@ -406,8 +406,21 @@ pub fn write_whole(
         }
     }
     recording::whole::write_whole(path, |file| fill(file).map_err(Trouble::Table)).map_err(|t| {
-        let why = match t {
-            Trouble::Io(e) => e.to_string(),
+        // Without the temporary name, which is nobody's.
+        let plain = |e: &std::io::Error| match e.kind() {
+            kind @ (ErrorKind::PermissionDenied | ErrorKind::StorageFull)
+                if e.get_ref().is_some() =>
+            {
+                std::io::Error::from(kind).to_string()
+            }
+            _ => e.to_string(),
+        };
+        let why = match &t {
+            Trouble::Io(e) => plain(e),
+            Trouble::Table(ParquetError::External(e)) => {
+                let io = e.downcast_ref::<std::io::Error>();
+                io.map_or_else(|| e.to_string(), plain)
+            }
             Trouble::Table(e) => e.to_string(),
         };
         format!("{}: cannot be written: {why}", path.display())

@@ -291,6 +291,16 @@ fn check_axis(axis: &Axis) -> Result<(), String> {
             if !(from.is_finite() && to.is_finite()) {
                 return Err("`from` and `to` must be finite".into());
             }
+            if !(to - from).is_finite() {
+                return Err(format!(
+                    "`from` {from:e} and `to` {to:e} are further apart than a number can say; bring them nearer"
+                ));
+            }
+            if axis.count.is_none() && from == to {
+                return Err(format!(
+                    "`from` and `to` are both {from}, and every point would be the same; give a range, or put the key into [set]"
+                ));
+            }
             if axis.spacing == Spacing::Log && !(from > 0.0 && to > 0.0) {
                 return Err("equal factors need `from` and `to` above zero".into());
             }
