@@ -1,6 +1,5 @@
 //! `view`: opens a recording in the Rerun viewer, or writes what it would show.
 
-use std::fs::File;
 use std::io::{BufWriter, Chain, Cursor, Read, Stdin, Write};
 use std::net::{TcpStream, ToSocketAddrs};
 use std::path::{Path, PathBuf};
@@ -123,19 +122,27 @@ fn name(file: &Path) -> String {
     )
 }
 
+/// An input that is a recording. What is wrong with it is said before what is wrong with a viewer.
+enum Input {
+    /// A file.
+    Whole(Box<Recording>),
+    /// Coming through standard input; its beginning has been read.
+    Growing(Chain<Cursor<Vec<u8>>, Stdin>),
+}
+
 /// What is to be shown, found good before anything is opened for it.
 enum Source {
     /// Read from a file, with its id.
     Whole(Box<Take>, String, Vec<Finding>),
-    /// Coming through standard input; its beginning has been read.
+    /// Coming through standard input.
     Growing(Chain<Cursor<Vec<u8>>, Stdin>),
 }
 
 /// Bytes by which an MCAP is known.
 const MAGIC_BYTES: u64 = 8;
 
-/// Reads a file, or the beginning of standard input.
-fn source(file: &Path) -> anyhow::Result<Source> {
+/// Opens a file, or reads the beginning of standard input.
+fn input(file: &Path) -> anyhow::Result<Input> {
     if is_stdin(file) {
         let mut begin = Vec::new();
         std::io::stdin()
@@ -148,9 +155,17 @@ fn source(file: &Path) -> anyhow::Result<Source> {
             Err(error) if begin.is_empty() => return Err(error.into()),
             _ => {}
         }
-        return Ok(Source::Growing(Cursor::new(begin).chain(std::io::stdin())));
+        return Ok(Input::Growing(Cursor::new(begin).chain(std::io::stdin())));
     }
-    let recording = open(file)?;
+    Ok(Input::Whole(Box::new(open(file)?)))
+}
+
+/// Reads a file.
+fn source(file: &Path, input: Input) -> anyhow::Result<Source> {
+    let recording = match input {
+        Input::Whole(recording) => recording,
+        Input::Growing(input) => return Ok(Source::Growing(input)),
+    };
     let (take, findings) = load(&name(file), &recording, Detail::Thinned)?;
     check(file, &take, &findings)?;
     let id = view::recording_id(&take.name, recording.info());
@@ -172,7 +187,7 @@ fn send(file: &Path, source: Source, sink: &mut dyn Sink) -> anyhow::Result<Vec<
     }
 }
 
-/// A recording without any number has nothing to look at; what was lost of it may be why.
+/// A recording without any number has nothing to look at; what the reader found odd may be why.
 fn check(file: &Path, take: &Take, findings: &[Finding]) -> anyhow::Result<()> {
     let nothing = take.state_ns.is_empty()
         && take.force_ns.is_empty()
@@ -182,9 +197,10 @@ fn check(file: &Path, take: &Take, findings: &[Finding]) -> anyhow::Result<()> {
         && take.topics.is_empty();
     if nothing {
         let lost = findings.iter().find(|f| f.kind.is_loss());
-        let lost = lost.map_or(String::new(), |f| format!(". And {f}"));
+        let why = lost.or(findings.first());
+        let why = why.map_or(String::new(), |f| format!(". And {f}"));
         bail!(
-            "{}: has no signal that can be shown; expected numbers in protobuf, CDR, ROS 1 or JSON messages, more than one of a topic (`analyze` lists what is in it){lost}",
+            "{}: has no signal that can be shown; expected numbers in protobuf, CDR, ROS 1 or JSON messages of more than one moment (`analyze` lists what is in it){why}",
             name(file)
         );
     }
@@ -217,11 +233,12 @@ fn connect(file: &Path, url: &str) -> anyhow::Result<Vec<Finding>> {
     let parsed = url
         .parse()
         .map_err(|error| anyhow!("--connect: {url:?} is no address of Rerun ({error}); expected one such as rerun+http://127.0.0.1:9876/proxy"))?;
+    let input = input(file)?;
     let mut client = re_grpc_client::write::Client::new(
         answering(parsed, url)?,
         re_grpc_client::write::Options::default(),
     );
-    let findings = send(file, source(file)?, &mut client)?;
+    let findings = send(file, source(file, input)?, &mut client)?;
     client
         .flush_blocking(Duration::from_secs(20))
         .map_err(|error| {
@@ -250,13 +267,10 @@ fn answering(uri: re_uri::ProxyUri, url: &str) -> anyhow::Result<re_uri::ProxyUr
 
 /// Starts the viewer, sends the recording into it and waits until it is closed.
 fn show(file: &Path, kind: Kind) -> anyhow::Result<Vec<Finding>> {
-    if !is_stdin(file) {
-        // What is wrong with the file is said before what is wrong with the viewer.
-        File::open(file).map_err(|error| anyhow!("{}: cannot be read: {error}", file.display()))?;
-    }
+    let input = input(file)?;
     let program = viewer::find()?;
     // What cannot be read should not open a window first.
-    let source = source(file)?;
+    let source = source(file, input)?;
     let (mut child, stdin) = viewer::start(&program, kind)?;
     let sent = Encoded::stream(BufWriter::with_capacity(1 << 16, stdin)).and_then(|mut encoded| {
         let findings = send(file, source, &mut encoded)?;

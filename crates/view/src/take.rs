@@ -102,13 +102,12 @@ pub struct Curve {
 }
 
 impl Curve {
-    /// Whether there is more than one point: one makes no curve.
+    /// Whether there are points at more than one moment: one makes no curve.
     pub fn has_two(&self) -> bool {
-        self.values
-            .iter()
-            .filter(|x| x.is_finite())
-            .nth(1)
-            .is_some()
+        let points = self.times_ns.iter().zip(&self.values);
+        let mut moments = points.filter(|(_, x)| x.is_finite()).map(|(t, _)| t);
+        let first = moments.next();
+        moments.any(|t| Some(t) != first)
     }
 }
 

@@ -94,10 +94,16 @@ impl Thin {
         self.high = (0, f64::NEG_INFINITY);
     }
 
-    /// What was kept.
+    /// What was kept, in order of time: messages may overtake each other.
     pub fn finish(mut self) -> Curve {
         self.flush();
-        self.out
+        let mut out = self.out;
+        if !out.times_ns.is_sorted() {
+            let mut points: Vec<(i64, f64)> = out.times_ns.into_iter().zip(out.values).collect();
+            points.sort_by_key(|(t, _)| *t);
+            (out.times_ns, out.values) = points.into_iter().unzip();
+        }
+        out
     }
 }
 
@@ -159,6 +165,16 @@ mod tests {
         for piece in [1, 13, 999] {
             assert_eq!(thinned(&values, 100, piece).values, whole.values);
         }
+    }
+
+    #[test]
+    fn points_are_in_order_of_time_whatever_the_order_of_messages() {
+        let mut thin = Thin::new("x", 0, 100, 5, 10);
+        thin.push(&[0, 20, 10], &[0.0, 2.0, 1.0]);
+        thin.push(&[40, 30], &[4.0, 3.0]);
+        let curve = thin.finish();
+        assert_eq!(curve.times_ns, [0, 10, 20, 30, 40]);
+        assert_eq!(curve.values, [0.0, 1.0, 2.0, 3.0, 4.0]);
     }
 
     #[test]

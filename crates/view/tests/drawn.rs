@@ -4,8 +4,10 @@ mod common;
 
 use common::{ROWS, imus, imus_logged, run, run_logged, taken};
 use recording::cdr::Imu;
+use recording::read::{ReadOptions, Recording};
 use recording::topics::MessageKind;
-use recording::write::{RecordingWriter, WriterOptions};
+use recording::write::{RawChannel, RecordingWriter, WriterOptions};
+use view::load::{Detail, load};
 
 #[test]
 fn a_run_of_two_shows_everything() {
@@ -142,11 +144,11 @@ fn sensors_alone_show_sensors_alone() {
     );
 }
 
-/// A sensor without a rate has no attitude and no spectra; what it measured may still be drawn.
+/// A sensor without a rate has no attitude, no spectra, and no curve over a time that does not pass: that is said.
 #[test]
 fn a_sensor_of_one_moment_is_no_sensor() {
     let folder = tempfile::tempdir().unwrap();
-    for (messages, rows) in [(1, None), (300, Some(&300))] {
+    for messages in [1, 300] {
         let path = folder.path().join("imu.mcap");
         let mut writer = RecordingWriter::create(&path, &WriterOptions::default()).unwrap();
         let channel = writer.channel("/imu/s0", MessageKind::Imu).unwrap();
@@ -163,7 +165,16 @@ fn a_sensor_of_one_moment_is_no_sensor() {
         );
         let drawn = sent.rows();
         let curve = drawn.iter().find(|(e, _)| e.starts_with("/topics/imu/s0/"));
-        assert_eq!(curve.map(|(_, rows)| rows), rows, "{drawn:?}");
+        assert_eq!(curve, None, "{drawn:?}");
+        let recording = Recording::open(&path, &ReadOptions::default()).unwrap();
+        let (take, _) = load("imu", &recording, Detail::Thinned).unwrap();
+        let said = |note: &String| note.contains("/imu/s0: all 300 messages are of one moment");
+        assert_eq!(
+            take.notes.iter().any(said),
+            messages > 1,
+            "{:?}",
+            take.notes
+        );
     }
 }
 
@@ -263,4 +274,73 @@ fn a_sensor_without_a_rate_is_named_too() {
     let (_, titles) = taken(&path);
     let named = |title: &String| title.starts_with("/imu/s0 specific force");
     assert!(titles.iter().any(named), "{titles:?}");
+}
+
+#[test]
+fn values_that_are_none_are_counted() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("arm.mcap");
+    let mut writer = RecordingWriter::create(&path, &WriterOptions::default()).unwrap();
+    let channel = writer
+        .raw_channel(&RawChannel {
+            topic: "/arm",
+            message_encoding: "json",
+            schema_name: "",
+            schema_encoding: "",
+            schema_data: b"",
+            metadata: &Default::default(),
+        })
+        .unwrap();
+    for k in 0..1000 {
+        let x = if (300..340).contains(&k) {
+            "NaN"
+        } else {
+            "1.5"
+        };
+        let message = format!("{{\"x\": {x}}}");
+        writer
+            .message(channel, k * 10_000_000, message.as_bytes())
+            .unwrap();
+    }
+    writer.finish().unwrap();
+    let recording = Recording::open(&path, &ReadOptions::default()).unwrap();
+    let (take, _) = load("arm", &recording, Detail::Thinned).unwrap();
+    let expected = (
+        Some(3.0),
+        "/arm: 40 values of x are NaN or infinite, first at 3.000 s".to_owned(),
+    );
+    assert_eq!(take.remarks, [expected]);
+}
+
+/// Every other pair of messages is written in the wrong order, in bursts; the sine of 2 Hz that was measured is drawn.
+#[test]
+fn messages_that_overtake_each_other_are_drawn_when_they_were_taken() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("imu.mcap");
+    let mut writer = RecordingWriter::create(&path, &WriterOptions::default()).unwrap();
+    let channel = writer.channel("/imu/s0", MessageKind::Imu).unwrap();
+    let sine = |t_ns: i64| 0.2 * (std::f64::consts::TAU * 2.0 * t_ns as f64 / 1e9).sin();
+    for k in 0..3000 {
+        let taken_ns = (if k % 4 < 2 { k ^ 1 } else { k }) * 10_000_000;
+        let imu = Imu::raw(
+            taken_ns,
+            "imu",
+            [sine(taken_ns), 0.0, 0.0],
+            [0.0, 0.0, 9.81],
+        );
+        writer
+            .message(channel, in_bursts(k * 10_000_000), &imu)
+            .unwrap();
+    }
+    writer.finish().unwrap();
+    let (sent, _) = taken(&path);
+    let rate = sent.scalars("/topics/imu/s0/gyro/x");
+    assert_eq!(rate.len(), 3000);
+    for (k, (t_ns, x)) in rate.iter().enumerate() {
+        assert!(
+            (t_ns - rate[0].0 - k as i64 * 10_000_000).abs() < 2_000,
+            "{k}"
+        );
+        assert!((x - sine(k as i64 * 10_000_000)).abs() < 1e-12, "{k}: {x}");
+    }
 }

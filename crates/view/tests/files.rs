@@ -98,6 +98,18 @@ fn without_a_viewer_the_install_command_is_given() {
     assert_eq!(output.status.code(), Some(1));
     assert!(said.contains(view::viewer::INSTALL), "{said}");
     assert_eq!(said.trim_end().lines().count(), 1, "{said}");
+    // What is wrong with the recording is said first.
+    std::fs::write(&path, b"this is no recording").unwrap();
+    for more in [&[][..], &["--connect", "rerun+http://127.0.0.1:1/proxy"]] {
+        let output = Command::new(env!("CARGO_BIN_EXE_view"))
+            .arg(&path)
+            .args(more)
+            .env("PATH", folder.path())
+            .output()
+            .unwrap();
+        let said = String::from_utf8_lossy(&output.stderr).into_owned();
+        assert!(said.contains("is not an MCAP recording"), "{said}");
+    }
 }
 
 #[test]

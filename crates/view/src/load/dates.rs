@@ -19,7 +19,7 @@ pub struct Dates {
 
 #[derive(Debug)]
 struct Dated {
-    /// Of every message in the order of the file, ns; ascending.
+    /// Of every message in the order of the file, ns; not ascending where messages overtake each other.
     times_ns: Vec<i64>,
     /// Those asked for so far.
     asked: usize,
@@ -109,13 +109,9 @@ pub fn collect(
         let Some((_, text)) = (axis.remarks.iter()).find(|(kind, _)| is_redated(kind)) else {
             continue;
         };
-        if axis.rows.is_sorted() {
-            dates.notes.push(remark(&name, text));
-            let times_ns = by_message(marks.len(), &axis.rows, &times_ns);
-            dates.topics.insert(name, Dated { times_ns, asked: 0 });
-        } else if !plan.is_ours(&name) {
-            dates.notes.push(format!("{name}: messages overtake each other; its own curves are drawn at the times of the log"));
-        }
+        dates.notes.push(remark(&name, text));
+        let times_ns = by_message(marks.len(), &axis.rows, &times_ns);
+        dates.topics.insert(name, Dated { times_ns, asked: 0 });
     }
     Ok((signals, dates, findings))
 }
@@ -127,12 +123,13 @@ fn is_redated(kind: &str) -> bool {
 
 /// Times by message; one without is where the one before it is, or at the first.
 fn by_message(count: usize, rows: &[usize], times_ns: &[i64]) -> Vec<i64> {
+    let mut known = vec![None; count];
+    for (row, t) in rows.iter().zip(times_ns) {
+        known[*row] = Some(*t);
+    }
     let mut last = times_ns.first().copied().unwrap_or(0);
-    let mut known = rows.iter().zip(times_ns).peekable();
-    let each = (0..count).map(|row| {
-        if let Some((_, t)) = known.next_if(|(known, _)| **known == row) {
-            last = *t;
-        }
+    let each = known.into_iter().map(|t| {
+        last = t.unwrap_or(last);
         last
     });
     each.collect()

@@ -13,7 +13,7 @@ use std::collections::BTreeMap;
 use analyze::examine::{Request, examine};
 use recording::read::{Info, ReadError, Recording};
 use recording::signal::{Signal, field_of};
-use recording::{Finding, topics};
+use recording::{Finding, Kind, topics};
 
 use crate::take::Take;
 
@@ -51,7 +51,7 @@ pub fn load(
         examined(&mut take, recording)?;
     } else {
         take.notes.push(format!(
-            "{} messages: curves and spectra only, at the times of the log; no metrics.",
+            "{} messages: curves and spectra only, at the times of the log; `analyze` computes the metrics.",
             info.messages
         ));
     }
@@ -76,6 +76,13 @@ pub fn load(
         &mut dates,
         &mut findings,
     )?;
+    // What `analyze` did not look at has its oddities too; holes are seen in the curves.
+    for found in findings.iter().filter(|f| f.kind != Kind::Gap) {
+        let remark = (found.t_s, remark(&found.topic, &found.text));
+        if !take.remarks.contains(&remark) {
+            take.remarks.push(remark);
+        }
+    }
     Ok((take, findings))
 }
 

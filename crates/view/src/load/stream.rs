@@ -135,6 +135,18 @@ pub fn others(
             findings.push(finding);
         }
     }
+    for (topic, times) in &times {
+        if let Some((first_ns, last_ns)) = times.ends_ns()
+            && first_ns == last_ns
+            && times.count() > 1
+        {
+            take.notes.push(format!(
+                "{topic}: all {} messages are of one moment, {:.3} s: no curve can be drawn.",
+                times.count(),
+                recording::signal::seconds_since(&[first_ns], start_ns)[0]
+            ));
+        }
+    }
     take.imus = sensors
         .into_iter()
         .map(|(topic, sensor)| sensor.finish(topic, &times[topic]))
