@@ -150,6 +150,21 @@ fn bad_input_gets_one_sentence_and_leaves_nothing() {
             None,
             "no/such/folder/x.mcap",
         ),
+        (
+            &["drum", "mine.toml", "--out", "mine.toml"],
+            Some("name = \"x\"\n[effects.music]\n"),
+            "mine.toml: is named twice",
+        ),
+        (
+            &["replay", "-"],
+            None,
+            "-: a replay does not read standard input",
+        ),
+        (
+            &["accuracy", "mine.toml", "--out", "mine.toml"],
+            Some("name = \"x\"\n[effects.music]\n"),
+            "cannot make the folder mine.toml",
+        ),
     ];
     for (args, text, expected) in cases {
         if let Some(text) = text {

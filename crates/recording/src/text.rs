@@ -1,7 +1,7 @@
 //! Small texts: scenes, studies, roles, layouts.
 
 use std::fs::File;
-use std::io::{Error, ErrorKind, Read, Result};
+use std::io::{Error, ErrorKind, Read, Result, Write};
 use std::path::Path;
 
 /// A line on standard error, for people. It need not be heard: where nothing can be written it is left out.
@@ -19,6 +19,21 @@ pub fn plain(text: &str) -> std::borrow::Cow<'_, str> {
     match text.contains(commands) {
         true => text.replace(commands, "\u{fffd}").into(),
         false => text.into(),
+    }
+}
+
+/// A result on standard output, [`plain`]; a reader that went away early (`… | head -1`) is no error.
+///
+/// # Errors
+/// What standard output says where it takes no more.
+pub fn print(text: &str) -> Result<()> {
+    let mut out = std::io::stdout().lock();
+    match (out.write_all(plain(text).as_bytes())).and_then(|()| out.flush()) {
+        Err(e) if e.kind() != ErrorKind::BrokenPipe => Err(Error::new(
+            e.kind(),
+            format!("standard output takes no more: {e}"),
+        )),
+        _ => Ok(()),
     }
 }
 

@@ -177,18 +177,8 @@ fn complain(error: &anyhow::Error) {
     }
 }
 
-/// Writes the result to standard output; a reader that went away early is no error.
 fn print(text: &str) -> anyhow::Result<()> {
-    let mut out = std::io::stdout().lock();
-    match out
-        .write_all(plain(text).as_bytes())
-        .and_then(|()| out.flush())
-    {
-        Err(e) if e.kind() != std::io::ErrorKind::BrokenPipe => {
-            Err(anyhow::Error::new(e).context("standard output takes no more"))
-        }
-        _ => Ok(()),
-    }
+    Ok(recording::text::print(text)?)
 }
 
 #[cfg(test)]

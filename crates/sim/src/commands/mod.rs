@@ -9,7 +9,6 @@ mod scenes;
 
 use clap::{Subcommand, ValueEnum};
 use serde_json::{Value, json};
-use std::io::Write;
 use std::process::ExitCode;
 
 /// What `sim` can do.
@@ -84,15 +83,8 @@ pub fn run(command: Command) -> ExitCode {
     }
 }
 
-/// Prints a result; a pipe that was closed early (`sim scenes | head -1`) is no error of ours.
 fn print(text: &str) -> anyhow::Result<()> {
-    match std::io::stdout()
-        .lock()
-        .write_all(recording::text::plain(text).as_bytes())
-    {
-        Err(e) if e.kind() != std::io::ErrorKind::BrokenPipe => Err(e.into()),
-        _ => Ok(()),
-    }
+    Ok(recording::text::print(text)?)
 }
 
 /// A number as JSON has it: null where it is none.

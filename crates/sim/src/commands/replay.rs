@@ -14,7 +14,7 @@ use sim::scene::load;
 use sim::sensors::Reading;
 use sim::solve::Stopped;
 use std::collections::{BTreeMap, VecDeque};
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 /// Arguments of `sim replay`.
 #[derive(clap::Args)]
@@ -92,6 +92,9 @@ pub enum Input {
 
 /// Replays, records, compares.
 pub fn run(args: &Args) -> Result<Input> {
+    if args.file == Path::new("-") {
+        bail!("-: a replay does not read standard input; expected the path of a recording");
+    }
     let scene = load(&args.scene, &args.set)?;
     let recording = Recording::open(&args.file, &ReadOptions::default())?;
     let name = args.file.display().to_string();
@@ -140,7 +143,8 @@ pub fn run(args: &Args) -> Result<Input> {
         PathBuf::from(format!("{stem}-replay.mcap"))
     });
     super::is_file(&out)?;
-    apart([out.as_path()], [args.file.as_path()]).map_err(anyhow::Error::msg)?;
+    let inputs = [args.file.as_path(), Path::new(&args.scene)];
+    apart([out.as_path()], inputs).map_err(anyhow::Error::msg)?;
     let model = Model::new(&replay.scene);
     let writer = RecordingWriter::create(&out, &WriterOptions::beside())?;
     let mut recorder = Recorder::at(&model, writer, replay.epoch_ns)?;

@@ -154,16 +154,8 @@ fn progress(runs: u64) -> Result<ProgressBar> {
     Ok(bar)
 }
 
-/// Prints a result; a closed pipe is no error of ours.
 fn print(text: &str) -> Result<()> {
-    let mut out = std::io::stdout().lock();
-    let plain = recording::text::plain(text);
-    match out.write_all(plain.as_bytes()).and_then(|()| out.flush()) {
-        Err(e) if e.kind() != std::io::ErrorKind::BrokenPipe => {
-            Err(anyhow::Error::new(e).context("standard output takes no more"))
-        }
-        _ => Ok(()),
-    }
+    Ok(recording::text::print(text)?)
 }
 
 /// Writes a file whole or not at all.

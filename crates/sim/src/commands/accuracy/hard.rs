@@ -1,12 +1,11 @@
 //! `sim accuracy --hard`: every hard case, by every method that claims it.
 
-use super::Watch;
+use super::{Watch, print};
 use anyhow::{Result, bail};
 use serde_json::{Value, json};
 use sim::cases::{CASES, Verdict, run_all};
 use sim::solve::METHODS;
 use std::fmt::Write as _;
-use std::io::Write as _;
 use std::sync::Mutex;
 
 /// Runs and prints the table; an error when a case does not hold.
@@ -27,7 +26,7 @@ pub fn run(as_json: bool) -> Result<()> {
     } else {
         table(&rows)
     };
-    std::io::stdout().lock().write_all(text.as_bytes())?;
+    print(&text)?;
     let verdicts = rows.iter().flatten().flatten();
     match verdicts.filter(|v| v.broken.is_some()).count() {
         0 => Ok(()),

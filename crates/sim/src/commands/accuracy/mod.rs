@@ -3,7 +3,7 @@
 mod figure;
 mod hard;
 
-use super::{Format, number, setting};
+use super::{Format, number, print, setting};
 use anyhow::{Context, Result, anyhow};
 use indicatif::{ProgressBar, ProgressStyle};
 use recording::whole::write_whole;
@@ -52,6 +52,11 @@ pub fn run(args: &Args) -> Result<()> {
         return hard::run(args.format == Format::Json);
     }
     let scene = load(&args.scene, &args.set)?;
+    // A folder that cannot be is said before minutes are spent.
+    if let Some(folder) = &args.out {
+        std::fs::create_dir_all(folder)
+            .with_context(|| format!("cannot make the folder {}", folder.display()))?;
+    }
     let mut watch = Watch::new();
     let study = study(&scene, args.repeats.into(), |done, total, what| {
         watch.look(done, total, what);
@@ -63,8 +68,6 @@ pub fn run(args: &Args) -> Result<()> {
         serde_json::to_string_pretty(&to_json(&study))? + "\n",
     );
     if let Some(folder) = &args.out {
-        std::fs::create_dir_all(folder)
-            .with_context(|| format!("cannot make the folder {}", folder.display()))?;
         for (name, text) in [
             ("table.txt", &table),
             ("accuracy.json", &json),
@@ -81,7 +84,7 @@ pub fn run(args: &Args) -> Result<()> {
     } else {
         &table
     };
-    Ok(std::io::stdout().lock().write_all(text.as_bytes())?)
+    print(text)
 }
 
 /// Progress on stderr, from the second second on; indicatif shows it on a terminal only.
