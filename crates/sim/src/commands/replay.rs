@@ -58,8 +58,8 @@ enum What {
     Beat,
 }
 
-const HELP: &str = "What drives is read from /carriers/phases, /tf and /beat. A field recording, in which the carriers wore inertial
-sensors, gets its phases and the body's measured motion from `analyze`, which writes them as /findings/phases and
+const HELP: &str = "What drives is read from /carriers/phases, /tf and /beat. A field recording, in which the carriers wore inertial \
+sensors, gets its phases and the body's measured motion from `analyze`, which writes them as /findings/phases and \
 /findings/state; they are used where the other topics are missing:
 
   analyze field.mcap --one-clock --annotate found.mcap
@@ -67,9 +67,9 @@ sensors, gets its phases and the body's measured motion from `analyze`, which wr
 
 (without --one-clock where every device stamps by its own clock).
 
-OUT holds the model's motion on the usual topics and the measured one on /measured/rath/state, /measured/carriers/phases,
-/measured/handles/forces and /measured/beat, all with the recording's stamps. Times that the scene itself names (onsets,
-turns) count from where the replay begins. SCENE's frequency_spread, coupling, noise and feedback are off
+OUT holds the model's motion on the usual topics and the measured one on /measured/rath/state, /measured/carriers/phases, \
+/measured/handles/forces and /measured/beat, all with the recording's stamps. Times that the scene itself names (onsets, \
+turns) count from where the replay begins. SCENE's frequency_spread, coupling, noise and feedback are off \
 where phases or shoulders drive; the attached scene.toml is complete, and `sim record` runs it again.
 
 Share is the SD of the difference over that of the measured motion: 0 is the same motion, 1 a model that does not move.

@@ -37,7 +37,7 @@ const EXAMPLES: &str = "Examples:
   study fit archive/music/seed_*/logs.npz
   study fit field.mcap --scene rath.toml --format json
 
-A field recording (inertial sensors on the rath and on every carrier, stamped by one clock) gives the beat, amplitudes and, where all
+A field recording (inertial sensors on the rath and on every carrier, stamped by one clock) gives the beat, amplitudes and, where all \
 handles carry for long enough, stiffness and damping; it may have come through `analyze FILE --annotate OUT.mcap` or not.";
 
 /// Fits every file, and says what they have in common.

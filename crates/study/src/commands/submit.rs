@@ -43,7 +43,8 @@ const EXAMPLES: &str = "Examples:
   study submit tongue.toml --tasks 8
   study submit tongue.toml --tasks 64 --cpus 4 --out /shared/tongue -- --partition=long
   study submit tongue.toml --dry-run       only writes tongue/job.sh
-Then `study status tongue`, and `study merge tongue` when all is there. A task that a node takes down with it is
+
+Then `study status tongue`, and `study merge tongue` when all is there. A task that a node takes down with it is \
 requeued by Slurm and leaves what it finds done.";
 
 /// Writes the job, and submits it where `sbatch` is.
