@@ -865,6 +865,27 @@ fn an_orientation_that_comes_late_is_turned_into_angles() {
     assert!((roll["max"].as_f64().unwrap() - 0.3).abs() < 1e-3);
 }
 
+#[test]
+fn a_finding_says_where_and_when_once() {
+    let folder = tempfile::tempdir().unwrap();
+    let message = |k: u32| {
+        let x = if (300..340).contains(&k) {
+            "NaN"
+        } else {
+            "1.5"
+        };
+        (f64::from(k) / 100.0, format!("{{\"x\":{x}}}"))
+    };
+    let file = told(folder.path(), &[("/arm", (0..1000).map(message).collect())]);
+    let out = analyze(&[&file]);
+    let said = text(&out.stdout);
+    let line = said.lines().find(|l| l.contains("NaN")).unwrap();
+    assert_eq!(
+        line,
+        "  – /arm: 40 values of x are NaN or infinite, first at 3.000 s"
+    );
+}
+
 /// What has no unit shares a scale with what is alike large only, and no panel uses a colour twice.
 #[test]
 fn signals_share_a_panel_where_one_scale_shows_them() {

@@ -286,11 +286,13 @@ fn quality_section(out: &mut String, a: &Analysis) {
     }
     line!(out, "\nQuality");
     for q in &a.quality {
+        // Many texts say where and when themselves.
         let at = q
             .t_s
+            .filter(|_| !q.text.contains("first at"))
             .map(|t| format!(" (first at {} s)", plain(t, 3)))
             .unwrap_or_default();
-        let topic = if q.topic.is_empty() {
+        let topic = if q.topic.is_empty() || q.text.starts_with(&q.topic) {
             String::new()
         } else {
             format!("{}: ", q.topic)
