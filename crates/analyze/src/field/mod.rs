@@ -201,9 +201,8 @@ impl Field {
                 if turns {
                     field.motion(topic, &track, settings);
                 } else {
-                    field.no_motion = Some(format!(
-                        "{topic} has no gyroscope (angular_velocity_covariance[0] is -1)"
-                    ));
+                    field.no_motion =
+                        Some("no gyroscope (angular_velocity_covariance[0] is -1)".into());
                 }
             }
             // The one sensor of a walker's phone plays the rath's role for want of another: steps tell.
@@ -278,7 +277,7 @@ impl Field {
                 }
                 self.motion = Some(motion);
             }
-            Err(error) => self.no_motion = Some(format!("{topic}: {error}")),
+            Err(error) => self.no_motion = Some(error.to_string()),
         }
     }
 
@@ -364,13 +363,13 @@ impl Field {
             if ours && let Some(v) = estimated.get(name) {
                 *value = v.clone();
             }
-            if let Some(why) = &self.no_motion
+            if let (Some(topic), Some(why)) = (&self.topic, &self.no_motion)
                 && interval::gives(name)
                 && value.reason.is_some()
                 && value.as_f64().is_none()
                 && value.as_word().is_none()
             {
-                value.reason = Some(why.clone());
+                value.reason = Some(format!("{topic}: {why}"));
             }
         }
         if let Some(v) = estimated.get("beat_hz")

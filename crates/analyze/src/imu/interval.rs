@@ -67,7 +67,7 @@ pub fn metrics(motion: &Motion, window: Window) -> Metrics {
         .collect();
     let range = window.range(&motion.inputs.t_s);
     let support_ratio = &motion.inputs.support_ratio[range];
-    let rate_hz = super::track::period_s(&motion.inputs.t_s).map_or(f64::INFINITY, |s| 1.0 / s);
+    let rate_hz = rate_hz(&motion.inputs);
     for (name, value) in &mut out.0 {
         if let Some((_, why)) = BEYOND.iter().find(|(n, _)| n == name) {
             value.withhold(*why);
@@ -110,7 +110,7 @@ pub fn metrics(motion: &Motion, window: Window) -> Metrics {
             format!("of what heaves faster than {corner_hz} Hz: an inertial sensor loses a slower course of the height")
         });
         let of_place = (OF_PLACE.contains(name) && !motion.settings.lever_is_known).then(|| "as if the sensor sat at the centre of mass, and the interval knows no better, for nobody says where it sits; give imu_place_m in a roles file".to_owned());
-        let of_rate = (OF_EDGES.contains(name) && is_slow(&motion.inputs)).then(|| {
+        let of_rate = (OF_EDGES.contains(name) && rate_hz < ENOUGH_HZ).then(|| {
             format!("at {rate_hz:.0} Hz touch-downs fall between samples, and their overtones onto slower lines; 100 Hz or more are wanted")
         });
         let reasons: Vec<String> = of_height
@@ -148,9 +148,9 @@ const OF_PLACE: &[&str] = &["dz_pp_m", "rms_z_m", "t_float"];
 const OF_EDGES: &[&str] = &["dz_pp_m", "t_float"];
 const ENOUGH_HZ: f64 = 90.0;
 
-/// Whether touch-downs fall between samples.
-fn is_slow(inputs: &Inputs) -> bool {
-    super::track::period_s(&inputs.t_s).is_some_and(|s| 1.0 / s < ENOUGH_HZ)
+/// Of the samples, Hz; infinite where nothing tells.
+fn rate_hz(inputs: &Inputs) -> f64 {
+    super::track::period_s(&inputs.t_s).map_or(f64::INFINITY, |s| 1.0 / s)
 }
 
 /// What a slow course of the height is part of.
@@ -266,7 +266,7 @@ fn beyond_the_budget(name: &str, motion: &Motion, window: Window) -> f64 {
             let (t_s, ratio) = (&inputs.t_s[range.clone()], &inputs.support_ratio[range]);
             let length_s = t_s.len().max(1) as f64 * period_s;
             let edges = 2 * unloadings(t_s, ratio).len();
-            let samples = EDGE_SAMPLES[usize::from(is_slow(inputs))];
+            let samples = EDGE_SAMPLES[usize::from(1.0 / period_s < ENOUGH_HZ)];
             samples * edges as f64 * period_s / length_s
         }
         // The transform has no taper: each line is as high as it falls on a bin of 1/T, and the estimate's T is not the window's. While an end
@@ -319,7 +319,7 @@ fn lost_course_m(motion: &Motion, range: Range<usize>) -> f64 {
     let corner_hz = motion.settings.height_corner_hz;
     let of_budget = ABOVE_CORNER * motion.settings.budget.height_wander_m;
     let step_hz = || metrics_of(&motion.inputs, Window::ALL, |n| n == "peak_hz").number("peak_hz");
-    let quarter_hz = is_slow(&motion.inputs)
+    let quarter_hz = (rate_hz(&motion.inputs) < ENOUGH_HZ)
         .then(step_hz)
         .flatten()
         .map_or(0.0, |hz| 0.25 * hz);

@@ -292,15 +292,10 @@ fn quality_section(out: &mut String, a: &Analysis) {
             .filter(|_| !q.text.contains("first at"))
             .map(|t| format!(" (first at {} s)", plain(t, 3)))
             .unwrap_or_default();
-        let topic = if q.topic.is_empty() || q.text.starts_with(&q.topic) {
-            String::new()
-        } else {
-            format!("{}: ", q.topic)
-        };
         wrapped(
             out,
             if q.loss { "  ! " } else { "  – " },
-            &format!("{topic}{}{at}", q.text),
+            &format!("{}{at}", q.told()),
         );
     }
 }
