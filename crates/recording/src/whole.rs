@@ -42,22 +42,14 @@ fn forget(path: &Path) {
     }
 }
 
-/// What the system said, without the name of the unfinished file that the error may carry.
-pub(crate) fn plain(error: io::Error) -> io::Error {
-    use io::ErrorKind::{NotFound, PermissionDenied, StorageFull};
-    match error.kind() {
-        NotFound => io::Error::new(NotFound, "there is no such folder; make it first"),
-        kind @ (PermissionDenied | StorageFull) if error.get_ref().is_some() => kind.into(),
-        _ => error,
-    }
-}
-
 /// Where the bytes go.
 pub enum Sink {
     /// A file that is not complete.
     File {
-        /// Under its temporary name.
-        file: BufWriter<tempfile::NamedTempFile>,
+        /// Its bytes.
+        file: BufWriter<fs::File>,
+        /// Its name until then: apart from the file, so that no error of writing says it.
+        temporary: tempfile::TempPath,
         /// The name that it gets.
         path: PathBuf,
     },
@@ -107,12 +99,24 @@ impl Sink {
             // As any new file: the system takes away what the umask forbids.
             builder.permissions(fs::Permissions::from_mode(0o666));
         }
-        let file = builder.tempfile_in(folder).map_err(plain)?;
+        let (file, temporary) = (builder.tempfile_in(folder))
+            .map_err(|error| match error.kind() {
+                kind @ io::ErrorKind::NotFound => {
+                    io::Error::new(kind, "there is no such folder; make it first")
+                }
+                // Without the temporary name, which is nobody's.
+                kind => {
+                    let said = error.to_string();
+                    io::Error::new(kind, said.split(" at path ").next().unwrap_or(&said))
+                }
+            })?
+            .into_parts();
         if let Ok(mut paths) = UNFINISHED.lock() {
-            paths.push(file.path().to_owned());
+            paths.push(temporary.to_path_buf());
         }
         Ok(Sink::File {
             file: BufWriter::with_capacity(1 << 18, file),
+            temporary,
             path,
         })
     }
@@ -120,10 +124,12 @@ impl Sink {
     /// Writes what is left and gives a file its name.
     pub fn commit(mut self) -> io::Result<()> {
         self.flush()?;
-        if let Sink::File { file, path } = &mut self {
-            let temporary = file.get_ref().path().to_owned();
-            fs::rename(&temporary, path)?;
-            forget(&temporary);
+        if let Sink::File {
+            temporary, path, ..
+        } = &self
+        {
+            fs::rename(temporary, path)?;
+            forget(temporary);
         }
         Ok(())
     }
@@ -131,9 +137,9 @@ impl Sink {
 
 impl Drop for Sink {
     fn drop(&mut self) {
-        if let Sink::File { file, .. } = self {
-            // The temporary file removes itself after this; what was renamed is no longer under that name.
-            forget(file.get_ref().path());
+        if let Sink::File { temporary, .. } = self {
+            // It removes itself after this; what was renamed is no longer under that name.
+            forget(temporary);
         }
     }
 }
@@ -220,6 +226,31 @@ mod tests {
         let path = folder.path().join("none").join("x");
         let error = write_whole::<Error>(&path, |_| Ok(())).unwrap_err();
         assert_eq!(error.to_string(), "there is no such folder; make it first");
+    }
+
+    #[cfg(unix)]
+    #[test]
+    fn no_error_says_the_temporary_name() {
+        let folder = tempfile::tempdir().unwrap();
+        let long = "x".repeat(250);
+        let error = write_whole::<Error>(&folder.path().join(&long), |_| Ok(())).unwrap_err();
+        assert!(!error.to_string().contains(&long), "{error}");
+        assert!(error.to_string().contains("too long"), "{error}");
+        // A file that refuses what is written, as a full disk does.
+        let path = folder.path().join("x");
+        let mut sink = Sink::beside(&path).unwrap();
+        if let Sink::File { file, .. } = &mut sink {
+            *file = BufWriter::new(
+                fs::OpenOptions::new()
+                    .write(true)
+                    .open("/dev/full")
+                    .unwrap(),
+            );
+        }
+        let error = (sink.write_all(b"x").and_then(|()| sink.commit())).unwrap_err();
+        assert_eq!(error.kind(), io::ErrorKind::StorageFull);
+        assert!(!error.to_string().contains("path"), "{error}");
+        assert!(!path.exists());
     }
 
     #[cfg(unix)]

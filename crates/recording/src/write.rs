@@ -19,7 +19,7 @@ use std::{
 
 use mcap::records::MessageHeader;
 
-use crate::whole::{Sink, plain};
+use crate::whole::Sink;
 use crate::{cdr, read::ChannelInfo, topics::MessageKind};
 use beside::{Batch, Beside};
 use container::Container;
@@ -174,10 +174,7 @@ impl RecordingWriter {
         let target = path.display().to_string();
         match Sink::beside(path) {
             Ok(sink) => Self::begin(sink, target, options),
-            Err(cause) => Err(WriteError::Io {
-                target,
-                cause: plain(cause),
-            }),
+            Err(cause) => Err(WriteError::Io { target, cause }),
         }
     }
 
@@ -362,20 +359,15 @@ impl RecordingWriter {
         result.map_err(|error| failed(&target, error))?;
         let container = container.expect("no thread has it");
         let sink = container.writer.into_inner().into_inner();
-        sink.commit().map_err(|cause| WriteError::Io {
-            target,
-            cause: plain(cause),
-        })
+        sink.commit()
+            .map_err(|cause| WriteError::Io { target, cause })
     }
 }
 
 fn failed(target: &str, error: mcap::McapError) -> WriteError {
     let target = target.to_owned();
     match error {
-        mcap::McapError::Io(cause) => WriteError::Io {
-            target,
-            cause: plain(cause),
-        },
+        mcap::McapError::Io(cause) => WriteError::Io { target, cause },
         cause => WriteError::Format { target, cause },
     }
 }

@@ -16,7 +16,7 @@ use parquet::errors::ParquetError;
 use recording::read::ends_whole;
 use recording::whole::Sink;
 use sim::record::VERSION;
-use std::io::{BufWriter, ErrorKind, Write};
+use std::io::{BufWriter, Write};
 use std::ops::Range;
 use std::path::{Path, PathBuf};
 use std::sync::atomic::AtomicBool;
@@ -396,32 +396,10 @@ pub fn write_whole(
     path: &Path,
     fill: impl FnOnce(&mut Sink) -> Result<(), ParquetError>,
 ) -> Outcome<()> {
-    enum Trouble {
-        Io(std::io::Error),
-        Table(ParquetError),
-    }
-    impl From<std::io::Error> for Trouble {
-        fn from(e: std::io::Error) -> Self {
-            Self::Io(e)
-        }
-    }
-    recording::whole::write_whole(path, |file| fill(file).map_err(Trouble::Table)).map_err(|t| {
-        // Without the temporary name, which is nobody's.
-        let plain = |e: &std::io::Error| match e.kind() {
-            kind @ (ErrorKind::PermissionDenied | ErrorKind::StorageFull)
-                if e.get_ref().is_some() =>
-            {
-                std::io::Error::from(kind).to_string()
-            }
-            _ => e.to_string(),
-        };
-        let why = match &t {
-            Trouble::Io(e) => plain(e),
-            Trouble::Table(ParquetError::External(e)) => {
-                let io = e.downcast_ref::<std::io::Error>();
-                io.map_or_else(|| e.to_string(), plain)
-            }
-            Trouble::Table(e) => e.to_string(),
+    recording::whole::write_whole(path, fill).map_err(|error: ParquetError| {
+        let why = match &error {
+            ParquetError::External(cause) => cause.to_string(),
+            _ => error.to_string(),
         };
         format!("{}: cannot be written: {why}", path.display())
     })
