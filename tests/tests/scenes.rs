@@ -73,6 +73,33 @@ fn explain_keeps_its_contract() {
 }
 
 #[test]
+fn explain_gives_up_a_motion_that_costs_too_much_and_says_so() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let explain = |scene: &str, set: &str, format: &str| {
+        let args = ["explain", scene, "--set", set, "--format", format];
+        good(run_in(folder.path(), "sim", &args))
+    };
+    // Poles of a hundred kilometres: after half a tenth of a second every simulated second takes minutes.
+    let (scene, long) = ("eight-carriers", "carriers.along_poles.length_m=1e5");
+    let found = json(&explain(scene, long, "json"));
+    assert!(found["ms_per_simulated_s"].is_number());
+    assert!(found["trial_s"].as_f64().is_some_and(|s| s < 1.0));
+    let why = found["reason"].as_str().expect("why no longer trial");
+    assert!(why.contains("evaluations were not enough"), "{why}");
+    // Paces that change by 10¹⁰ rad/s every hundredth of a second.
+    let (scene, loud) = ("baseline", "effects.noise.phase_rad_per_sqrt_s=1e9");
+    let found = json(&explain(scene, loud, "json"));
+    assert!(found["ms_per_simulated_s"].is_null() && found["rhs_ns"].is_number());
+    assert!(found["reason"].is_string() && found["freedoms"] == serde_json::json!([]));
+    let said = text(&explain(scene, loud, "table").stdout);
+    assert!(said.contains("no motion was tried"), "{said}");
+    assert!(
+        !said.contains("NaN") && !said.contains("freedom "),
+        "{said}"
+    );
+}
+
+#[test]
 fn a_scene_without_music_has_no_drum() {
     let folder = tempfile::tempdir().expect("a folder");
     let refused = run_in(folder.path(), "sim", &["drum", "baseline"]);

@@ -5,8 +5,9 @@ use anyhow::Result;
 use serde_json::{Value, json};
 use sim::effects::{Entry, TABLE};
 use sim::model::Model;
-use sim::run::Sample;
+use sim::run::{Listener, Sample, method_of, run_model, settings};
 use sim::scene::{Freedom, Scene, load};
+use sim::solve::Settings;
 use std::fmt::Write;
 use std::time::Instant;
 
@@ -30,9 +31,10 @@ const EXAMPLES: &str = "Examples:
   sim explain eight-carriers --format json
   sim explain music --set 'freedom=[\"height\", \"roll\"]'";
 
-/// Longest stretch that a trial simulates, s, and how long one should take at most, s.
+/// Longest stretch that a trial simulates, s, how long one should take at most, and after how long it is given up, s.
 const TRIAL_S: f64 = 20.0;
 const TRIAL_WALL_S: f64 = 1.0;
+const GIVEN_UP_S: f64 = 2.0;
 /// A freedom whose absence changes less than this is named as one that could be held: rad and m.
 const LITTLE: (f64, f64) = (0.017_453, 0.005);
 
@@ -43,7 +45,7 @@ struct Effect {
     idle: Option<&'static str>,
     adds_state: usize,
     cost_ns: Option<f64>,
-    /// Cost of a simulated second of the scene without it, ms.
+    /// Cost of a simulated second of the scene without it, ms; `None` where the trial failed.
     without_ms: Option<f64>,
 }
 
@@ -54,8 +56,11 @@ struct Findings {
     effects: Vec<Effect>,
     freedoms: Vec<Trial>,
     rhs_ns: f64,
-    ms_per_s: f64,
+    /// Cost of a simulated second, or why even the shortest trial failed.
+    ms_per_s: Result<f64, String>,
     trial_s: f64,
+    /// Why no longer stretch was tried, where one failed.
+    failed: Option<String>,
 }
 
 struct Trial {
@@ -77,18 +82,30 @@ pub fn run(args: &Args) -> Result<()> {
 
 fn explore(scene: Scene) -> Findings {
     let model = Model::new(&scene);
+    let [rhs_ns] = cost_ns([&model]);
+    let most = (GIVEN_UP_S * 1e9 / rhs_ns) as u64;
     // A short beginning, and ever longer ones, tell how long a trial may be.
+    let most_s = scene.duration_s.min(TRIAL_S);
     let mut trial = scene.clone();
-    trial.duration_s = scene.duration_s.min(1e-3);
-    loop {
-        let wall_s = ms_per_s([&trial])[0] / 1e3 * trial.duration_s;
-        let most_s = scene.duration_s.min(TRIAL_S);
-        if !(wall_s < 0.1 * TRIAL_WALL_S) || trial.duration_s >= most_s {
+    trial.duration_s = most_s.min(1e-3);
+    let [mut ms] = ms_per_s([&trial], most);
+    let mut failed = None;
+    while let Ok(found) = ms {
+        let wall_s = found / 1e3 * trial.duration_s;
+        if wall_s >= 0.1 * TRIAL_WALL_S || trial.duration_s >= most_s {
             break;
         }
-        trial.duration_s = most_s.min(4.0 * trial.duration_s);
+        let mut longer = trial.clone();
+        longer.duration_s = most_s.min(4.0 * trial.duration_s);
+        match ms_per_s([&longer], most) {
+            [Ok(found)] => (trial, ms) = (longer, Ok(found)),
+            // Up to here it went well.
+            [Err(why)] => {
+                failed = Some(why);
+                break;
+            }
+        }
     }
-    let [ms] = ms_per_s([&trial]);
     let effects = TABLE
         .iter()
         .map(|e| {
@@ -107,16 +124,20 @@ fn explore(scene: Scene) -> Findings {
                 let [a, b] = cost_ns([&a, &b]);
                 effect.cost_ns = Some(a - b);
                 // In proportion, where the scene with it alone is not the whole.
-                let [with_ms, without_ms] = ms_per_s([&with, &without]);
-                effect.without_ms = Some(ms * without_ms / with_ms);
+                if let (Ok(ms), [Ok(with_ms), Ok(without_ms)]) =
+                    (&ms, ms_per_s([&with, &without], most))
+                {
+                    effect.without_ms = Some(ms * without_ms / with_ms);
+                }
             }
             effect
         })
         .collect();
     Findings {
-        rhs_ns: cost_ns([&model])[0],
-        freedoms: try_freedoms(&trial),
+        rhs_ns,
+        freedoms: try_freedoms(&trial, most),
         trial_s: trial.duration_s,
+        failed,
         ms_per_s: ms,
         effects,
         model,
@@ -165,19 +186,26 @@ fn cost_ns<const N: usize>(models: [&Model; N]) -> [f64; N] {
     least
 }
 
-/// Cost of a simulated second of each scene with its instruments, ms, by turns: the best of two runs or more. NaN for a scene that fails.
-fn ms_per_s<const N: usize>(scenes: [&Scene; N]) -> [f64; N] {
+/// Runs a scene for so many evaluations at most.
+fn attempt(scene: &Scene, most: u64, listener: &mut dyn Listener) -> Result<(), String> {
+    let settings = Settings {
+        most_evaluations: most,
+        ..settings(scene)
+    };
+    let (_, outcome) = run_model(&Model::new(scene), method_of(scene), &settings, listener);
+    outcome.map_err(|e| e.to_string())
+}
+
+/// Cost of a simulated second of each scene with its instruments, ms, by turns: the best of two runs or more; or why one fails.
+fn ms_per_s<const N: usize>(scenes: [&Scene; N], most: u64) -> [Result<f64, String>; N] {
     let began = Instant::now();
-    let mut least = [f64::INFINITY; N];
+    let mut least = [const { Ok(f64::INFINITY) }; N];
     for round in 0..10 {
         for (scene, least) in scenes.iter().zip(&mut least) {
+            let Ok(so_far) = *least else { continue };
             let began = Instant::now();
-            let outcome = sim::run::run(scene, &mut |_: &Sample| true);
-            let wall_s = began.elapsed().as_secs_f64();
-            *least = match outcome {
-                Ok(_) => least.min(wall_s * 1e3 / scene.duration_s),
-                Err(_) => f64::NAN,
-            };
+            *least = attempt(scene, most, &mut |_: &Sample| true)
+                .map(|()| so_far.min(began.elapsed().as_secs_f64() * 1e3 / scene.duration_s));
         }
         if round > 0 && began.elapsed().as_secs_f64() > 0.1 {
             break;
@@ -187,9 +215,9 @@ fn ms_per_s<const N: usize>(scenes: [&Scene; N]) -> [f64; N] {
 }
 
 /// The six coordinates in every sample.
-fn motion(scene: &Scene) -> Result<Vec<[f64; 6]>, String> {
+fn motion(scene: &Scene, most: u64) -> Result<Vec<[f64; 6]>, String> {
     let mut all = Vec::new();
-    sim::run::run(scene, &mut |s: &Sample| {
+    attempt(scene, most, &mut |s: &Sample| {
         let ([x, y, z], [roll, tilt, yaw]) = (s.pose.position_m, s.pose.roll_pitch_yaw_rad());
         all.push([
             x - scene.carriers.walk_m_per_s[0] * s.t_s,
@@ -200,19 +228,18 @@ fn motion(scene: &Scene) -> Result<Vec<[f64; 6]>, String> {
             yaw,
         ]);
         true
-    })
-    .map_err(|e| e.to_string())?;
+    })?;
     Ok(all)
 }
 
 /// Runs the scene as it is, then with each freedom held.
-fn try_freedoms(scene: &Scene) -> Vec<Trial> {
+fn try_freedoms(scene: &Scene, most: u64) -> Vec<Trial> {
     let mut scene = scene.clone();
     // Instruments watch a motion and change none.
     for effect in TABLE.iter().filter(|e| ["imu", "drum"].contains(&e.name)) {
         (effect.switch_off)(&mut scene.effects);
     }
-    let Ok(full) = motion(&scene) else {
+    let Ok(full) = motion(&scene, most) else {
         return Vec::new();
     };
     Freedom::ALL
@@ -227,7 +254,7 @@ fn try_freedoms(scene: &Scene) -> Vec<Trial> {
             fewer.freedom.retain(|g| g != f);
             let held = sim::scene::check(&fewer)
                 .map_err(|p| p.message)
-                .and_then(|()| motion(&fewer))
+                .and_then(|()| motion(&fewer, most))
                 .map(|held| {
                     let worst = |apart: &dyn Fn(&[f64; 6], &[f64; 6]) -> f64| {
                         full.iter()
@@ -266,7 +293,8 @@ fn as_json(found: &Findings) -> Value {
             "without_ms_per_simulated_s": e.without_ms.map_or(Value::Null, number),
         })).collect::<Vec<_>>(),
         "rhs_ns": number(found.rhs_ns),
-        "ms_per_simulated_s": number(found.ms_per_s),
+        "ms_per_simulated_s": found.ms_per_s.as_ref().map_or(Value::Null, |ms| number(*ms)),
+        "reason": found.ms_per_s.as_ref().err().or(found.failed.as_ref()),
         "trial_s": number(found.trial_s),
         "freedoms": found.freedoms.iter().map(|t| json!({
             "name": t.name,
@@ -313,12 +341,22 @@ fn write_effects(out: &mut String, found: &Findings) -> std::fmt::Result {
     for e in found.effects.iter().filter(|e| !e.on) {
         writeln!(out, "{:<17} -   {:36}{}", e.name, "", e.about)?;
     }
-    writeln!(
+    write!(
         out,
-        "\ncost: one right-hand side takes {:.0} ns, so much of it is the effect's; a simulated second takes {:.3} ms on one core,\n\
-         'without' what it takes without the effect (the motion is another then)",
-        found.rhs_ns, found.ms_per_s
+        "\ncost: one right-hand side takes {:.0} ns, so much of it is the effect's; ",
+        found.rhs_ns
     )?;
+    match &found.ms_per_s {
+        Ok(ms) => writeln!(
+            out,
+            "a simulated second takes {ms:.3} ms on one core,\n\
+             'without' what it takes without the effect (the motion is another then)"
+        )?,
+        Err(why) => writeln!(
+            out,
+            "no motion was tried, for even its beginning fails:\n{why}"
+        )?,
+    }
     if found.scene.effects.drum.is_some() {
         writeln!(
             out,
@@ -337,10 +375,15 @@ fn write_effects(out: &mut String, found: &Findings) -> std::fmt::Result {
 }
 
 fn write_freedoms(out: &mut String, found: &Findings) -> std::fmt::Result {
+    if found.ms_per_s.is_err() {
+        return Ok(());
+    }
     writeln!(
         out,
-        "\n{:<8} {:>12}  held instead: worst error within {:.0} s",
-        "freedom", "RMS", found.trial_s
+        "\n{:<8} {:>12}  held instead: worst error within {} s",
+        "freedom",
+        "RMS",
+        (found.trial_s * 1e3).round() / 1e3
     )?;
     for t in &found.freedoms {
         let linear = ["x", "y", "height"].contains(&t.name.as_str());
