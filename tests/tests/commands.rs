@@ -1,6 +1,7 @@
 //! The commands as a person would run them: in an empty folder, on real files.
 
 use serde_json::Value;
+use std::io::Read;
 use std::path::Path;
 use std::process::{Command, Stdio};
 use std::time::{Duration, Instant};
@@ -120,6 +121,21 @@ fn bad_input_gets_one_sentence_and_leaves_nothing() {
             "--duration: duration_s: found -5, expected a number above zero",
         ),
         (
+            &["record", "--duration", "1e12"],
+            None,
+            "--duration: duration_s: 1e12 s at 30 Hz are 3.0e13 samples, expected at most 1e9",
+        ),
+        (
+            &["record", "--set", "log_rate_hz=1e9"],
+            None,
+            "--set: log_rate_hz: 60 s at 1e9 Hz are 6.0e10 samples",
+        ),
+        (
+            &["record", "--duration", "1e11", "--set", "log_rate_hz=1e-3"],
+            None,
+            "--duration: duration_s: the stamps would pass the year 2262",
+        ),
+        (
             &["record", "--tolerance", "1e-20"],
             None,
             "--tolerance: solver.tolerance: found 1e-20",
@@ -177,9 +193,23 @@ fn bad_input_gets_one_sentence_and_leaves_nothing() {
         assert!(out.stdout.is_empty());
     }
     assert_eq!(files(folder.path()), ["mine.toml"], "nothing half-written");
-    for wrong in ["foo", "=3"] {
-        let out = run_in(folder.path(), "sim", &["record", "--set", wrong]);
-        assert_eq!(out.status.code(), Some(2), "{wrong}");
+    for (flag, wrong, expected) in [
+        ("--set", "foo", "expected KEY=VALUE"),
+        ("--set", "=3", "expected KEY=VALUE"),
+        ("--seed", "-1", "expected a whole number, 0 or more"),
+        ("--seed", "1.5", "expected a whole number, 0 or more"),
+        ("--duration", "1m", "expected a number"),
+        ("--tolerance", "fine", "expected a number"),
+    ] {
+        let out = run_in(folder.path(), "sim", &["record", flag, wrong]);
+        let said = String::from_utf8_lossy(&out.stderr);
+        assert_eq!(out.status.code(), Some(2), "{flag} {wrong}");
+        assert!(said.contains(expected), "{flag} {wrong} says: {said}");
+    }
+    let help = good(run_in(folder.path(), "sim", &["--help"])).stdout;
+    let help = String::from_utf8_lossy(&help);
+    for code in ["0 done;", "1 it", "2 wrong usage;", "3 done, but"] {
+        assert!(help.contains(code), "{help}");
     }
     assert_eq!(
         run_in(folder.path(), "sim", &["record", "--nonsense"])
@@ -396,7 +426,7 @@ fn an_interrupted_run_leaves_nothing_and_says_so() {
     let said = {
         let mut said = String::new();
         let stderr = child.stderr.as_mut().expect("a pipe");
-        std::io::Read::read_to_string(stderr, &mut said).expect("text");
+        Read::read_to_string(stderr, &mut said).expect("text");
         said
     };
     assert_eq!(child.wait().expect("ends").code(), Some(1), "{said}");
@@ -421,5 +451,27 @@ fn a_full_disk_is_said_in_one_sentence() {
     let said = String::from_utf8_lossy(&output.stderr);
     assert_eq!(output.status.code(), Some(1), "{said}");
     assert!(said.contains("No space left on device"), "{said}");
+    assert!(!said.contains("file"), "there was none: {said}");
     assert_eq!(said.trim().lines().count(), 1, "{said}");
+}
+
+/// `sim record --out - | head -c 10`, of a run that is longer than any pipe.
+#[test]
+fn a_reader_that_leaves_is_no_error() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let mut child = Command::new(bin("sim"))
+        .args(["record", "--duration", "600", "--out", "-"])
+        .current_dir(folder.path())
+        .stdout(Stdio::piped())
+        .stderr(Stdio::piped())
+        .spawn()
+        .expect("starts");
+    let mut begin = [0; 10];
+    let mut pipe = child.stdout.take().expect("piped");
+    pipe.read_exact(&mut begin).expect("it begins");
+    drop(pipe);
+    assert_eq!(begin[1..5], *b"MCAP");
+    let output = child.wait_with_output().expect("ends");
+    let said = String::from_utf8_lossy(&output.stderr);
+    assert_eq!((output.status.code(), &*said), (Some(0), ""));
 }

@@ -28,12 +28,15 @@ pub use options::WriterOptions;
 /// A message larger than this is refused.
 const MAX_MESSAGE_BYTES: usize = 256 << 20;
 
+/// What a stream is called.
+const STDOUT: &str = "standard output";
+
 /// Why a recording could not be written. Nothing is left under the final name.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum WriteError {
     /// The file or stream took no more bytes, or could not be made.
-    #[error("{target}: cannot be written: {cause}; no file of that name was made or changed")]
+    #[error("{target}: cannot be written: {cause}{}", if target == STDOUT { "" } else { "; no file of that name was made or changed" })]
     Io {
         /// The path, or `standard output`.
         target: String,
@@ -70,6 +73,13 @@ pub enum WriteError {
         /// Its size.
         bytes: usize,
     },
+}
+
+impl WriteError {
+    /// Whether a reader went away early, as in `… | head -c 10`: whoever wrote need not complain.
+    pub fn reader_left(&self) -> bool {
+        matches!(self, WriteError::Io { cause, .. } if cause.kind() == io::ErrorKind::BrokenPipe)
+    }
 }
 
 /// Anything that can be the content of a message.
@@ -185,7 +195,7 @@ impl RecordingWriter {
     ) -> Result<Self, WriteError> {
         Self::begin(
             Sink::Stream(BufWriter::with_capacity(1 << 16, Box::new(stream))),
-            "standard output".to_owned(),
+            STDOUT.to_owned(),
             options,
         )
     }

@@ -124,12 +124,26 @@ fn the_same_content_gives_the_same_bytes_to_a_file_and_to_a_stream() {
         .expect("a signal");
     assert!(y.values.iter().enumerate().all(|(i, y)| *y == -(i as f64)));
     assert_eq!(y.unit, "m");
-    // The official library reads it too.
-    let read = mcap::MessageStream::new(&bytes)
-        .expect("opens")
-        .filter(Result::is_ok)
-        .count();
+    // The official library reads it too: one time for both, numbers that count from 0.
+    let mut read = 0;
+    for message in mcap::MessageStream::new(&bytes).expect("opens") {
+        let message = message.expect("whole");
+        let of_channel = read / 2;
+        assert_eq!(message.sequence, of_channel);
+        assert_eq!(message.log_time, u64::from(of_channel) * 33_000_000);
+        assert_eq!(message.publish_time, message.log_time);
+        read += 1;
+    }
     assert_eq!(read, 10_000);
+    // Chunks are compressed and small, and a killed program loses ten seconds of log time at most.
+    let summary = mcap::Summary::read(&bytes).expect("reads").expect("there");
+    assert!(summary.chunk_indexes.len() >= 16, "165 s");
+    for chunk in &summary.chunk_indexes {
+        assert_eq!(chunk.compression, "zstd");
+        assert!(chunk.uncompressed_size < 520 << 10, "{chunk:?}");
+        let spans_ns = chunk.message_end_time - chunk.message_start_time;
+        assert!(spans_ns <= 10_033_000_000, "{chunk:?}");
+    }
 }
 
 #[test]

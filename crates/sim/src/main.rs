@@ -21,7 +21,9 @@ const EXAMPLES: &str = "Examples:
   sim accuracy music                      what accuracy costs: every method against a reference
   sim replay music-1001.mcap              a recording's carriers drive a scene; how far the motions part
   sim scenes                              the scenes that come with the program
-  sim scenes music > mine.toml            a scene to change";
+  sim scenes music > mine.toml            a scene to change
+
+Exit codes: 0 done; 1 it could not; 2 wrong usage; 3 done, but the recording to replay was damaged.";
 
 fn main() -> ExitCode {
     commands::run(Cli::parse().command)

@@ -43,6 +43,11 @@ fn setting(text: &str) -> Result<String, String> {
     }
 }
 
+/// Takes a number; which ones make sense, the scene's check says.
+fn real(text: &str) -> Result<f64, String> {
+    text.parse().map_err(|_| "expected a number".into())
+}
+
 /// Takes a time within a recording.
 fn seconds(text: &str) -> Result<f64, String> {
     match text.parse::<f64>() {

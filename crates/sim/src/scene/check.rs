@@ -108,6 +108,9 @@ pub(crate) fn problem(key: &str, message: impl Into<String>) -> Problem {
 /// Most samples that a run may log, and cells that its noise may have; beyond it a slip of the keyboard is likelier than a wish.
 pub(crate) const MOST_SAMPLES: f64 = 1e9;
 
+/// Whoever asks for more than a year has likelier slipped there than in what goes with it, s.
+const LONG_S: f64 = 3.2e7;
+
 /// Most steps that a run of fixed steps may take: an hour or so of computing.
 const MOST_STEPS: f64 = 1e10;
 
@@ -118,11 +121,17 @@ const MOST_STEPS: f64 = 1e10;
 pub fn check(scene: &Scene) -> Result<(), Problem> {
     Checker::positive("duration_s", scene.duration_s)?;
     Checker::positive("log_rate_hz", scene.log_rate_hz)?;
-    if scene.duration_s * scene.log_rate_hz > MOST_SAMPLES {
+    let samples = scene.duration_s * scene.log_rate_hz;
+    if samples > MOST_SAMPLES {
+        let key = if scene.duration_s > LONG_S {
+            "duration_s"
+        } else {
+            "log_rate_hz"
+        };
         return Err(problem(
-            "log_rate_hz",
+            key,
             format!(
-                "{} s at {} Hz are more than {MOST_SAMPLES:e} samples; log less often",
+                "{} s at {} Hz are {samples:.1e} samples, expected at most {MOST_SAMPLES:e}; simulate less, or log less often",
                 shown(scene.duration_s),
                 shown(scene.log_rate_hz)
             ),
@@ -131,8 +140,13 @@ pub fn check(scene: &Scene) -> Result<(), Problem> {
     Checker::not_negative("analysis_start_s", scene.analysis_start_s)?;
     Checker::not_negative("epoch_s", scene.epoch_s)?;
     if scene.epoch_s + scene.duration_s > 9.2e9 {
+        let key = if scene.duration_s > scene.epoch_s {
+            "duration_s"
+        } else {
+            "epoch_s"
+        };
         return Err(problem(
-            "epoch_s",
+            key,
             "the stamps would pass the year 2262, the last that nanoseconds in 64 bits can name",
         ));
     }
