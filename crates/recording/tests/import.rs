@@ -649,7 +649,7 @@ fn what_is_missing_is_missing_however_it_is_written() {
     let folder = folder();
     let log = folder.path().join("belt.csv");
     let head = "Time (s),Acceleration x (m/s^2),Acceleration y (m/s^2),Acceleration z (m/s^2)";
-    std::fs::write(
+    fs::write(
         &log,
         format!("{head}\n0,1,2,9.8\n\n0.01,null,NaN,NA\n0.02,n/a,,None\n0.03,1,2,9.8\n"),
     )
@@ -662,11 +662,11 @@ fn what_is_missing_is_missing_however_it_is_written() {
         assert_eq!(none, [false, true, true, false], "{axis}");
     }
     // The line is that of the file: empty ones count.
-    std::fs::write(&log, format!("{head}\n0,1,2,9.8\n\n\n0.01,1,high,3\n")).unwrap();
+    fs::write(&log, format!("{head}\n0,1,2,9.8\n\n\n0.01,1,high,3\n")).unwrap();
     let error = ingest(folder.path(), std::slice::from_ref(&log), None).err();
     let error = error.unwrap().to_string();
     assert!(error.contains("line 5, column \"Acceleration y"), "{error}");
-    std::fs::write(&log, format!("{head}\n")).unwrap();
+    fs::write(&log, format!("{head}\n")).unwrap();
     let error = ingest(folder.path(), &[log], None).err().unwrap();
     let error = error.to_string();
     assert!(error.contains("has a header but no rows"), "{error}");
@@ -684,7 +684,7 @@ fn halves_of_a_device_are_told() {
         let head = ["x", "y", "z"].map(|axis| format!("{sensor} {axis} ({unit})"));
         let path = folder.path().join(format!("{sensor}.csv"));
         let text = format!("Time (s),{}\n0,1,2,3\n0.01,1,2,3\n", head.join(","));
-        std::fs::write(&path, text).unwrap();
+        fs::write(&path, text).unwrap();
         path
     });
     let told = |paths: &[PathBuf]| {
