@@ -3,7 +3,7 @@
 use recording::read::Batch;
 use recording::signal::field_of;
 
-use crate::field::dates::{Dated, dated};
+use crate::field::dates::{Dated, dated, delay_s};
 use crate::inputs::{mean_step_in, stretches};
 use crate::summary::seconds;
 
@@ -22,6 +22,8 @@ pub struct Axis {
     pub t_s: Vec<f64>,
     /// The message at each time, counted as they came.
     pub rows: Vec<usize>,
+    /// First and last time (s) where these are the messages' own and the log tells nothing of them.
+    pub own_s: Option<(f64, f64)>,
     /// Kinds and texts of remarks.
     pub remarks: Vec<(&'static str, String)>,
 }
@@ -77,12 +79,20 @@ impl Arrivals {
             return None;
         }
         let first_ns = stamp_ns[*rows.first()?];
-        let stamps = rows
+        let log_s = self.log_s(&rows, start_ns);
+        let mut stamps: Vec<f64> = rows
             .iter()
             .map(|r| seconds(first_ns, stamp_ns[*r]))
             .collect();
-        let Dated { t_s, remark, .. } = dated(self.log_s(&rows, start_ns), Some(stamps));
-        let axis = |remark| Axis::new(t_s, rows, vec![remark]);
+        let moved_s = delay_s(log_s.iter().zip(&stamps).map(|(l, s)| l - s));
+        stamps.iter_mut().for_each(|s| *s += moved_s);
+        let dated = dated(log_s, Some(stamps));
+        let own_s = dated.own_s();
+        let Dated { t_s, remark, .. } = dated;
+        let axis = |remark| Axis {
+            own_s,
+            ..Axis::new(t_s, rows, vec![remark])
+        };
         remark.filter(|(kind, _)| *kind == "by_stamps").map(axis)
     }
 
@@ -113,7 +123,12 @@ impl Arrivals {
 impl Axis {
     fn new(t_s: Vec<f64>, rows: Vec<usize>, mut remarks: Vec<(&'static str, String)>) -> Self {
         remarks.extend(uneven(&t_s));
-        Axis { t_s, rows, remarks }
+        Axis {
+            t_s,
+            rows,
+            own_s: None,
+            remarks,
+        }
     }
 }
 

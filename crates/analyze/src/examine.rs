@@ -10,14 +10,14 @@ use recording::text::counted;
 use crate::arrivals::{Arrivals, Axis};
 use crate::envelope::Envelope;
 use crate::events::{Event, events};
-use crate::field::{DeviceClocks, Field};
+use crate::field::{ACCEL, DeviceClocks, Field, GYRO};
 use crate::inputs::{Inputs, Window, between};
 use crate::metrics::{self, Metrics};
 use crate::peaks::SpectrumSummary;
 use crate::phase::{unwrap, wrap};
 use crate::quality::Quality;
 use crate::quaternion::Quaternions;
-use crate::roles::{AngleUnit, Role, Roles, RolesFile, matches, of_topic};
+use crate::roles::{AngleUnit, Role, Roles, RolesFile, matches, of_topic, stands_beside};
 use crate::summary::{Stream, Summary, Times, segment};
 
 /// What is asked of a recording.
@@ -146,6 +146,15 @@ const LEAST_ABSENT: f64 = 0.02;
 const LEAST_ABSENT_S: f64 = 1.0;
 /// No attitude that is wrapped goes beyond half a turn (rad); a little more for what rounds.
 const LARGEST_ANGLE_RAD: f64 = 3.15;
+/// Where transforms of ROS and of Foxglove hold a place and an orientation.
+const TRANSFORMS: [(&str, &str); 3] = [
+    (
+        "transforms[0].transform.translation",
+        "transforms[0].transform.rotation",
+    ),
+    ("transforms[0].translation", "transforms[0].rotation"),
+    ("translation", "rotation"),
+];
 /// At most so many panels of traces are kept.
 const MOST_TRACES: usize = 24;
 /// At most so many signals are drawn in one panel: as there are colours.
@@ -217,7 +226,12 @@ pub fn examine(
     remarks
         .extend(chosen.map(|(topic, text)| Quality::remark(topic, "one_of_several", text.clone())));
     let mut inputs = pass.inputs(&metadata, said);
-    let window = window(request, &metadata, said, duration_s, &mut warnings);
+    // What was written at once lasts longer than its log.
+    let own = pass.axes.values().filter_map(|axis| axis.own_s);
+    let lasts_s = own.map(|e| e.1).fold(duration_s, f64::max);
+    let until = |last_s: f64, warnings: &mut Vec<String>| {
+        window(request, &metadata, said, lasts_s.max(last_s), warnings)
+    };
     let mut field = match estimates(recording, &roles, request) {
         Ok(()) => Field::read(
             recording,
@@ -225,16 +239,22 @@ pub fn examine(
             inputs.gravity_m_per_s2,
             request.truth,
             request.clocks,
-            window,
+            |last_s| until(last_s, &mut Vec::new()),
         )?,
         Err(why) => {
             warnings.extend(why);
             Field::default()
         }
     };
+    if request.truth && !field.has_truth() {
+        warnings.push("no truth is known in the recording: estimates are judged by the pose of a topic whose name holds \"truth\", or of truth = \"TOPIC\" in a file for --roles".into());
+    }
+    let last_s = field.own_s.values().map(|e| e.1).fold(0.0, f64::max);
+    let window = until(last_s, &mut warnings);
     field.fill(&mut inputs);
     quality.extend(remarks);
-    quality.extend(pass.coverage(window));
+    quality.extend(pass.coverage(window, &field.own_s));
+    quality.extend(pass.unknown_movers());
     quality.extend(field.quality());
     let mut metrics = metrics::metrics(&inputs, window);
     field.finish(&inputs, &mut metrics, window);
@@ -728,13 +748,52 @@ impl<'a> Pass<'a> {
         out
     }
 
+    /// Where nothing tells how anybody moves, remarks on topics that might, though their type does not say so, with what to write.
+    fn unknown_movers(&self) -> Vec<Quality> {
+        let movers = [Role::Height, Role::Roll, Role::Imu, Role::Carriers];
+        if movers.iter().any(|r| !self.roles.patterns(*r).is_empty()) {
+            return Vec::new();
+        }
+        let paths: HashSet<&str> = self.entries.iter().map(|e| &*e.path).collect();
+        let topics = self.recording.info().channels.iter();
+        let topics: BTreeSet<&str> = topics.map(|c| c.topic.as_str()).collect();
+        let mut out = Vec::new();
+        for topic in topics.into_iter().filter(|t| !stands_beside(t)) {
+            let has = |field: String| paths.contains(&*format!("{topic}.{field}"));
+            let transforms = TRANSFORMS
+                .iter()
+                .find(|(place, turn)| has(format!("{place}.z")) && has(format!("{turn}.roll")));
+            let (what, lines) = if GYRO.iter().chain(&ACCEL).all(|f| has((*f).to_owned())) {
+                (
+                    "holds what an inertial sensor tells",
+                    format!("imu = \"{topic}\""),
+                )
+            } else if let Some((place, turn)) = transforms {
+                (
+                    "holds transforms",
+                    format!("height = \"{topic}.{place}.z\" and roll = \"{topic}.{turn}.roll\""),
+                )
+            } else {
+                continue;
+            };
+            let text = format!(
+                "{what}, but its type does not say whose: if it is the load's, write {lines} into a file for --roles"
+            );
+            out.push(Quality::remark(topic, "unknown_type", text));
+        }
+        out
+    }
+
     /// Remarks on topics that metrics rest on and that cover clearly less of the window than there is of the recording.
-    fn coverage(&self, window: Window) -> Vec<Quality> {
+    fn coverage(&self, window: Window, own_s: &BTreeMap<String, (f64, f64)>) -> Vec<Quality> {
         let info = self.recording.info();
         let start_ns = i128::from(info.start_ns);
         let since = |t: i64| (i128::from(t) - start_ns) as f64 / 1e9;
+        let axes = self.axes.values().filter_map(|axis| axis.own_s);
+        let lasts_s = own_s.values().copied().chain(axes).map(|e| e.1);
+        let lasts_s = lasts_s.fold(since(info.end_ns), f64::max);
         let from_s = window.start_s.max(0.0);
-        let to_s = window.end_s.min(since(info.end_ns));
+        let to_s = window.end_s.min(lasts_s);
         let sensors = [Role::Imu, Role::Carriers].map(|role| self.roles.patterns(role));
         let players = self.entries.iter().filter(|e| !e.kept.is_empty());
         let fed: HashSet<usize> = players.map(|e| self.first[e.channel]).collect();
@@ -745,7 +804,10 @@ impl<'a> Pass<'a> {
             let of_topic = || (0..info.channels.len()).filter(|j| self.first[*j] == k);
             let ends = of_topic().filter_map(|j| self.times[j].ends_ns());
             let ends = ends.reduce(|a, b| (a.0.min(b.0), a.1.max(b.1)));
-            let Some((first_s, last_s)) = ends.map(|(a, b)| (since(a), since(b))) else {
+            let told = ends.map(|(a, b)| (since(a), since(b)));
+            let of_sensor = own_s.get(&info.channels[k].topic).copied();
+            let own_s = of_sensor.or_else(|| self.axes.get(&k)?.own_s);
+            let Some((first_s, last_s)) = own_s.or(told) else {
                 continue;
             };
             let messages: u64 = of_topic().map(|j| self.times[j].count()).sum();
@@ -819,7 +881,10 @@ impl<'a> Pass<'a> {
 
     /// Outlines of moving signals without a role, those of one vector together, and how many find no place.
     fn traces(&self) -> (Vec<Trace>, u64) {
-        // Topics that play a role are drawn as that; transforms, scenes and joints repeat them.
+        // Topics that play a role are drawn as that; transforms, scenes and joints repeat them, where there are some.
+        let none = self.entries.iter().all(|e| e.role.is_none())
+            && (self.roles.topic(Role::Imu).is_none()
+                && self.roles.topic(Role::Carriers).is_none());
         let known = |channel: usize| {
             let info = &self.recording.info().channels[channel];
             let repeats = [
@@ -830,7 +895,7 @@ impl<'a> Pass<'a> {
             ]
             .iter()
             .any(|s| info.schema.ends_with(s));
-            repeats
+            (repeats && !none)
                 || info.topic == recording::topics::MOTION
                 || self
                     .entries

@@ -451,7 +451,7 @@ impl Roles {
 }
 
 /// Whether a topic repeats in the recording's own terms what another is about: what `analyze --annotate` found, what `sim replay` was given.
-fn stands_beside(topic: &str) -> bool {
+pub(crate) fn stands_beside(topic: &str) -> bool {
     ["/findings/", "/measured/"]
         .iter()
         .any(|p| topic.starts_with(p))

@@ -659,6 +659,98 @@ fn bursts_are_dated_by_their_stamps() {
     assert!(kinds(&found).contains(&"by_stamps".to_owned()));
 }
 
+/// What an inertial sensor tells of a roll by 20° at 1 Hz and a heave by 3 cm at 2 Hz, as a JSON message without a schema.
+fn swung(t: f64) -> String {
+    let stamp_ns = 1_600_000_000_000_000_000 + (t * 1e9).round() as u64;
+    let (sec, nanosec) = (stamp_ns / 1_000_000_000, stamp_ns % 1_000_000_000);
+    let w = std::f64::consts::TAU;
+    let roll = 20f64.to_radians() * (w * t).sin();
+    let rate = 20f64.to_radians() * w * (w * t).cos();
+    let force = 9.80665 - 0.03 * (2.0 * w).powi(2) * (2.0 * w * t).sin();
+    let (y, z) = (force * roll.sin(), force * roll.cos());
+    format!(
+        "{{\"header\":{{\"stamp\":{{\"sec\":{sec},\"nanosec\":{nanosec}}}}},\
+         \"angular_velocity\":{{\"x\":{rate},\"y\":0.0,\"z\":0.0}},\
+         \"linear_acceleration\":{{\"x\":0.0,\"y\":{y},\"z\":{z}}}}}"
+    )
+}
+
+/// A log that was written at once, within a quarter of a second, or beside a simulation that ran at a third of the wall's clock.
+#[test]
+fn stamps_tell_the_times_where_the_log_keeps_another_pace() {
+    let folder = tempfile::tempdir().unwrap();
+    let paces: [fn(f64) -> f64; 3] = [|_| 0.0, |t| t / 240.0, |t| 3.0 * t];
+    for pace in paces {
+        let taken = (0..6000).map(|k| f64::from(k) * 0.01);
+        let messages = taken.map(|t| (pace(t), swung(t))).collect();
+        let file = told(folder.path(), &[("/s", messages)]);
+        let found = with_roles(folder.path(), &file, "imu = \"/s\"\n");
+        let near = |name: &str, value: f64, bound: f64| {
+            let got = metric(&found, name);
+            assert!((got - value).abs() < bound, "{name}: {got}");
+        };
+        // 20°/√2, to the interval that is stated.
+        near("rms_roll_deg", 14.142, 0.09);
+        near("peak_hz", 2.0, 0.02);
+        near("roll_peak_hz", 1.0, 0.02);
+        assert!(kinds(&found).contains(&"by_stamps".to_owned()));
+        assert!(found["window_s"][1].as_f64().unwrap() >= 59.99);
+    }
+}
+
+/// A sensor whose type nobody knows is told of with the line that names it.
+#[test]
+fn what_may_move_the_load_is_told_with_its_remedy() {
+    let folder = tempfile::tempdir().unwrap();
+    let taken = (0..2000).map(|k| f64::from(k) * 0.01);
+    let file = told(
+        folder.path(),
+        &[("/s", taken.map(|t| (t, swung(t))).collect())],
+    );
+    let found = json(&[&file, "--format", "json"]);
+    let quality = found["quality"].as_array().unwrap();
+    let hint = quality.iter().find(|q| q["kind"] == "unknown_type");
+    let hint = hint.unwrap()["text"].as_str().unwrap();
+    let line = "imu = \"/s\"";
+    assert!(hint.contains(line), "{hint}");
+    let found = with_roles(folder.path(), &file, line);
+    assert!((metric(&found, "roll_peak_hz") - 1.0).abs() < 0.05);
+    assert!(!kinds(&found).contains(&"unknown_type".to_owned()));
+}
+
+/// `-` is standard output where a recording is all that is written, and refused where the result stands there.
+#[test]
+fn a_recording_may_go_to_standard_output() {
+    let folder = tempfile::tempdir().unwrap();
+    let log = folder.path().join("belt.csv");
+    std::fs::write(
+        &log,
+        "Time (s),Acceleration x (m/s^2),Acceleration y (m/s^2),Acceleration z (m/s^2)\n0,0,0,9.8\n0.01,0,0,9.8\n",
+    )
+    .unwrap();
+    let run = |args: &[&str]| {
+        Command::new(env!("CARGO_BIN_EXE_analyze"))
+            .args(args)
+            .current_dir(folder.path())
+            .output()
+            .unwrap()
+    };
+    let piped = run(&["ingest", "belt.csv", "--out", "-"]);
+    assert!(piped.status.success(), "{}", text(&piped.stderr));
+    run(&["ingest", "belt.csv", "--out", "belt.mcap"]);
+    assert_eq!(
+        piped.stdout,
+        std::fs::read(folder.path().join("belt.mcap")).unwrap()
+    );
+    for option in ["--out", "--annotate", "--report"] {
+        let refused = run(&["belt.mcap", option, "-"]);
+        assert_eq!(refused.status.code(), Some(1));
+        let said = text(&refused.stderr);
+        assert!(said.contains("standard output"), "{said}");
+    }
+    assert!(!folder.path().join("-").exists());
+}
+
 /// A roll in degrees is one where its name or the user says so, and is suspected where it goes beyond half a turn.
 #[test]
 fn degrees_are_taken_as_such() {

@@ -643,3 +643,61 @@ fn sound_stands_where_it_is_said_to_begin_and_its_loss_is_said() {
     }
     assert!(error("b.wav", &wav(1, 0, 8000, 16, &[])).starts_with("b.wav: "));
 }
+
+#[test]
+fn what_is_missing_is_missing_however_it_is_written() {
+    let folder = folder();
+    let log = folder.path().join("belt.csv");
+    let head = "Time (s),Acceleration x (m/s^2),Acceleration y (m/s^2),Acceleration z (m/s^2)";
+    fs::write(
+        &log,
+        format!("{head}\n0,1,2,9.8\n\n0.01,null,NaN,NA\n0.02,n/a,,None\n0.03,1,2,9.8\n"),
+    )
+    .unwrap();
+    let got = ingest(folder.path(), std::slice::from_ref(&log), None).unwrap();
+    for axis in ["x", "y", "z"] {
+        let path = format!("/imu/belt.linear_acceleration.{axis}");
+        let signal = got.signals.iter().find(|s| s.path == path).unwrap();
+        let none: Vec<bool> = signal.values.iter().map(|v| v.is_nan()).collect();
+        assert_eq!(none, [false, true, true, false], "{axis}");
+    }
+    // The line is that of the file: empty ones count.
+    fs::write(&log, format!("{head}\n0,1,2,9.8\n\n\n0.01,1,high,3\n")).unwrap();
+    let error = ingest(folder.path(), std::slice::from_ref(&log), None).err();
+    let error = error.unwrap().to_string();
+    assert!(error.contains("line 5, column \"Acceleration y"), "{error}");
+    fs::write(&log, format!("{head}\n")).unwrap();
+    let error = ingest(folder.path(), &[log], None).err().unwrap();
+    let error = error.to_string();
+    assert!(error.contains("has a header but no rows"), "{error}");
+}
+
+#[test]
+fn halves_of_a_device_are_told() {
+    let folder = folder();
+    let paths = ["Acceleration", "Gyroscope"].map(|sensor| {
+        let unit = if sensor == "Gyroscope" {
+            "rad/s"
+        } else {
+            "m/s^2"
+        };
+        let head = ["x", "y", "z"].map(|axis| format!("{sensor} {axis} ({unit})"));
+        let path = folder.path().join(format!("{sensor}.csv"));
+        let text = format!("Time (s),{}\n0,1,2,3\n0.01,1,2,3\n", head.join(","));
+        fs::write(&path, text).unwrap();
+        path
+    });
+    let told = |paths: &[PathBuf]| {
+        let got = ingest(folder.path(), paths, None).unwrap();
+        let mut notes = got.ingested.notes.into_iter();
+        notes.find(|note| note.contains("zip or the folder"))
+    };
+    let note = told(&paths).expect("a note");
+    assert!(
+        note.starts_with("Gyroscope has no acceleration and Acceleration no angular"),
+        "{note}"
+    );
+    // One phone that only counts steps beside a whole one is no half.
+    assert_eq!(told(&paths[..1]), None);
+    assert_eq!(told(&[folder.path().to_owned()]), None);
+}

@@ -23,6 +23,9 @@ pub(super) fn run(args: &AnalyzeArgs) -> anyhow::Result<Done> {
         ("--report", &args.report),
     ];
     for (option, value) in single {
+        if value.as_deref() == Some(Path::new("-")) {
+            bail!("{option}: standard output holds the result; name a file");
+        }
         if value.is_some() && args.files.len() > 1 {
             bail!(
                 "{option} takes one recording, but {} were given: run it once for each",

@@ -17,6 +17,7 @@ Examples:
   analyze ingest rath.zip carrier_1.csv carrier_2.csv --out walk.mcap  several devices, one recording
   analyze ingest rath.zip carrier_1.zip carrier_2.zip drum.wav --out walk.mcap  with sound
   analyze ingest sensor.csv --layout columns.toml --out walk.mcap
+  analyze ingest phone.zip --out - | analyze -               nothing is kept
 
 A file's name says whose device it was: carrier, bearer, walker or person in it is somebody who carries. A roles file says otherwise.";
 
@@ -26,10 +27,10 @@ pub(super) struct IngestArgs {
     /// Logs: .npz of the archive; .zip, .csv or folders of phone apps and inertial sensors; .wav of a sound recorder
     #[arg(required = true, value_name = "FILE")]
     files: Vec<PathBuf>,
-    /// The recording to write
+    /// The recording to write; `-` is standard output
     #[arg(long, value_name = "FILE.mcap")]
     out: PathBuf,
-    /// How the columns are laid out, where the files do not tell: a built-in name or a TOML file
+    /// How the columns are laid out, where the files do not tell: a built-in name (x-io, physics-toolbox) or a TOML file (docs/recording.md)
     #[arg(long, value_name = "NAME|FILE.toml")]
     layout: Option<String>,
     /// When the sound begins after the first inertial sample; taps that both noticed put it right later
@@ -54,7 +55,11 @@ pub(super) fn run(args: &IngestArgs) -> anyhow::Result<Done> {
         layout: args.layout.as_deref(),
         sound_start_s: args.sound_start,
     };
-    let mut writer = RecordingWriter::create(&args.out, &WriterOptions::default())?;
+    let piped = args.out.as_os_str() == "-";
+    let mut writer = match piped {
+        true => RecordingWriter::to_stream(std::io::stdout(), &WriterOptions::default())?,
+        false => RecordingWriter::create(&args.out, &WriterOptions::default())?,
+    };
     let done = import::ingest(&args.files, &options, &mut writer)?;
     writer.finish()?;
     for note in done.notes.iter().chain(&done.losses) {
@@ -65,11 +70,11 @@ pub(super) fn run(args: &IngestArgs) -> anyhow::Result<Done> {
         .iter()
         .map(|(topic, messages)| format!("{topic} ({messages})"))
         .collect();
-    recording::note!(
-        "analyze: {} written: {}",
-        args.out.display(),
-        topics.join(", ")
-    );
+    let out = match piped {
+        true => "standard output".into(),
+        false => args.out.to_string_lossy(),
+    };
+    recording::note!("analyze: {out} written: {}", topics.join(", "));
     Ok(if done.losses.is_empty() {
         Done::Well
     } else {

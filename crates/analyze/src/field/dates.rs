@@ -20,8 +20,12 @@ const PACKETS: f64 = 0.6;
 /// Packets of so many samples on average leave fewer than one step in twenty, which then look like holes; and so many of them tell their rate.
 const LONG_PACKET: usize = 20;
 const FEWEST_PACKETS: usize = 4;
-/// Stamps whose span is not the log's within this share tell no times.
+/// Stamps whose span is not the log's within this share run at another pace, or tell no times.
 const SAME_SPAN: f64 = 0.1;
+/// Stamps that run slower than the log by more than this are in another unit, or nobody filled them in. Those that run faster by more count messages,
+/// unless the log's mean step is shorter than any device's (s).
+const FARTHEST_PACE: f64 = 20.0;
+const AT_ONCE_S: f64 = 1e-3;
 /// A clock is set back once or twice; what goes back more often are messages that overtake each other.
 const SET_BACK: usize = 3;
 
@@ -31,31 +35,52 @@ pub struct Dated {
     pub t_s: Vec<f64>,
     /// Whether the samples have overtaken each other and belong in the order of these times.
     pub overtaken: bool,
+    /// Whether the log tells nothing of these times, not even how long it lasted.
+    pub own_pace: bool,
     /// Kind and text of a remark.
     pub remark: Option<(&'static str, String)>,
 }
 
-/// From log times and, where every sample has one, header stamps (s, each since its own first one), in the order of the log.
+impl Dated {
+    /// First and last time (s), where the log tells nothing of them.
+    pub fn own_s(&self) -> Option<(f64, f64)> {
+        let each = self.t_s.iter().filter(|_| self.own_pace).map(|t| (*t, *t));
+        each.reduce(|a, b| (a.0.min(b.0), a.1.max(b.1)))
+    }
+}
+
+/// From log times (s since the recording begins) and, where every sample has one, header stamps (s, moved by [`delay_s`]), in the order of the log.
 pub fn dated(log_s: Vec<f64>, stamp_s: Option<Vec<f64>>) -> Dated {
     let of_log = scatter_s(&log_s);
-    if let Some(stamp_s) = stamp_s
-        && of_log > EVEN_S
-        && stamp_s.len() == log_s.len()
-        && keep_time(&stamp_s, &log_s)
-    {
+    if let Some(stamp_s) = stamp_s.filter(|s| s.len() == log_s.len()) {
         let back = stamp_s.windows(2).filter(|w| w[1] < w[0]).count();
         let overtaken = back > SET_BACK;
-        let of_stamps = if overtaken {
-            let mut sorted = stamp_s.clone();
-            sorted.sort_by(f64::total_cmp);
-            scatter_s(&sorted)
-        } else {
-            scatter_s(&stamp_s)
-        };
-        if of_stamps < MORE_EVEN * of_log {
+        let mut ordered = stamp_s.clone();
+        if overtaken {
+            ordered.sort_by(f64::total_cmp);
+        }
+        let of_stamps = scatter_s(&ordered);
+        let spans = [&stamp_s, &log_s].map(|t| span_s(t));
+        let same_span = (spans[0] - spans[1]).abs() <= SAME_SPAN * spans[1];
+        if !same_span && 4 * back < stamp_s.len() && has_own_pace(&ordered, spans[1]) {
+            return Dated {
+                t_s: stamp_s,
+                overtaken,
+                own_pace: true,
+                remark: Some((
+                    "by_stamps",
+                    format!(
+                        "samples are dated by their header stamps, which span {:.3} s, the log times {:.3} s (written at once, or beside a simulation or a replay?); rates and lines of single signals are by the log",
+                        spans[0], spans[1]
+                    ),
+                )),
+            };
+        }
+        if same_span && of_log > EVEN_S && of_stamps < MORE_EVEN * of_log {
             return Dated {
                 t_s: on_the_logs_clock(&log_s, &stamp_s),
                 overtaken,
+                own_pace: false,
                 remark: Some((
                     "by_stamps",
                     format!(
@@ -71,6 +96,7 @@ pub fn dated(log_s: Vec<f64>, stamp_s: Option<Vec<f64>>) -> Dated {
         Some((t_s, usual, mean)) => Dated {
             t_s,
             overtaken: false,
+            own_pace: false,
             remark: Some((
                 "packets",
                 format!(
@@ -83,20 +109,38 @@ pub fn dated(log_s: Vec<f64>, stamp_s: Option<Vec<f64>>) -> Dated {
         None => Dated {
             t_s: log_s,
             overtaken: false,
+            own_pace: false,
             remark: None,
         },
     }
 }
 
-/// Whether stamps run as the log does: those that are all zero, or count something else, do not.
-fn keep_time(stamp_s: &[f64], log_s: &[f64]) -> bool {
-    let [stamps_s, log_s] = [stamp_s, log_s].map(|t| {
-        let (low, high) = t
-            .iter()
-            .fold((f64::MAX, f64::MIN), |(a, b), t| (a.min(*t), b.max(*t)));
-        high - low
-    });
-    (stamps_s - log_s).abs() <= SAME_SPAN * log_s
+/// What stamps (s since the first of them) are moved by, so that none lies behind its log time, nor before the recording begins.
+pub fn delay_s(late: impl Iterator<Item = f64>) -> f64 {
+    late.fold(f64::MAX, f64::min).max(0.0)
+}
+
+/// From the earliest to the latest, s.
+fn span_s(t_s: &[f64]) -> f64 {
+    let least = t_s.iter().copied().fold(f64::MAX, f64::min);
+    let most = t_s.iter().copied().fold(f64::MIN, f64::max);
+    most - least
+}
+
+/// Whether ascending stamps are times of a clock that runs at another pace than the log, which spans `log_s`. One that was only set anew goes on at
+/// the log's pace.
+fn has_own_pace(stamp_s: &[f64], log_s: f64) -> bool {
+    let mut steps: Vec<f64> = stamp_s.windows(2).map(|w| w[1] - w[0]).collect();
+    let mean_s = log_s / steps.len() as f64;
+    median(&mut steps).is_some_and(|usual_s| {
+        let possible = match mean_s < AT_ONCE_S {
+            true => f64::INFINITY,
+            false => FARTHEST_PACE * mean_s,
+        };
+        usual_s > 0.0
+            && (usual_s - mean_s).abs() > SAME_SPAN * mean_s
+            && (mean_s / FARTHEST_PACE..=possible).contains(&usual_s)
+    })
 }
 
 /// Mean absolute difference of steps from the usual one, s.
@@ -231,6 +275,36 @@ mod tests {
         // Stamps that nobody filled in, or in another unit.
         for stamps in [vec![0.0; 6000], taken.iter().map(|t| 1e-3 * t).collect()] {
             assert_eq!(dated(log.clone(), Some(stamps)).t_s, log);
+        }
+    }
+
+    #[test]
+    fn a_log_that_keeps_another_pace_tells_no_times() {
+        let taken: Vec<f64> = (0..6000).map(|k| f64::from(k) * 0.01).collect();
+        let at = |f: fn(f64) -> f64| -> Vec<f64> { taken.iter().map(|t| f(*t)).collect() };
+        // Written at once, within half a second, at the end of a recording that others fill; beside a simulation, slow and fast.
+        for (log, begins_s) in [
+            (at(|_| 0.0), 0.0),
+            (at(|_| 70.0), 70.0 - 59.99),
+            (at(|t| 8e-3 * t), 0.0),
+            (at(|t| 3.0 * t), 0.0),
+            (at(|t| 4.0 + 0.5 * t), 0.0),
+        ] {
+            let moved_s = delay_s(log.iter().zip(&taken).map(|(l, s)| l - s));
+            let stamps = taken.iter().map(|t| t + moved_s).collect();
+            let found = dated(log, Some(stamps));
+            assert!(found.own_pace && found.remark.unwrap().0 == "by_stamps");
+            let off = worst(&found.t_s, taken.iter().map(|t| t + begins_s));
+            assert!(off < 1e-9, "{off}");
+        }
+        // Stamps that were set anew on the way, that count messages, or that are whatever was in memory, leave the log as it is.
+        let mut random = Random(9);
+        for stamps in [
+            at(|t| if t < 20.0 { t } else { t + 3600.0 }),
+            at(|t| 100.0 * t),
+            taken.iter().map(|_| 1e5 * random.uniform()).collect(),
+        ] {
+            assert_eq!(dated(taken.clone(), Some(stamps)).t_s, taken);
         }
     }
 

@@ -1,8 +1,9 @@
 //! Errors of estimates where the recording holds the truth (`--truth`).
 
 use recording::read::Recording;
+use recording::signal::Signal;
 
-use super::{Columns, Records};
+use super::{ACCEL, Columns, Records};
 use nalgebra::{UnitQuaternion, Vector3};
 
 use crate::clock::{Clock, from_signals};
@@ -92,13 +93,20 @@ pub struct Judge {
 }
 
 impl Judge {
-    /// The truth of a recording; `None` where it has none.
-    pub fn read(columns: &Columns, roles: &Roles, recording: &Recording) -> Option<Self> {
+    /// The truth of a recording; `None` where it has none. `stamped` are the topics whose stamps are of one clock, where their spans overlap.
+    pub fn read(
+        columns: &Columns,
+        roles: &Roles,
+        recording: &Recording,
+        stamped: &[&str],
+    ) -> Option<Self> {
         let step_s = columns.times(STEP_TOPIC);
         let topic = roles.topic(Role::Truth);
-        let sensor = roles
-            .topic(Role::Imu)
-            .and_then(|t| Some(columns.sensor(t)?.track));
+        let track = |topic: &str| {
+            let dates = columns.dates(topic, ACCEL[0], stamped)?;
+            Some(columns.sensor(topic, dates)?.track)
+        };
+        let sensor = roles.topic(Role::Imu).and_then(track);
         let mut judge = Self {
             truth: Truth::default(),
             height: None,
@@ -108,17 +116,25 @@ impl Judge {
             step_s,
         };
         if let Some(topic) = topic {
+            // By the log, unless it tells no times.
+            let times_s = |signal: &Signal, field: &str| {
+                let own = columns.dates(topic, field, stamped);
+                let own = own.filter(|dated| dated.own_pace);
+                own.map_or_else(|| signal.times_s(columns.start_ns), |dated| dated.t_s)
+            };
             for fields in ORIENTATION {
                 if let (Some(q), Some(signal)) = (
                     columns.values(topic, *fields),
                     columns.get(topic, fields[0]),
                 ) {
-                    judge.truth = Truth::from_columns(&signal.times_s(columns.start_ns), q);
+                    judge.truth = Truth::from_columns(&times_s(signal, fields[0]), q);
                 }
             }
-            let height = HEIGHT.iter().find_map(|f| columns.get(topic, f));
-            judge.height = height.map(|s| {
-                let all = s.times_s(columns.start_ns).into_iter().zip(&s.values);
+            let height = HEIGHT
+                .iter()
+                .find_map(|f| Some((columns.get(topic, f)?, f)));
+            judge.height = height.map(|(s, field)| {
+                let all = times_s(s, field).into_iter().zip(&s.values);
                 all.filter(|(_, z)| z.is_finite()).unzip()
             });
             judge.of_body = recording

@@ -32,26 +32,30 @@ use crate::quality::Quality;
 use crate::roles::{Role, Roles, Sensors, about_the_load};
 use carriers::Carriers;
 use clocks::Clocks;
-use dates::{Dated, dated};
+use dates::{Dated, dated, delay_s};
 use judge::Judge;
 use sound::Heard;
 
 /// The six columns of an inertial message.
-const GYRO: [&str; 3] = [
+pub(crate) const GYRO: [&str; 3] = [
     "angular_velocity.x",
     "angular_velocity.y",
     "angular_velocity.z",
 ];
-const ACCEL: [&str; 3] = [
+pub(crate) const ACCEL: [&str; 3] = [
     "linear_acceleration.x",
     "linear_acceleration.y",
     "linear_acceleration.z",
 ];
 /// ROS's mark of a field that the sensor does not have.
 const GYRO_MARK: &str = "angular_velocity_covariance[0]";
+const ACCEL_MARK: &str = "linear_acceleration_covariance[0]";
 
-/// Seconds and nanoseconds of a header's stamp.
-const STAMP: [&str; 2] = ["header.stamp.sec", "header.stamp.nanosec"];
+/// Seconds and nanoseconds of a header's stamp, as ROS 2 and as ROS 1 name them.
+const STAMPS: [[&str; 2]; 2] = [
+    ["header.stamp.sec", "header.stamp.nanosec"],
+    ["header.stamp.sec", "header.stamp.nsec"],
+];
 /// Fields of a beat: its number and its own time.
 const BEAT: [&str; 2] = ["number", "time_s"];
 /// More samples than this share left out are worth a word.
@@ -83,6 +87,8 @@ pub struct Field {
     judge: Option<Judge>,
     filled: Filled,
     quality: Vec<Quality>,
+    /// By topic, when a sensor's first and last samples were taken (s), where the log does not tell.
+    pub own_s: BTreeMap<String, (f64, f64)>,
 }
 
 /// Which groups of columns came from here.
@@ -95,7 +101,7 @@ struct Filled {
 
 impl Field {
     /// Reads the sensors' topics; nothing when the recording has none. Clocks are put on the rath's by taps, or the carriers' on each other by
-    /// their motion, as `devices` says.
+    /// their motion, as `devices` says. `window` is asked with the time of the sensors' last sample (s).
     ///
     /// # Errors
     /// Where the file cannot be read.
@@ -105,7 +111,7 @@ impl Field {
         gravity_m_per_s2: f64,
         truth: bool,
         devices: DeviceClocks,
-        window: Window,
+        window: impl FnOnce(f64) -> Window,
     ) -> Result<Self, ReadError> {
         let topics: Vec<&str> = [Role::Imu, Role::Carriers, Role::Beats, Role::Truth]
             .iter()
@@ -123,7 +129,7 @@ impl Field {
         if topics.is_empty() || !(senses || truth) {
             return Ok(field);
         }
-        let factors = match thin::factors(recording, roles) {
+        let factors = match thin::factors(recording, roles)? {
             Ok(factors) => factors,
             Err(samples) => {
                 field.quality.push(Quality::remark(
@@ -142,7 +148,8 @@ impl Field {
                 GYRO.contains(&field)
                     || ACCEL.contains(&field)
                     || field == GYRO_MARK
-                    || STAMP.contains(&field)
+                    || field == ACCEL_MARK
+                    || STAMPS.as_flattened().contains(&field)
                     || judge::wants(field)
                     || BEAT.contains(&field)
             }) || (truth && path.starts_with(judge::STEP_TOPIC))
@@ -158,17 +165,30 @@ impl Field {
         }
         let start_ns = recording.info().start_ns;
         let columns = Columns { signals, start_ns };
+        let sensors: Vec<&str> = imus.clone().map(String::as_str).collect();
+        let stamped = [&sensors, roles.topic(Role::Truth).as_slice()].concat();
+        let dates = |topic: &&str| columns.dates(topic, ACCEL[0], &stamped);
+        let dates: Vec<Option<Dated>> = sensors.iter().map(dates).collect();
+        for (topic, dated) in sensors.iter().zip(&dates) {
+            let own_s = dated.as_ref().and_then(Dated::own_s);
+            field
+                .own_s
+                .extend(own_s.map(|ends| ((*topic).to_owned(), ends)));
+        }
+        let last_s = field.own_s.values().map(|e| e.1).fold(0.0, f64::max);
+        let window = window(last_s);
         let places = place::places(recording);
         let options = options(place::is_simulated(recording), &roles.sensors);
         let one_clock = devices == DeviceClocks::One;
         let leave = devices == DeviceClocks::Told;
         let mut clocks = Clocks::default();
-        for topic in imus {
+        for (topic, dated) in imus.zip(dates) {
             let Some(Sensor {
                 mut track,
                 turns,
+                feels,
                 remarks,
-            }) = columns.sensor(topic)
+            }) = dated.and_then(|dated| columns.sensor(topic, dated))
             else {
                 continue;
             };
@@ -198,12 +218,15 @@ impl Field {
                     ..here.or_as_said(&roles.sensors)
                 };
                 field.topic = Some(topic.clone());
-                if turns {
-                    field.motion(topic, &track, settings);
-                } else {
-                    field.no_motion =
-                        Some("no gyroscope (angular_velocity_covariance[0] is -1)".into());
+                let lacking = |what, mark| Some(format!("no {what} ({mark} is -1)"));
+                match (turns, feels) {
+                    (true, true) => field.motion(topic, &track, settings),
+                    (false, _) => field.no_motion = lacking("gyroscope", GYRO_MARK),
+                    (_, false) => field.no_motion = lacking("accelerometer", ACCEL_MARK),
                 }
+            }
+            if !feels {
+                continue;
             }
             // The one sensor of a walker's phone plays the rath's role for want of another: steps tell.
             if !is_rath || (roles.patterns(Role::Carriers).is_empty() && !about_the_load(topic)) {
@@ -229,7 +252,7 @@ impl Field {
         }
         field.quality.append(&mut clocks.remarks);
         if truth {
-            field.judge = Judge::read(&columns, roles, recording);
+            field.judge = Judge::read(&columns, roles, recording, &stamped);
         }
         Ok(field)
     }
@@ -434,6 +457,11 @@ impl Field {
         out
     }
 
+    /// Whether there is a truth to judge by.
+    pub fn has_truth(&self) -> bool {
+        self.judge.is_some()
+    }
+
     /// Steps, beats heard and unloading, as events.
     pub fn events(&self) -> Vec<Event> {
         let mut out = self.carriers.events();
@@ -487,8 +515,9 @@ fn options(simulated: bool, said: &Sensors) -> Options {
 /// What is read of an inertial sensor.
 struct Sensor {
     track: Track,
-    /// Whether it has a gyroscope.
+    /// Whether it has a gyroscope, and an accelerometer.
     turns: bool,
+    feels: bool,
     remarks: Vec<(&'static str, String)>,
 }
 
@@ -513,19 +542,59 @@ impl Columns {
         found.try_into().ok()
     }
 
-    fn sensor(&self, topic: &str) -> Option<Sensor> {
-        let signal = self.get(topic, ACCEL[0])?;
+    /// A sensor's header stamps, seconds and nanoseconds.
+    fn stamps(&self, topic: &str) -> Option<[&[f64]; 2]> {
+        STAMPS.iter().find_map(|names| self.values(topic, *names))
+    }
+
+    /// A topic's stamps (s), on one clock with those of the others that were stamped in the same span of time.
+    fn stamp_s(&self, topic: &str, stamped: &[&str]) -> Option<Vec<f64>> {
+        let ends = |topic: &str| {
+            let [sec, nanosec] = self.stamps(topic)?;
+            // A clock that is not set yet says 0.
+            let set = sec.iter().zip(nanosec).map(|(s, ns)| s + ns / 1e9);
+            let set = set.filter(|s| *s != 0.0).map(|s| (s, s));
+            set.reduce(|a, b| (a.0.min(b.0), a.1.max(b.1)))
+        };
+        let own = ends(topic)?;
+        let meanwhile = |t: &&&str| ends(t).is_some_and(|(a, b)| a <= own.1 && own.0 <= b);
+        let beside: Vec<&str> = stamped.iter().filter(meanwhile).copied().collect();
+        let firsts = beside.iter().filter_map(|t| Some(ends(t)?.0));
+        let first_s = firsts.fold(own.0, f64::min);
+        let since = |topic: &str| {
+            let [sec, nanosec] = self.stamps(topic)?;
+            // Whole seconds first: a date has no digits left for nanoseconds.
+            let (whole_s, part_s) = (first_s.floor(), first_s.fract());
+            let since = move |(s, ns): (&f64, &f64)| (s - whole_s) + (ns / 1e9 - part_s);
+            Some(sec.iter().zip(nanosec).map(since))
+        };
+        let moved_s = delay_s(beside.iter().flat_map(|t| {
+            let log_s = self.get(t, STAMPS[0][0]).map(|s| s.times_s(self.start_ns));
+            let each = log_s
+                .into_iter()
+                .flatten()
+                .zip(since(t).into_iter().flatten());
+            each.map(|(l, s)| l - s)
+        }));
+        Some(since(topic)?.map(|s| s + moved_s).collect())
+    }
+
+    /// When the values of a topic's field were taken.
+    fn dates(&self, topic: &str, field: &str, stamped: &[&str]) -> Option<Dated> {
+        let signal = self.get(topic, field)?;
+        let stamp_s = self.stamp_s(topic, stamped);
+        Some(dated(signal.times_s(self.start_ns), stamp_s))
+    }
+
+    fn sensor(&self, topic: &str, dated: Dated) -> Option<Sensor> {
         let accel = self.values(topic, ACCEL)?;
-        let n = signal.values.len();
-        let stamp_s = self.values(topic, STAMP).map(|[sec, nanosec]| {
-            let since = |(s, ns): (&f64, &f64)| (s - sec[0]) + (ns - nanosec[0]) / 1e9;
-            sec.iter().zip(nanosec).map(since).collect()
-        });
+        let n = accel[0].len();
         let Dated {
             mut t_s,
             overtaken,
             remark,
-        } = dated(signal.times_s(self.start_ns), stamp_s);
+            ..
+        } = dated;
         let mut remarks: Vec<_> = remark.into_iter().collect();
         let gyro = self.values(topic, GYRO);
         // Samples without a rate among others that have one are holes; a sensor that never gives one still tells steps.
@@ -534,6 +603,8 @@ impl Columns {
         let marked = |k: usize| mark.is_some_and(|mark| mark[k] == -1.0);
         let without = (0..n).filter(|k| marked(*k)).count();
         let turns = gyro.is_some() && without < n;
+        let feels = self.get(topic, ACCEL_MARK);
+        let feels = feels.is_none_or(|mark| mark.values.iter().any(|m| *m != -1.0));
         if turns && without > 0 {
             for (k, t) in t_s.iter_mut().enumerate() {
                 if marked(k) {
@@ -569,6 +640,7 @@ impl Columns {
         Some(Sensor {
             track,
             turns,
+            feels,
             remarks,
         })
     }
@@ -655,7 +727,11 @@ mod tests {
             signals.push(column(field, vec![1.0; 100]));
         }
         let start_ns = 0;
-        Columns { signals, start_ns }.sensor("/imu/rath").unwrap()
+        let columns = Columns { signals, start_ns };
+        let dates = columns
+            .dates("/imu/rath", ACCEL[0], &["/imu/rath"])
+            .unwrap();
+        columns.sensor("/imu/rath", dates).unwrap()
     }
 
     #[test]
@@ -674,6 +750,40 @@ mod tests {
         // A pedometer has none at all, and its steps still count.
         let never = read(|_| false);
         assert!(!never.turns && never.track.len() == 100);
+    }
+
+    #[test]
+    fn sensors_of_a_log_that_was_written_at_once_keep_their_clock() {
+        // One began 2 s after the other; ROS 1 and ROS 2 name their stamps differently.
+        let since_s = [
+            ("/imu/rath", "nanosec", 0.0),
+            ("/imu/carrier_1", "nsec", 2.0),
+        ];
+        let mut signals = Vec::new();
+        for (topic, nanosec, begins_s) in since_s {
+            let mut column = |field: &str, value: &dyn Fn(i64) -> f64| {
+                signals.push(Signal {
+                    path: format!("{topic}.{field}"),
+                    unit: String::new(),
+                    times_ns: vec![9; 600].into(),
+                    values: (0..600).map(value).collect(),
+                });
+            };
+            let ns = |k: i64| 1_764_000_000_900_000_000 + (begins_s * 1e9) as i64 + 10_000_000 * k;
+            column(ACCEL[0], &|_| 9.8);
+            column("header.stamp.sec", &|k| (ns(k) / 1_000_000_000) as f64);
+            let rest = |k| (ns(k) % 1_000_000_000) as f64;
+            column(&format!("header.stamp.{nanosec}"), &rest);
+        }
+        let start_ns = 9;
+        let columns = Columns { signals, start_ns };
+        let topics = since_s.map(|s| s.0);
+        for (topic, _, begins_s) in since_s {
+            let dates = columns.dates(topic, ACCEL[0], &topics).unwrap();
+            let off = |(k, t): (usize, &f64)| (t - begins_s - 0.01 * k as f64).abs();
+            let worst = dates.t_s.iter().enumerate().map(off).fold(0.0, f64::max);
+            assert!(worst < 1e-6, "{topic}: {worst}");
+        }
     }
 
     #[test]

@@ -6,7 +6,7 @@ use recording::Signal;
 use recording::read::{Batch, ReadError, Recording};
 use recording::signal::field_of;
 
-use super::{ACCEL, GYRO, GYRO_MARK, STAMP};
+use super::{ACCEL, GYRO, GYRO_MARK, STAMPS};
 use crate::roles::{Role, Roles};
 
 /// Bytes that the estimates hold per sample of the rath's sensor, and of a carrier's (measured; they hold many columns at once).
@@ -16,9 +16,17 @@ const CARRIER_BYTES: u64 = 250;
 const MOST_BYTES: u64 = 220_000_000;
 /// Thinning stops at this rate (Hz): what moves on shoulders lies below a tenth of it.
 const LEAST_HZ: f64 = 100.0;
+/// No device samples faster (Hz): such a log was written at once, and the stamps tell the rate.
+const MOST_HZ: f64 = 2e4;
 
-/// How many samples of each topic become one; 1 where all are kept. `Err` gives the number of samples that are too many all the same.
-pub fn factors(recording: &Recording, roles: &Roles) -> Result<BTreeMap<String, usize>, u64> {
+/// How many samples of each topic become one; 1 where all are kept. `Ok(Err)` gives the number of samples that are too many all the same.
+///
+/// # Errors
+/// Where the file cannot be read.
+pub fn factors(
+    recording: &Recording,
+    roles: &Roles,
+) -> Result<Result<BTreeMap<String, usize>, u64>, ReadError> {
     let info = recording.info();
     let span_s = (info.end_ns.saturating_sub(info.start_ns)) as f64 / 1e9;
     let rath = roles.topic(Role::Imu);
@@ -42,16 +50,39 @@ pub fn factors(recording: &Recording, roles: &Roles) -> Result<BTreeMap<String, 
     };
     let mut factors: BTreeMap<String, usize> = topics.map(|t| (t.clone(), 1)).collect();
     if bytes(&factors) <= MOST_BYTES {
-        return Ok(factors);
+        return Ok(Ok(factors));
     }
+    let by_log = |topic: &str| messages(topic) as f64 / span_s.max(1e-9);
+    let stamped_s = match factors.keys().any(|topic| by_log(topic) > MOST_HZ) {
+        true => stamped_s(recording)?,
+        false => BTreeMap::new(),
+    };
     for (topic, factor) in &mut factors {
-        let hz = messages(topic) as f64 / span_s.max(1e-9);
+        let hz = match stamped_s.get(topic) {
+            Some(span_s) if by_log(topic) > MOST_HZ => messages(topic) as f64 / span_s,
+            _ => by_log(topic),
+        };
         *factor = ((hz / LEAST_HZ) as usize).max(1);
     }
     if bytes(&factors) <= MOST_BYTES {
-        return Ok(factors);
+        return Ok(Ok(factors));
     }
-    Err(factors.keys().map(|topic| messages(topic)).sum())
+    Ok(Err(factors.keys().map(|topic| messages(topic)).sum()))
+}
+
+/// From the first to the last stamp of each topic that has stamps, s.
+fn stamped_s(recording: &Recording) -> Result<BTreeMap<String, f64>, ReadError> {
+    let mut ends: BTreeMap<String, (i64, i64)> = BTreeMap::new();
+    recording.stream(&|_| false, &mut |batch| {
+        for &stamp in batch.stamps_ns.unwrap_or_default() {
+            let topic = ends.entry(batch.topic.to_owned());
+            let ends = topic.or_insert((stamp, stamp));
+            *ends = (ends.0.min(stamp), ends.1.max(stamp));
+        }
+    })?;
+    let span_s = |(first, last): (i64, i64)| (i128::from(last) - i128::from(first)) as f64 / 1e9;
+    let each = ends.into_iter().map(|(topic, ends)| (topic, span_s(ends)));
+    Ok(each.filter(|(_, span_s)| *span_s > 0.0).collect())
 }
 
 /// The inertial columns and stamps of the topics whose factor is above 1: means over so many samples in the order of the file, at log times.
@@ -90,8 +121,16 @@ pub fn read(
 }
 
 /// What is averaged. A mean of whole seconds near 2·10⁹ is good to 10⁻⁷ s.
-const COLUMNS: [&str; 8] = [
-    GYRO[0], GYRO[1], GYRO[2], ACCEL[0], ACCEL[1], ACCEL[2], STAMP[0], STAMP[1],
+const COLUMNS: [&str; 9] = [
+    GYRO[0],
+    GYRO[1],
+    GYRO[2],
+    ACCEL[0],
+    ACCEL[1],
+    ACCEL[2],
+    STAMPS[0][0],
+    STAMPS[0][1],
+    STAMPS[1][1],
 ];
 
 /// One sensor on the way.

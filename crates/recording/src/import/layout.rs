@@ -1,20 +1,4 @@
-//! Any CSV with inertial columns, by a layout in TOML:
-//!
-//! ```toml
-//! header = "Time (s)"          # the header is the first line that begins with this; by default the first line
-//! device = "belt"              # topic /imu/belt; by default the file's name
-//! [time]
-//! column = "Time (s)"
-//! unit = "s"                   # s, ms, us, ns
-//! start_s = 1700000000.0       # added to every time, s since 1970; by default 0
-//! [acceleration]
-//! columns = ["Accelerometer X (g)", "Accelerometer Y (g)", "Accelerometer Z (g)"]
-//! unit = "g"                   # m/s^2, g
-//! sign = 1                     # -1 where the axis that points up reads negative at rest
-//! [angular_velocity]
-//! columns = ["Gyroscope X (deg/s)", "Gyroscope Y (deg/s)", "Gyroscope Z (deg/s)"]
-//! unit = "deg/s"               # rad/s, deg/s
-//! ```
+//! Any CSV with inertial columns, by a layout in TOML; docs/recording.md has one with every key.
 
 use std::path::Path;
 

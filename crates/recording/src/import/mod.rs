@@ -159,6 +159,7 @@ pub fn ingest(
         logs.push(log);
     }
     notes.extend(undated(&logs));
+    notes.extend(halves(&logs));
     let first_ns = logs
         .iter()
         .flat_map(|log| log.samples.iter().map(|s| s.t_ns))
@@ -392,4 +393,19 @@ fn undated(logs: &[imu::Log]) -> Vec<String> {
             )
         })
         .collect()
+}
+
+/// Files of single sensors are devices of their own, and neither half of a device tells how it moves: a note where both are there.
+fn halves(logs: &[imu::Log]) -> Option<String> {
+    let without = |what: fn(&imu::Sample) -> bool| {
+        let half = |log: &&imu::Log| !log.samples.iter().any(what);
+        logs.iter().find(half).map(|log| log.name.as_str())
+    };
+    let (rate, force) = (
+        without(|s| s.force.is_some())?,
+        without(|s| s.rate.is_some())?,
+    );
+    Some(format!(
+        "{rate} has no acceleration and {force} no angular velocity: if they are of one device, give the zip or the folder that they come from instead"
+    ))
 }

@@ -31,7 +31,7 @@ pub(super) fn read(files: &Files) -> Result<Log, ImportError> {
         None => Vec::new(),
     };
     let mut tracks: [Track; 3] = Default::default();
-    let mut seen = Vec::new();
+    let (mut seen, mut known) = (Vec::new(), false);
     for (name, text) in files.texts() {
         if name.contains("meta/") || !text.lines().next().is_some_and(is_header) {
             continue;
@@ -42,6 +42,7 @@ pub(super) fn read(files: &Files) -> Result<Log, ImportError> {
         for ((sensor, unit), track) in SENSORS.iter().zip(&mut tracks) {
             let names = ["x", "y", "z"].map(|axis| format!("{sensor} {axis} ({unit})"));
             if track.is_empty() && table.find(&names[0]).is_some() {
+                known = true;
                 *track = read_track(&table, [&names[0], &names[1], &names[2]], &starts)?;
             }
         }
@@ -61,7 +62,7 @@ pub(super) fn read(files: &Files) -> Result<Log, ImportError> {
     } else {
         with_gravity
     };
-    if force.is_empty() && rate.is_empty() {
+    if force.is_empty() && rate.is_empty() && !known {
         let problem = format!(
             "has no acceleration and no gyroscope columns; found {}",
             seen.join(", ")

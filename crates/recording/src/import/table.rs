@@ -2,6 +2,9 @@
 
 use super::ImportError;
 
+/// How programs write a value that is missing.
+const NOTHING: [&str; 4] = ["null", "none", "na", "n/a"];
+
 /// A table of text cells.
 pub(super) struct Table {
     /// The file, for messages.
@@ -59,7 +62,16 @@ impl Table {
         let columns = columns.iter().map(str::to_owned).collect();
         let mut rows = Vec::new();
         for row in reader.records() {
-            let row = row.map_err(|error| problem(format!("cannot be read: {error}")))?;
+            let mut row = row.map_err(|error| problem(format!("cannot be read: {error}")))?;
+            // The reader begins a row with the empty lines before it.
+            if let Some(mut at) = row.position().cloned() {
+                // OK because a place in the text fits.
+                let rest = &text.as_bytes()[offset + at.byte() as usize..];
+                let ends = rest.iter().take_while(|b| matches!(b, b'\r' | b'\n'));
+                let empty = ends.filter(|b| **b == b'\n').count() as u64;
+                at.set_line(at.line() + empty);
+                row.set_position(Some(at));
+            }
             if row.iter().any(|cell| !cell.is_empty()) {
                 rows.push(row);
             }
@@ -97,8 +109,7 @@ impl Table {
         } else {
             format!("{}: ", self.name)
         };
-        // OK because a line's number fits where the text does.
-        let line = last.position().map_or(0, |at| at.line() as usize) + self.header_line - 1;
+        let line = self.line(self.rows.len() - 1);
         notes.push(format!(
             "{file}line {line}, the last, has {found} of {expected} cells: it was cut off and is left out"
         ));
@@ -151,10 +162,17 @@ impl Table {
             .unwrap_or_default()
     }
 
-    /// A cell's number; an empty cell is NaN.
+    /// The line of a row in the file, from 1; empty lines count.
+    fn line(&self, row: usize) -> usize {
+        let at = self.rows.get(row).and_then(csv::StringRecord::position);
+        // OK because a line's number fits where the text does.
+        at.map_or(0, |at| at.line() as usize) + self.header_line - 1
+    }
+
+    /// A cell's number; one that is empty, or says that there is none, is NaN.
     pub fn number(&self, row: usize, column: usize) -> Result<f64, ImportError> {
         let cell = self.text(row, column);
-        if cell.is_empty() {
+        if cell.is_empty() || NOTHING.iter().any(|word| cell.eq_ignore_ascii_case(word)) {
             return Ok(f64::NAN);
         }
         let parsed = if self.decimal_comma {
@@ -166,7 +184,7 @@ impl Table {
             let cell: String = cell.chars().take(40).collect();
             self.problem(format!(
                 "line {}, column {:?}: found {cell:?}, expected a number",
-                self.header_line + 1 + row,
+                self.line(row),
                 self.columns.get(column).map_or("", String::as_str)
             ))
         })
