@@ -59,7 +59,7 @@ fn contact(inputs: &Inputs, out: &mut Vec<Event>) {
                     true => Event {
                         t_s: *t_s,
                         kind: "contact_regained",
-                        what: format!("handle {number} presses again with {n:.0} N"),
+                        what: format!("handle {number} presses with {n:.*} N", decimals(*n)),
                     },
                     false => Event {
                         t_s: *t_s,
@@ -73,7 +73,13 @@ fn contact(inputs: &Inputs, out: &mut Vec<Event>) {
     }
 }
 
-/// Stretches of at least two samples in which nothing holds the weight.
+/// Decimals that show two digits of a positive number or more.
+fn decimals(x: f64) -> usize {
+    // OK because it is clamped, and zero decimals are right where it is no number.
+    (1.0 - x.log10().floor()).clamp(0.0, 9.0) as usize
+}
+
+/// Stretches of at least two samples in which next to nothing holds the weight.
 fn jumps(c: &Context, out: &mut Vec<Event>) {
     let inputs = c.inputs;
     let (t_s, ratio) = if inputs.normal_n.is_empty() {
@@ -100,7 +106,7 @@ fn jumps(c: &Context, out: &mut Vec<Event>) {
                             t_s: t_s[from],
                             kind: "jump",
                             what: format!(
-                                "nothing holds it for {:.2} s",
+                                "next to nothing holds it for {:.2} s",
                                 t_s[k.min(last)] - t_s[from]
                             ),
                         });
