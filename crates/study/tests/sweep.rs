@@ -136,6 +136,9 @@ fn angles_are_taken_about_their_circular_mean() {
     assert!((sd - (14.12f64 / 3.0).sqrt()).abs() < 1e-9, "{csv}");
     let about = about_their_mean(&[170.0, -170.0, -160.0], 360.0);
     assert!((about[1] - about[0] - 20.0).abs() < 1e-9 && (about[2] - about[1] - 10.0).abs() < 1e-9);
+    // Axes, which are the same after half a turn.
+    let about = about_their_mean(&[89.0, -89.0, -85.0], 180.0);
+    assert!((about[1] - about[0] - 2.0).abs() < 1e-9 && (about[2] - about[1] - 4.0).abs() < 1e-9);
 }
 
 #[test]
