@@ -24,11 +24,11 @@ fn plan(seeds: u64) -> Plan {
 #[test]
 fn rows_are_the_same_however_the_runs_are_shared_out() {
     let plan = plan(20);
-    let all = plan.run(0..40, None);
+    let all = plan.run(0..40, None).unwrap();
     assert_eq!(all.len(), 40);
     for piece in [0..1, 7..13, 15..29, 39..40] {
         let (first, last) = (piece.start as usize, piece.end as usize);
-        assert_eq!(plan.run(piece, None), all[first..last]);
+        assert_eq!(plan.run(piece, None).unwrap(), all[first..last]);
     }
 }
 
@@ -65,8 +65,8 @@ fn many_seeds_give_what_few_give_within_the_tolerance() {
     };
     for (run, other) in [(0, 0), (1, 1), (20, 2)] {
         let (a, b) = (
-            many.run(run..run + 1, None),
-            few.run(other..other + 1, None),
+            many.run(run..run + 1, None).unwrap(),
+            few.run(other..other + 1, None).unwrap(),
         );
         let place = column(&many, "rms_roll_deg");
         let number = |cell: &study::sweep::table::Cell| match cell {

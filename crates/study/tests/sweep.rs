@@ -100,7 +100,7 @@ fn a_run_without_a_window_says_so() {
     let study = plan(
         "metrics = [\"dz_pp_m\", \"rms_roll_deg\"]\n[set]\nduration_s = 1.0\nanalysis_start_s = 15.0",
     );
-    let rows = study.unwrap().run(0..1, None);
+    let rows = study.unwrap().run(0..1, None).unwrap();
     let Cell::Text(why) = &rows[0][rows[0].len() - 2] else {
         panic!("{rows:?}");
     };
@@ -136,6 +136,9 @@ fn angles_are_taken_about_their_circular_mean() {
     assert!((sd - (14.12f64 / 3.0).sqrt()).abs() < 1e-9, "{csv}");
     let about = about_their_mean(&[170.0, -170.0, -160.0], 360.0);
     assert!((about[1] - about[0] - 20.0).abs() < 1e-9 && (about[2] - about[1] - 10.0).abs() < 1e-9);
+    // Axes, which are the same after half a turn.
+    let about = about_their_mean(&[89.0, -89.0, -85.0], 180.0);
+    assert!((about[1] - about[0] - 2.0).abs() < 1e-9 && (about[2] - about[1] - 4.0).abs() < 1e-9);
 }
 
 #[test]
@@ -180,13 +183,11 @@ fn a_recording_that_is_lost_is_made_again_and_another_study_s_table_is_none_of_o
     assert!(missing().is_empty());
     let kept = folder.path().join("recordings");
     let first = kept.join("run-000000000.mcap");
-    let left = kept.join(".run-000000000.mcap.abc.part");
     let whole = std::fs::read(&first).unwrap();
     std::fs::write(&first, &whole[..whole.len() / 2]).unwrap();
-    std::fs::write(&left, "half").unwrap();
     assert_eq!(missing(), [0]);
     compute();
-    assert!(std::fs::read(&first).unwrap() == whole && !left.exists());
+    assert!(std::fs::read(&first).unwrap() == whole);
     std::fs::remove_file(kept.join("run-000000001.mcap")).unwrap();
     assert_eq!(missing(), [0]);
     // The table needs no recordings.
@@ -194,6 +195,63 @@ fn a_recording_that_is_lost_is_made_again_and_another_study_s_table_is_none_of_o
     assert!(store.is_merged());
     let other = plan(&text("rms_roll_deg")).unwrap();
     assert!(!Store::new(&other, folder.path()).is_merged());
+}
+
+/// What a kill left goes when the study goes on; what another process may be writing stays, and so does what is no study's.
+#[test]
+fn what_a_kill_left_is_taken_away() {
+    let ours = plan("seeds = 1\nset = { duration_s = 1.0, analysis_start_s = 0.0 }").unwrap();
+    let folder = tempfile::tempdir().unwrap();
+    let store = Store::new(&ours, folder.path());
+    store.create().unwrap();
+    std::fs::create_dir(folder.path().join("recordings")).unwrap();
+    let hours_old = std::time::SystemTime::now() - std::time::Duration::from_secs(7200);
+    let unfinished = |name: &str, old: bool| {
+        let path = folder.path().join(name);
+        let file = std::fs::File::create(&path).unwrap();
+        if old {
+            file.set_modified(hours_old).unwrap();
+        }
+        path
+    };
+    let left = [
+        "parts/.000000000-000000001.parquet.abc.part",
+        "recordings/.run-000000000.mcap.abc.part",
+        ".runs.parquet.abc.part",
+    ];
+    let left = left.map(|name| unfinished(name, true));
+    let kept = [
+        unfinished("parts/.000000000-000000001.parquet.def.part", false),
+        unfinished("recordings/.run-000000000.mcap.def.part", false),
+        unfinished(".film.part", true),
+        unfinished("parts/notes.part", true),
+    ];
+    store
+        .compute(&[0], 1, &AtomicBool::new(false), || ())
+        .unwrap();
+    assert!(!left.iter().any(|path| path.exists()), "{left:?}");
+    assert!(kept.iter().all(|path| path.exists()), "{kept:?}");
+}
+
+/// That a disk is full says nothing of a run. A row of it would stay so for ever: `--resume` leaves what is there.
+#[test]
+fn a_recording_that_cannot_be_written_is_no_result() {
+    let text = "seeds = 2\nrecordings = true\n[set]\nduration_s = 0.5\nanalysis_start_s = 0.0";
+    let ours = plan(text).unwrap();
+    let folder = tempfile::tempdir().unwrap();
+    let store = Store::new(&ours, folder.path());
+    store.create().unwrap();
+    let stop = AtomicBool::new(false);
+    let in_the_way = folder.path().join("recordings/run-000000001.mcap");
+    std::fs::create_dir(&in_the_way).unwrap();
+    let why = store.compute(&[0], 1, &stop, || ()).unwrap_err();
+    assert!(
+        why.contains("run-000000001.mcap: cannot be written"),
+        "{why}"
+    );
+    assert_eq!(store.progress(Shard::WHOLE).unwrap().missing, [0]);
+    std::fs::remove_dir(&in_the_way).unwrap();
+    assert_eq!(store.compute(&[0], 1, &stop, || ()).unwrap().failed, 0);
 }
 
 /// The file that cannot be written is named, once and by its own name, with what the system says of it.

@@ -122,7 +122,8 @@ pub fn run(args: &Args) -> Result<Input> {
             if all.len() > 1 && !together.is_empty() {
                 text += &format!("mean of {} files\n", all.len());
                 for (e, n) in &together {
-                    text += &line(e, &format!("  ({n} files)"));
+                    let files = recording::text::counted(*n as u64, "file", "files");
+                    text += &line(e, &format!("  ({files})"));
                 }
             }
             print(&text)?;

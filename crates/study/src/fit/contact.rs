@@ -294,9 +294,8 @@ pub(super) fn pendulum(field: &Field, window: Window) -> Result<Vec<Outcome>, St
                     blocks.push(Block::empty());
                 }
                 if let Some(block) = blocks.last_mut() {
-                    let bend = angle[k - 1] - 2.0 * angle[k] + angle[k + 1];
-                    let x = [numerov(&pull, k), numerov(&braked, k)];
-                    block.add(x, bend / (step_s * step_s));
+                    let x = [lele_mean_of_bends(&pull, k), lele_mean_of_bends(&braked, k)];
+                    block.add(x, lele_bend(&angle, k, step_s));
                 }
             }
         }
@@ -306,8 +305,10 @@ pub(super) fn pendulum(field: &Field, window: Window) -> Result<Vec<Outcome>, St
     if fine.is_empty() {
         return Err("too few samples in the window".into());
     }
-    let (value, interval) =
-        bootstrapped(&fine, |p| [p[0], p[1]]).ok_or("the roll does not move")?;
+    let value = solve(&fine, |k| k).ok_or("the roll does not move")?;
+    let half = jackknifed(&fine)
+        .filter(|half| half.iter().all(|h| h.is_finite()))
+        .ok_or("the roll is recorded for too short a time to tell how sure they would be")?;
     let other = unexplained(&fine).unwrap_or(1.0);
     if other > OTHER {
         return Err(format!(
@@ -339,23 +340,30 @@ pub(super) fn pendulum(field: &Field, window: Window) -> Result<Vec<Outcome>, St
             ));
         }
     }
-    if interval[1][1] < 0.0 {
+    if value[1] + half[1] < 0.0 {
         return Err(format!(
             "the roll does not swing as a pendulum: it gains energy from another cause (damping {:.2} 1/s)",
             value[1]
         ));
     }
-    let coarse = solve(&blocks(2), |k| k).map_or(value, |p| [p[0], p[1]]);
+    let coarse = solve(&blocks(2), |k| k).unwrap_or(value);
     let interval = std::array::from_fn(|p| {
-        let sampling = (coarse[p] - value[p]).abs();
-        [interval[p][0] - sampling, interval[p][1] + sampling]
+        let half = half[p] + SAMPLED * (coarse[p] - value[p]).abs();
+        [value[p] - half, value[p] + half]
     });
     let names = [("pendulum", "1/(kg·m)"), ("roll damping", "1/s")];
-    Ok(pair(names, value, interval))
+    Ok(pair(names, [value[0], value[1]], interval))
 }
 
-/// What a second difference over h² is of `bend`, the second derivative: (θ_{k−1} − 2θ_k + θ_{k+1})/h² = (θ̈_{k−1} + 10 θ̈_k + θ̈_{k+1})/12 + O(h⁴).
-/// Source: Numerov, Mon. Not. R. Astron. Soc. 84 (1924) 592.
-fn numerov(bend: &[f64], k: usize) -> f64 {
-    (bend[k - 1] + 10.0 * bend[k] + bend[k + 1]) / 12.0
+/// A mean over three samples of what `lele_bend` is the second derivative of.
+fn lele_mean_of_bends(bend: &[f64], k: usize) -> f64 {
+    (2.0 * bend[k - 1] + 11.0 * bend[k] + 2.0 * bend[k + 1]) / 15.0
+}
+
+/// The mean of three second derivatives, (2 ẍ_{k−1} + 11 ẍ_k + 2 ẍ_{k+1})/15, to an error of (ωh)⁶/3300. Source: Lele, J. Comput. Phys. 103 (1992) 16,
+/// eq. 2.2.7.
+fn lele_bend(x: &[f64], k: usize, step_s: f64) -> f64 {
+    let near = x[k + 1] - 2.0 * x[k] + x[k - 1];
+    let far = x[k + 2] - 2.0 * x[k] + x[k - 2];
+    (16.0 * near + far) / (20.0 * step_s * step_s)
 }

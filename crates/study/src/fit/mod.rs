@@ -20,13 +20,12 @@
 //! over a second as white noise would be (stronger by half and five standard errors, or weaker by three), or a tenth of it and more comes back with a carrier's own steps, carriers do what the model does not know, and
 //! nothing is told. On a graph, the scene's, the coupling is K_c/(d_i + 1) times the sum over the d_i neighbours.
 //! Nothing reaches across a hole of the record: no increment, no spline, no straight line through a beat.
-//! k, c where compression was recorded: linear least squares on means over three samples and Lele's slope that goes with them, an error of (ωΔt)⁶/2100.
-//! Their intervals are a jackknife's over blocks of two roll periods, because neighbours are alike, with Student's t, because contact may be kept for
-//! a few of them only; three sixty-thirds are added of what leaving out every other sample changes, three times the error of such a rule (Roache 1994).
-//! a, b and, from sensors, k, c: linear least squares on derivatives of the not-a-knot spline, their intervals from a moving-block bootstrap (500
-//! draws, the same blocks). θ̈ stands as a second difference, and the other side as Numerov's mean
-//! over three samples that goes with it: an error of (ωΔt)⁴/240, where the spline's own second derivative is off by (ωΔt)²/12. Where steps tell the phases, pull and gait are those of Adler's test
-//! ([`analyze::beat::adler`]), which knows that a step detector smooths them and finds τ by itself. Pendulum and contact from sensors add what they change by when every other
+//! k, c where compression was recorded, a, b: linear least squares on means over three samples and Lele's slope or second derivative that goes with them, errors
+//! of (ωΔt)⁶/2100 and (ωΔt)⁶/3300. Their intervals are a jackknife's over blocks of two roll periods, because neighbours are alike, with Student's t, because
+//! contact may be kept for a few of them only; three sixty-thirds are added of what leaving out every other sample changes, three times the error of such a rule
+//! (Roache 1994). θ̇ is the not-a-knot spline's, as δ̇ is from sensors, whose k, c have intervals from a moving-block bootstrap (500 draws, the same blocks).
+//! Where steps tell the phases, pull and gait are those of Adler's test
+//! ([`analyze::beat::adler`]), which knows that a step detector smooths them and finds τ by itself. Contact from sensors adds what it changes by when every other
 //! sample is left out: a bound, 15 times over, of what the sampling does. From sensors z_i is the shoulder's and the body's motion about
 //! their slow course, δ_i = z_i − (body's height + (R p_i)_z), N_tot the body's specific force times its mass; a handle carries where
 //! k δ_i + c δ̇_i + e/N, its share of the load, is above a seventh of the weight over N. The intervals of k and c reach to what they would be if all

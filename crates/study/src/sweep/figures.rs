@@ -201,10 +201,11 @@ fn distribution(label: &str, mut values: Vec<f64>, runs: u64, turn: Option<f64>)
     values.sort_by(f64::total_cmp);
     let n = values.len();
     // A thousand steps are as many as a picture can show.
-    let step = n.div_ceil(1000).max(1);
-    let points: Vec<(f64, f64)> = (0..n)
-        .step_by(step)
-        .map(|k| (values[k], (k + 1) as f64 / runs as f64))
+    let thin = n.div_ceil(1000).max(1);
+    let share = |k: usize| k as f64 / runs as f64;
+    let steps = (0..n).filter(|k| k.is_multiple_of(thin) || k + 1 == n);
+    let points: Vec<(f64, f64)> = steps
+        .flat_map(|k| [(values[k], share(k)), (values[k], share(k + 1))])
         .collect();
     (n > 1 && values[n - 1] > values[0]).then(|| Figure {
         title: match n as u64 {
@@ -217,4 +218,33 @@ fn distribution(label: &str, mut values: Vec<f64>, runs: u64, turn: Option<f64>)
         y_range: Some((0.0, 1.02)),
         ..Figure::default()
     })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Three of four runs have it. The share jumps at each value and does not climb to it: between 2 and 4 it is one half.
+    #[test]
+    fn a_distribution_is_a_stair() {
+        let figure = distribution("x", vec![4.0, 1.0, 2.0], 4, None).unwrap();
+        let Layer::Line { points, .. } = &figure.layers[0] else {
+            panic!("{figure:?}");
+        };
+        let stair = [
+            (1.0, 0.0),
+            (1.0, 0.25),
+            (2.0, 0.25),
+            (2.0, 0.5),
+            (4.0, 0.5),
+            (4.0, 0.75),
+        ];
+        assert_eq!(points[..], stair);
+        // Many values are thinned, but not the last, at which all have it.
+        let figure = distribution("x", (0..1502).map(f64::from).collect(), 1502, None).unwrap();
+        let Layer::Line { points, .. } = &figure.layers[0] else {
+            panic!("{figure:?}");
+        };
+        assert_eq!(points.last(), Some(&(1501.0, 1.0)));
+    }
 }

@@ -14,7 +14,7 @@ use crate::ensemble::{measure_abreast, observe};
 use analyze::inputs::{Inputs, Window};
 use analyze::metrics::{Metric, find, metrics_of};
 use design::Points;
-use recording::write::{RecordingWriter, WriterOptions};
+use recording::write::{RecordingWriter, WriteError, WriterOptions};
 use sim::model::Model;
 use sim::record::{Recorder, VERSION};
 use sim::run::{Listener, Sample};
@@ -267,7 +267,14 @@ impl Plan {
     /// Runs some runs: their rows, which say why where there is no result. A recording goes into `recordings` where one is named.
     ///
     /// A row does not depend on which others are computed with it.
-    pub fn run(&self, runs: Range<u64>, recordings: Option<&Path>) -> Vec<Vec<Cell>> {
+    ///
+    /// # Errors
+    /// A recording that the disk does not take: that says nothing of its run, which has no row until it is made again.
+    pub fn run(
+        &self,
+        runs: Range<u64>,
+        recordings: Option<&Path>,
+    ) -> Result<Vec<Vec<Cell>>, String> {
         let measure = |runs: Range<u64>| {
             std::panic::catch_unwind(AssertUnwindSafe(|| self.measure(runs, recordings)))
         };
@@ -277,7 +284,7 @@ impl Plan {
             let point = run..runs.end.min(run + self.spec.seeds - run % self.spec.seeds);
             run = point.end;
             if let Ok(found) = measure(point.clone()) {
-                rows.extend(point.zip(found).map(|(run, found)| self.row(run, found)));
+                rows.extend(point.zip(found?).map(|(run, found)| self.row(run, found)));
                 continue;
             }
             // One of them breaks off; the others need not suffer.
@@ -288,12 +295,14 @@ impl Plan {
                         .map(String::as_str)
                         .or_else(|| cause.downcast_ref::<&str>().copied())
                         .unwrap_or("no message");
-                    vec![Measured::failed(format!("the program broke off: {text}"))]
+                    Ok(vec![Measured::failed(format!(
+                        "the program broke off: {text}"
+                    ))])
                 });
-                rows.extend(found.into_iter().map(|found| self.row(run, found)));
+                rows.extend(found?.into_iter().map(|found| self.row(run, found)));
             }
         }
-        rows
+        Ok(rows)
     }
 
     fn row(&self, run: u64, found: Measured) -> Vec<Cell> {
@@ -335,10 +344,14 @@ impl Plan {
         row
     }
 
-    fn measure(&self, runs: Range<u64>, recordings: Option<&Path>) -> Vec<Measured> {
+    fn measure(
+        &self,
+        runs: Range<u64>,
+        recordings: Option<&Path>,
+    ) -> Result<Vec<Measured>, String> {
         let scene = match self.scene(runs.start) {
             Ok(scene) => scene,
-            Err(reason) => return runs.map(|_| Measured::failed(reason.clone())).collect(),
+            Err(reason) => return Ok(runs.map(|_| Measured::failed(reason.clone())).collect()),
         };
         // By plan and scene alone, not by how many happen to be together: a row is to be the same however the runs are shared out.
         let samples = scene.duration_s * scene.log_rate_hz;
@@ -352,7 +365,7 @@ impl Plan {
             let metrics = &self.metrics;
             let found = measure_abreast(&scene, seeds, metrics, MOST_EVALUATIONS, weigh);
             if let Some(found) = found {
-                return found;
+                return Ok(found);
             }
         }
         let alone = |run: u64| {
@@ -366,7 +379,12 @@ impl Plan {
         runs.map(alone).collect()
     }
 
-    fn measure_alone(&self, run: u64, scene: &Scene, recordings: Option<&Path>) -> Measured {
+    fn measure_alone(
+        &self,
+        run: u64,
+        scene: &Scene,
+        recordings: Option<&Path>,
+    ) -> Result<Measured, String> {
         let model;
         let mut keeper = Keeper(None);
         if let Some(folder) = recordings {
@@ -376,16 +394,16 @@ impl Plan {
                 .and_then(|writer| Recorder::new(&model, writer));
             match recorder {
                 Ok(recorder) => keeper.0 = Some(recorder),
-                Err(error) => return Measured::failed(error.to_string()),
+                Err(error) => return of_its_run(&error).map(Measured::failed),
             }
         }
         let (inputs, stats, outcome) = observe(scene, Some(MOST_EVALUATIONS), &mut keeper);
         // The writer knows best why it stopped a run.
-        let kept = keeper
-            .0
-            .map_or(Ok(()), |r| r.finish().map_err(|e| e.to_string()));
-        let ended = kept.and(outcome.map_err(|e| e.to_string()));
-        self.weigh(scene, &inputs, stats, ended)
+        let ended = match keeper.0.map_or(Ok(()), Recorder::finish) {
+            Ok(()) => outcome.map_err(|e| e.to_string()),
+            Err(error) => Err(of_its_run(&error)?),
+        };
+        Ok(self.weigh(scene, &inputs, stats, ended))
     }
 
     /// The metrics of a run that has ended.
@@ -468,6 +486,14 @@ impl Measured {
             stats: None,
             failed: Some(reason),
         }
+    }
+}
+
+/// What a recording's writer says of the run; an error where it is the disk that it speaks of.
+fn of_its_run(error: &WriteError) -> Result<String, String> {
+    match error {
+        WriteError::Io { .. } => Err(error.to_string()),
+        _ => Ok(error.to_string()),
     }
 }
 

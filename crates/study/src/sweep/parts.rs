@@ -20,9 +20,12 @@ use std::io::{BufWriter, Write};
 use std::ops::Range;
 use std::path::{Path, PathBuf};
 use std::sync::atomic::AtomicBool;
+use std::time::Duration;
 
 /// Rows of a row group of the merged table.
 const GROUP_ROWS: usize = 16_384;
+/// An unfinished file that has not grown for so long is nobody's any more. A younger one may be of another process at the same study.
+const LEFT: Duration = Duration::from_secs(3600);
 
 /// A study's folder.
 pub struct Store<'p> {
@@ -211,19 +214,23 @@ impl<'p> Store<'p> {
         Ok(true)
     }
 
-    /// Takes away what a kill left of recordings of these blocks.
-    fn sweep_up(&self, blocks: &[u64]) {
-        let runs: Vec<Range<u64>> = blocks.iter().map(|b| self.plan.block(*b)).collect();
-        let Ok(entries) = std::fs::read_dir(self.recordings()) else {
-            return;
-        };
-        for path in entries.flatten().map(|e| e.path()) {
-            let name = path.file_name().unwrap_or_default().to_string_lossy();
-            let of = |run: &u64| name.contains(&*recording_name(*run));
-            let unfinished = path.extension().is_some_and(|e| e == "part");
-            if unfinished && runs.iter().any(|r| r.clone().any(|run| of(&run))) {
-                // Best effort: it is in nobody's way.
-                let _ = std::fs::remove_file(&path);
+    /// Takes away what a kill left unfinished.
+    fn sweep_up(&self) {
+        let parts = self.folder.join("parts");
+        for folder in [&self.folder, &self.recordings(), &parts] {
+            let entries = std::fs::read_dir(folder).into_iter().flatten().flatten();
+            for entry in entries {
+                let name = entry.file_name();
+                let name = name.to_string_lossy();
+                let its = [".runs.parquet.", ".summary.csv.", ".run-"];
+                let ours = folder == &parts || its.iter().any(|own| name.starts_with(own));
+                let unfinished = name.starts_with('.') && name.ends_with(".part");
+                let since = || entry.metadata().and_then(|m| m.modified()).ok();
+                let age = || since().and_then(|then| then.elapsed().ok());
+                if ours && unfinished && age().is_some_and(|age| age > LEFT) {
+                    // Best effort: it is in nobody's way.
+                    let _ = std::fs::remove_file(entry.path());
+                }
             }
         }
     }
@@ -231,7 +238,7 @@ impl<'p> Store<'p> {
     /// Computes the blocks named; `done` is called after every run. When `stop` is set, whole parts stay and the rest is dropped.
     ///
     /// # Errors
-    /// A part that cannot be written.
+    /// A part or a recording that cannot be written.
     pub fn compute(
         &self,
         blocks: &[u64],
@@ -241,9 +248,7 @@ impl<'p> Store<'p> {
     ) -> Outcome<Written> {
         let recordings = self.recordings();
         let recordings = self.plan.spec.recordings.then_some(&*recordings);
-        if recordings.is_some() {
-            self.sweep_up(blocks);
-        }
+        self.sweep_up();
         let runs: u64 = blocks
             .iter()
             .map(|b| self.plan.block(*b))
@@ -259,11 +264,11 @@ impl<'p> Store<'p> {
             stop,
             |k| {
                 let pieces = self.pieces(blocks, shares.get(k)).into_iter();
-                let rows = pieces.flat_map(|piece| self.plan.run(piece, recordings));
-                rows.collect::<Vec<_>>()
+                let rows: Outcome<Vec<_>> = pieces.map(|p| self.plan.run(p, recordings)).collect();
+                rows.map(|rows| rows.concat())
             },
             |_, batch| {
-                for row in batch {
+                for row in batch? {
                     rows.push(row);
                     done();
                     let Some(&of) = block else { continue };
@@ -320,12 +325,14 @@ impl<'p> Store<'p> {
     pub fn merge(&self) -> Outcome<Found> {
         let progress = self.parts(Shard::WHOLE, false)?;
         if let Some(first) = progress.missing.first() {
+            let runs = self.plan.block(*first);
             return Err(format!(
-                "{}: {} of {} parts are missing, the first is that of runs {:?}; `study {} --resume` computes them",
+                "{}: {} of {} parts are missing, the first is that of runs {} to {}; `study {} --resume` computes them",
                 self.folder.display(),
                 progress.missing.len(),
                 self.plan.blocks(),
-                self.plan.block(*first),
+                runs.start,
+                runs.end - 1,
                 self.folder.join("study.toml").display(),
             ));
         }

@@ -294,7 +294,8 @@ impl Found {
             out.push('\n');
         }
         for (reason, count) in &self.reasons {
-            out += &format!("failed {count} times: {reason}\n");
+            let times = recording::text::counted(*count, "time", "times");
+            out += &format!("failed {times}: {reason}\n");
         }
         out
     }
