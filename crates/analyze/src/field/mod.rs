@@ -135,7 +135,7 @@ impl Field {
                 field.quality.push(Quality::remark(
                     "",
                     "too_long",
-                    format!("motion is not estimated from {samples} inertial samples, which would take too much memory: name fewer sensors in a roles file"),
+                    format!("motion is not estimated from {samples} inertial samples, which would take too much memory: name fewer sensors in a roles file, or give a part of the recording"),
                 ));
                 return Ok(field);
             }

@@ -1,6 +1,6 @@
 //! Long logs of fast sensors, thinned while they are read: the mean of so many samples stands for them, so that memory stays bounded.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 
 use recording::Signal;
 use recording::read::{Batch, ReadError, Recording};
@@ -14,8 +14,8 @@ const RATH_BYTES: u64 = 700;
 const CARRIER_BYTES: u64 = 250;
 /// What the estimates may hold (bytes).
 const MOST_BYTES: u64 = 220_000_000;
-/// Thinning stops at this rate (Hz): what moves on shoulders lies below a tenth of it.
-const LEAST_HZ: f64 = 100.0;
+/// Sensors are thinned to the first of these rates (Hz), or to the next where that is not enough: what moves on shoulders lies below a tenth of either.
+const LEAST_HZ: [f64; 2] = [100.0, 50.0];
 /// No device samples faster (Hz): such a log was written at once, and the stamps tell the rate.
 const MOST_HZ: f64 = 2e4;
 
@@ -38,36 +38,47 @@ pub fn factors(
         let of_topic = info.channels.iter().filter(|c| c.topic == topic);
         of_topic.map(|c| c.messages).sum()
     };
-    let bytes = |factors: &BTreeMap<String, usize>| -> u64 {
-        let each = factors.iter().map(|(topic, factor)| {
-            let weight = match rath == Some(topic.as_str()) {
-                true => RATH_BYTES,
-                false => CARRIER_BYTES,
-            };
-            messages(topic) / *factor as u64 * weight
-        });
-        each.sum()
+    let weight = |topic: &str| match rath == Some(topic) {
+        true => RATH_BYTES,
+        false => CARRIER_BYTES,
     };
-    let mut factors: BTreeMap<String, usize> = topics.map(|t| (t.clone(), 1)).collect();
-    if bytes(&factors) <= MOST_BYTES {
-        return Ok(Ok(factors));
+    let topics: BTreeSet<&str> = topics.map(String::as_str).collect();
+    let all = |factors: Vec<usize>| -> BTreeMap<String, usize> {
+        let names = topics.iter().map(|topic| (*topic).to_owned());
+        names.zip(factors).collect()
+    };
+    let whole: u64 = topics.iter().map(|t| messages(t) * weight(t)).sum();
+    if whole <= MOST_BYTES {
+        return Ok(Ok(all(vec![1; topics.len()])));
     }
     let by_log = |topic: &str| messages(topic) as f64 / span_s.max(1e-9);
-    let stamped_s = match factors.keys().any(|topic| by_log(topic) > MOST_HZ) {
+    let stamped_s = match topics.iter().any(|topic| by_log(topic) > MOST_HZ) {
         true => stamped_s(recording)?,
         false => BTreeMap::new(),
     };
-    for (topic, factor) in &mut factors {
-        let hz = match stamped_s.get(topic) {
-            Some(span_s) if by_log(topic) > MOST_HZ => messages(topic) as f64 / span_s,
-            _ => by_log(topic),
-        };
-        *factor = ((hz / LEAST_HZ) as usize).max(1);
-    }
-    if bytes(&factors) <= MOST_BYTES {
-        return Ok(Ok(factors));
-    }
-    Ok(Err(factors.keys().map(|topic| messages(topic)).sum()))
+    let hz = |topic: &str| match stamped_s.get(topic) {
+        Some(span_s) if by_log(topic) > MOST_HZ => messages(topic) as f64 / span_s,
+        _ => by_log(topic),
+    };
+    let each = topics.iter().map(|t| (messages(t), weight(t), hz(t)));
+    let fits = fitting(&each.collect::<Vec<_>>()).map(all);
+    Ok(fits.ok_or_else(|| topics.iter().map(|topic| messages(topic)).sum()))
+}
+
+/// How many samples become one, of sensors with so many samples of so many bytes at such a rate (Hz); `None` where the least rate is too much.
+fn fitting(sensors: &[(u64, u64, f64)]) -> Option<Vec<usize>> {
+    let at = |least_hz: &f64| -> Vec<usize> {
+        let each = sensors.iter();
+        // A rate that falls short of a multiple by what a clock errs, or by a lost sample, is that multiple.
+        each.map(|(.., hz)| ((1.01 * hz / least_hz) as usize).max(1))
+            .collect()
+    };
+    let fits = |factors: &Vec<usize>| {
+        let each = sensors.iter().zip(factors);
+        let bytes: u64 = each.map(|((n, bytes, _), f)| n / *f as u64 * bytes).sum();
+        bytes <= MOST_BYTES
+    };
+    LEAST_HZ.iter().map(at).find(fits)
 }
 
 /// From the first to the last stamp of each topic that has stamps, s.
@@ -265,6 +276,20 @@ mod tests {
             stamps_ns: None,
             columns,
         }
+    }
+
+    #[test]
+    fn no_more_is_thinned_than_has_to_be() {
+        let hours = |hours: f64, hz: f64, bytes: u64| ((3600.0 * hours * hz) as u64, bytes, hz);
+        let of_three = |h: f64, hz: f64| {
+            let carrier = hours(h, hz, CARRIER_BYTES);
+            fitting(&[hours(h, hz, RATH_BYTES), carrier, carrier])
+        };
+        assert_eq!(of_three(0.4, 199.9), Some(vec![2; 3]));
+        assert_eq!(of_three(1.0, 199.9), Some(vec![4; 3]));
+        assert_eq!(of_three(1.0, 99.99), Some(vec![2; 3]));
+        assert_eq!(of_three(1.0, 50.0), Some(vec![1; 3]));
+        assert_eq!(of_three(1.1, 99.99), None);
     }
 
     #[test]

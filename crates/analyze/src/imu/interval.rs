@@ -148,6 +148,9 @@ const OF_PLACE: &[&str] = &["dz_pp_m", "rms_z_m", "t_float"];
 const OF_EDGES: &[&str] = &["dz_pp_m", "t_float"];
 const ENOUGH_HZ: f64 = 90.0;
 
+/// Samples as they might have been are this far apart or farther, s: enough for what is rated by them.
+const DRAWN_S: f64 = 0.033;
+
 /// Of the samples, Hz; infinite where nothing tells.
 fn rate_hz(inputs: &Inputs) -> f64 {
     super::track::period_s(&inputs.t_s).map_or(f64::INFINITY, |s| 1.0 / s)
@@ -223,8 +226,8 @@ const OF_HEAVE: &[&str] = &[
 const SEEN: f64 = 5.0;
 
 /// How far an edge of the support is moved by what smooths it, samples: 0.14 on twelve twins at 100 Hz, 0.28 in the worked example of
-/// docs/field.md; below [`ENOUGH_HZ`] 0.2 to 0.65 on twenty at 50 Hz.
-const EDGE_SAMPLES: [f64; 2] = [0.3, 0.35];
+/// docs/field.md; below [`ENOUGH_HZ`] 0.2 to 0.65 on twenty at 50 Hz, to 0.78 on fifty at 25 to 40 Hz, and 0.7 in an hour of means over 20 ms.
+const EDGE_SAMPLES: [f64; 2] = [0.3, 0.4];
 
 /// So much of its SD has a wandering of [`WANDER_S`] between 0.2 and 0.4 Hz, as [`slow_course_m`] sees it: ∫ of its spectrum times the difference
 /// of the two gains 1/(1 + (f₀/f)⁴), squared.
@@ -373,27 +376,29 @@ fn farthest(
         .fold(0.0, f64::max)
 }
 
-/// The window's columns as they might have come out of an equally good sensor, at 30 Hz.
+/// The window's columns as they might have come out of an equally good sensor, at 30 Hz or its own rate.
 fn varied(motion: &Motion, window: Window, draw: u64) -> Inputs {
     let budget = &motion.settings.budget;
     let mut random = Random(SEED ^ (draw.wrapping_add(1)).wrapping_mul(0x9e37_79b9_7f4a_7c15));
     let inputs = &motion.inputs;
     let range = window.range(&inputs.t_s);
-    let (Some(first), Some(last)) = (
-        inputs.t_s[range.clone()].first(),
-        inputs.t_s[range.clone()].last(),
-    ) else {
+    let Some(first) = inputs.t_s[range.clone()].first() else {
         return Inputs {
             gravity_m_per_s2: inputs.gravity_m_per_s2,
             ..Inputs::default()
         };
     };
-    let step_s = 0.033;
-    let phase = random.uniform() * step_s;
-    let n = ((last - first - phase) / step_s).max(0.0) as usize + 1;
-    let t_s: Vec<f64> = (0..n.min(range.len()))
-        .map(|k| first + phase + k as f64 * step_s)
-        .collect();
+    let step_s = super::track::period_s(&inputs.t_s).map_or(DRAWN_S, |s| s.max(DRAWN_S));
+    let begin = first + random.uniform() * step_s;
+    let at = |k: usize| (inputs.t_s[k] - begin) / step_s;
+    // Every stretch to its end, and none of what lies between them.
+    let within = |r: &Range<usize>| {
+        let (from, to) = (r.start.max(range.start), r.end.min(range.end));
+        let some = (from < to).then(|| (at(from).ceil() as i64)..=(at(to - 1).floor() as i64));
+        some.into_iter().flatten()
+    };
+    let steps = motion.stretches.iter().flat_map(within);
+    let t_s: Vec<f64> = steps.map(|k| begin + k as f64 * step_s).collect();
     let pick = |x: &[f64]| between(&inputs.t_s[range.clone()], &x[range.clone()], &t_s);
     let angle = |x: &[f64], random: &mut Random| -> Vec<f64> {
         let (offset, scale) = (

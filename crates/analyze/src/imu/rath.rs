@@ -695,6 +695,37 @@ mod tests {
         );
     }
 
+    /// A roll that begins three quarters into the window, seen at 26 Hz.
+    #[test]
+    fn what_a_slow_sensor_feels_late_counts_too() {
+        let (settings, window) = most();
+        let (w, hz) = (TAU * 1.07, 26.0);
+        let swell = |t: f64| 0.15 * (1.0 + (t - 28.0).tanh());
+        let roll = |t: f64| swell(t) * (w * t).sin();
+        let mut track = Track::default();
+        for t in (0..40 * 26).map(|k| f64::from(k) / hz) {
+            let swells = 0.15 / (t - 28.0).cosh().powi(2);
+            let rate = swells * (w * t).sin() + swell(t) * w * (w * t).cos();
+            let felt = UnitQuaternion::from_axis_angle(&Vector3::x_axis(), -roll(t))
+                * Vector3::new(0.0, 0.0, settings.gravity_m_per_s2);
+            track.t_s.push(t);
+            track.gyro_rad_per_s.push([rate, 0.0, 0.0]);
+            track.accel_m_per_s2.push(felt.into());
+        }
+        let true_deg = rms((5000..35_000).map(|k| roll(f64::from(k) / 1e3))).to_degrees();
+        let found = metrics(&motion(&track, &settings).unwrap(), window);
+        let found = found.get("rms_roll_deg").unwrap();
+        let [low, high] = found.ci95.unwrap();
+        assert!(
+            low <= true_deg && true_deg <= high,
+            "{found:?}, true {true_deg}"
+        );
+        assert!(
+            (found.as_f64().unwrap() - true_deg).abs() < 0.005 * true_deg,
+            "{found:?}"
+        );
+    }
+
     /// A rattle of 49.5 Hz moves nothing by a micrometre, but at 50 Hz looks like a course of 0.5 Hz.
     #[test]
     fn what_folds_onto_a_slow_course_is_less_sure() {

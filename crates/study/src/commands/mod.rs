@@ -57,7 +57,28 @@ const EXAMPLES: &str = "Examples:
   study merge tongue                       all parts into tongue/runs.parquet
   study submit tongue.toml --tasks 8       the same on Slurm
   study fit music-1001.mcap                beat, pull, contact and roll, with intervals
-docs/studies.md says what a study file may hold.";
+docs/studies.md says what a study file may hold.
+
+Exit codes: 0 done; 1 it could not; 2 wrong usage; 3 done, but an input was damaged.";
+
+/// Takes a whole number of a range.
+fn count(
+    range: std::ops::RangeInclusive<u64>,
+) -> impl Fn(&str) -> Result<u64, String> + Clone + Send + Sync + 'static {
+    move |text| {
+        let given = text.parse().ok().filter(|n| range.contains(n));
+        given.ok_or_else(|| match (*range.start(), *range.end()) {
+            (least, u64::MAX) => format!("expected a whole number, {least} or more"),
+            (least, most) => format!("expected a whole number from {least} to {most}"),
+        })
+    }
+}
+
+/// Takes a number of threads.
+fn jobs(text: &str) -> Result<usize, String> {
+    let given = text.parse();
+    given.map_err(|_| "expected a whole number, 0 for one per core".into())
+}
 
 /// What stdout gets.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, clap::ValueEnum)]
@@ -170,10 +191,21 @@ mod tests {
 
     #[test]
     fn seeds_that_cannot_be_counted_up_to_are_refused() {
-        let parsed = |seeds: &str| Args::try_parse_from(["study", "paper", "--seeds", seeds]);
+        let parsed = |flag: &str, n: &str| Args::try_parse_from(["study", "paper", flag, n]);
         for absurd in ["0", "-1", "nan", "1000000000000", "18446744073709551615"] {
-            assert!(parsed(absurd).is_err(), "{absurd}");
+            let said = parsed("--seeds", absurd).err().unwrap().to_string();
+            let expected = "expected a whole number from 1 to 100000";
+            assert!(said.contains(expected), "{absurd}: {said}");
         }
-        assert!(parsed("100").is_ok());
+        assert!(parsed("--seeds", "100").is_ok() && parsed("--jobs", "0").is_ok());
+        let said = parsed("--jobs", "-1").err().unwrap().to_string();
+        assert!(said.contains("expected a whole number, 0 for"), "{said}");
+        // Study files are run as many times as is asked.
+        let said = Args::try_parse_from(["study", "run", "x.toml", "--seeds", "0"]);
+        let said = said.err().unwrap().to_string();
+        assert!(
+            said.contains("expected a whole number, 1 or more"),
+            "{said}"
+        );
     }
 }

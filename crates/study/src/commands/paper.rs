@@ -1,6 +1,6 @@
 //! `study paper`: Table 1.
 
-use super::{Format, print, write_whole};
+use super::{Format, count, jobs, print, write_whole};
 use anyhow::{Context, Result, bail};
 use sim::scene::{Scene, load};
 use std::path::PathBuf;
@@ -13,10 +13,10 @@ use study::paper::{CONDITIONS, Condition, FIRST_SEED, RUNS, figures, table, to_j
 #[command(after_help = EXAMPLES)]
 pub struct Args {
     /// Seeds per condition, from 1001 on.
-    #[arg(long, value_name = "N", allow_negative_numbers = true, value_parser = clap::value_parser!(u64).range(1..=100_000))]
+    #[arg(long, value_name = "N", allow_negative_numbers = true, value_parser = count(1..=100_000))]
     seeds: Option<u64>,
     /// Threads; 0 is one per core. The result does not depend on it.
-    #[arg(long, value_name = "N", default_value_t = 0)]
+    #[arg(long, value_name = "N", default_value_t = 0, value_parser = jobs, allow_negative_numbers = true)]
     jobs: usize,
     /// A folder for the result's files (paper.json, paper.txt, runs.csv, pictures).
     #[arg(long, value_name = "DIR")]

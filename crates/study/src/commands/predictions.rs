@@ -1,6 +1,6 @@
 //! `study predictions`: what the paper predicts, tried.
 
-use super::{Format, print, watch_interrupts, write_whole};
+use super::{Format, count, jobs, print, watch_interrupts, write_whole};
 use anyhow::{Context, Result, bail};
 use indicatif::{ProgressBar, ProgressStyle};
 use std::path::PathBuf;
@@ -14,10 +14,10 @@ pub struct Args {
     /// Only these experiments: locking, coherence, lever, harmonics, onsets, stability.
     names: Vec<String>,
     /// Seeds of every ensemble, from 1001 on.
-    #[arg(long, value_name = "N", default_value_t = SEEDS, value_parser = clap::value_parser!(u64).range(2..=100_000))]
+    #[arg(long, value_name = "N", default_value_t = SEEDS, allow_negative_numbers = true, value_parser = count(2..=100_000))]
     seeds: u64,
     /// Threads; 0 is one per core. The result does not depend on it.
-    #[arg(long, value_name = "N", default_value_t = 0)]
+    #[arg(long, value_name = "N", default_value_t = 0, value_parser = jobs, allow_negative_numbers = true)]
     jobs: usize,
     /// A folder for predictions.md, predictions.json and the pictures (predictions/*.png), of the experiments that were run; what is there
     /// of others is replaced.

@@ -1,6 +1,6 @@
 //! `study submit FILE.toml`: a job for a scheduler, written and, where the scheduler is here, handed over.
 
-use super::{print, sweep, write_whole};
+use super::{count, print, sweep, write_whole};
 use anyhow::{Context, Result, bail};
 use std::path::{Path, PathBuf};
 use std::process::Command;
@@ -16,10 +16,10 @@ pub struct Args {
     #[arg(long, value_enum, default_value_t = Engine::Slurm)]
     engine: Engine,
     /// Tasks of the array. Few and long: each starts once and works through its share.
-    #[arg(long, value_name = "N", default_value_t = 8, value_parser = clap::value_parser!(u64).range(1..=100_000))]
+    #[arg(long, value_name = "N", default_value_t = 8, allow_negative_numbers = true, value_parser = count(1..=100_000))]
     tasks: u64,
     /// Cores, and so threads, of each task.
-    #[arg(long, value_name = "N", default_value_t = 1, value_parser = clap::value_parser!(u64).range(1..=1024))]
+    #[arg(long, value_name = "N", default_value_t = 1, allow_negative_numbers = true, value_parser = count(1..=1024))]
     cpus: u64,
     /// The study's folder, on a disk that all nodes share. Default: as for `study FILE.toml`.
     #[arg(long, value_name = "DIR")]

@@ -1,6 +1,6 @@
 //! `study FILE.toml`: a sweep, or a shard of one.
 
-use super::{Format, print, progress, watch_interrupts};
+use super::{Format, count, jobs, print, progress, watch_interrupts};
 use anyhow::{Result, anyhow, bail};
 use serde_json::json;
 use std::path::{Path, PathBuf};
@@ -18,10 +18,10 @@ pub struct Args {
     /// The study file (docs/studies.md).
     file: PathBuf,
     /// Runs of every point, instead of the file's own `seeds`.
-    #[arg(long, value_name = "N", allow_negative_numbers = true, value_parser = clap::value_parser!(u64).range(1..))]
+    #[arg(long, value_name = "N", allow_negative_numbers = true, value_parser = count(1..=u64::MAX))]
     seeds: Option<u64>,
     /// Threads; 0 is one per core. The result does not depend on it.
-    #[arg(long, value_name = "N", default_value_t = 0)]
+    #[arg(long, value_name = "N", default_value_t = 0, value_parser = jobs, allow_negative_numbers = true)]
     jobs: usize,
     /// The study's folder. Default: the file's name without `.toml`, here.
     #[arg(long, value_name = "DIR")]

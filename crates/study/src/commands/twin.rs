@@ -1,6 +1,6 @@
 //! `study twin`: how far the paper's metrics can be had from sensors alone.
 
-use super::{Format, print, progress, watch_interrupts};
+use super::{Format, count, jobs, print, progress, watch_interrupts};
 use anyhow::Result;
 use std::time::Instant;
 use study::twin::{FIRST_SEED, table, to_json, twins};
@@ -10,13 +10,13 @@ use study::twin::{FIRST_SEED, table, to_json, twins};
 #[command(after_help = EXAMPLES)]
 pub struct Args {
     /// Seeds of each condition.
-    #[arg(long, value_name = "N", default_value_t = 20, value_parser = clap::value_parser!(u64).range(1..=10_000))]
+    #[arg(long, value_name = "N", default_value_t = 20, allow_negative_numbers = true, value_parser = count(1..=10_000))]
     seeds: u64,
     /// The first of them.
-    #[arg(long, value_name = "SEED", default_value_t = FIRST_SEED, value_parser = clap::value_parser!(u64).range(..=1 << 53))]
+    #[arg(long, value_name = "SEED", default_value_t = FIRST_SEED, allow_negative_numbers = true, value_parser = count(0..=1 << 53))]
     first_seed: u64,
     /// Threads; 0 is one per core. The result does not depend on it.
-    #[arg(long, value_name = "N", default_value_t = 0)]
+    #[arg(long, value_name = "N", default_value_t = 0, value_parser = jobs, allow_negative_numbers = true)]
     jobs: usize,
     /// What to print.
     #[arg(long, value_enum, default_value_t = Format::Table)]
