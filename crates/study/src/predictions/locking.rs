@@ -170,8 +170,11 @@ pub fn run(lab: &Lab) -> Result<Finding, String> {
     let mut along = band(&lock, "locking", 0, 1.0);
     along.extend(band(&height, "Δz_pp, dm", 1, 10.0));
     along.extend(band(&float, "T_float", 2, 1.0));
+    // Three decimetres, or more where a band goes on.
+    let highest = height.iter().map(|s| 10.0 * s.quantiles[2].max(s.mean));
+    let top = highest.fold(3.0, f64::max);
     for side in [-pull, pull] {
-        along.push(Layer::dashed("", vec![(side, 0.0), (side, 3.0)], 6));
+        along.push(Layer::dashed("", vec![(side, 0.0), (side, top)], 6));
     }
     let points = sides
         .iter()
@@ -244,7 +247,7 @@ pub fn run(lab: &Lab) -> Result<Finding, String> {
                     x_label: "detuning Δω, rad/s".into(),
                     y_label: "locking; Δz_pp, dm; T_float".into(),
                     layers: along,
-                    y_range: Some((0.0, 3.0)),
+                    y_range: Some((0.0, top)),
                     ..Figure::default()
                 },
             ),
