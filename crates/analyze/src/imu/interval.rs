@@ -226,7 +226,7 @@ const OF_HEAVE: &[&str] = &[
 const SEEN: f64 = 5.0;
 
 /// How far an edge of the support is moved by what smooths it, samples: 0.14 on twelve twins at 100 Hz, 0.28 in the worked example of
-/// docs/field.md; below [`ENOUGH_HZ`] 0.2 to 0.65 on twenty at 50 Hz, to 0.78 on fifty at 25 to 40 Hz, and 0.7 in an hour of means over 20 ms.
+/// docs/field.md; below [`ENOUGH_HZ`] 0.2 to 0.65 on twenty at 50 Hz, to 0.78 on seventy at 25 to 40 Hz, and 0.7 in an hour of means over 20 ms.
 const EDGE_SAMPLES: [f64; 2] = [0.3, 0.4];
 
 /// So much of its SD has a wandering of [`WANDER_S`] between 0.2 and 0.4 Hz, as [`slow_course_m`] sees it: ∫ of its spectrum times the difference
