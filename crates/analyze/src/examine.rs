@@ -249,8 +249,7 @@ pub fn examine(
     if request.truth && !field.has_truth() {
         warnings.push("no truth is known in the recording: estimates are judged by the pose of a topic whose name holds \"truth\", or of truth = \"TOPIC\" in a file for --roles".into());
     }
-    let last_s = field.own_s.values().map(|e| e.1).fold(0.0, f64::max);
-    let window = until(last_s, &mut warnings);
+    let window = until(field.last_s(), &mut warnings);
     field.fill(&mut inputs);
     quality.extend(remarks);
     quality.extend(pass.coverage(window, &field.own_s));

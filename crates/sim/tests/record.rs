@@ -151,30 +151,14 @@ fn a_thrown_ball_is_where_it_must_be() {
             + Vector3::new(3.0, -4.0, 5.0) * t_s
             + Vector3::z() * (-0.5 * 9.81 * t_s * t_s);
         let attitude = start * UnitQuaternion::from_scaled_axis(spin * t_s);
-        same(
-            "position",
-            made.vector("/rath/state.position_m", k),
-            position,
-            1e-7,
-        );
-        same(
-            "velocity",
-            made.vector("/rath/state.velocity_m_per_s", k),
-            velocity,
-            1e-7,
-        );
-        same(
-            "spin",
-            made.vector("/rath/state.angular_velocity_rad_per_s", k),
-            spin,
-            1e-7,
-        );
-        same(
-            "frame",
-            made.vector("/tf.transforms[0].transform.translation", k),
-            position,
-            1e-7,
-        );
+        for (path, expected) in [
+            ("/rath/state.position_m", position),
+            ("/rath/state.velocity_m_per_s", velocity),
+            ("/rath/state.angular_velocity_rad_per_s", spin),
+            ("/tf.transforms[0].transform.translation", position),
+        ] {
+            same(path, made.vector(path, k), expected, 1e-7);
+        }
         for turn in [
             "/rath/state.orientation",
             "/tf.transforms[0].transform.rotation",

@@ -44,9 +44,14 @@ pub struct Dated {
 impl Dated {
     /// First and last time (s), where the log tells nothing of them.
     pub fn own_s(&self) -> Option<(f64, f64)> {
-        let each = self.t_s.iter().filter(|_| self.own_pace).map(|t| (*t, *t));
-        each.reduce(|a, b| (a.0.min(b.0), a.1.max(b.1)))
+        ends_s(self.t_s.iter().copied().filter(|_| self.own_pace))
     }
+}
+
+/// The earliest and the latest of times in any order, s.
+pub fn ends_s(t_s: impl Iterator<Item = f64>) -> Option<(f64, f64)> {
+    t_s.map(|t| (t, t))
+        .reduce(|a, b| (a.0.min(b.0), a.1.max(b.1)))
 }
 
 /// From log times (s since the recording begins) and, where every sample has one, header stamps (s, moved by [`delay_s`]), in the order of the log.
@@ -122,9 +127,7 @@ pub fn delay_s(late: impl Iterator<Item = f64>) -> f64 {
 
 /// From the earliest to the latest, s.
 fn span_s(t_s: &[f64]) -> f64 {
-    let least = t_s.iter().copied().fold(f64::MAX, f64::min);
-    let most = t_s.iter().copied().fold(f64::MIN, f64::max);
-    most - least
+    ends_s(t_s.iter().copied()).map_or(0.0, |(first, last)| last - first)
 }
 
 /// Whether ascending stamps are times of a clock that runs at another pace than the log, which spans `log_s`. One that was only set anew goes on at

@@ -32,7 +32,7 @@ use crate::quality::Quality;
 use crate::roles::{Role, Roles, Sensors, about_the_load};
 use carriers::Carriers;
 use clocks::Clocks;
-use dates::{Dated, dated, delay_s};
+use dates::{Dated, dated, delay_s, ends_s};
 use judge::Judge;
 use sound::Heard;
 
@@ -175,8 +175,7 @@ impl Field {
                 .own_s
                 .extend(own_s.map(|ends| ((*topic).to_owned(), ends)));
         }
-        let last_s = field.own_s.values().map(|e| e.1).fold(0.0, f64::max);
-        let window = window(last_s);
+        let window = window(field.last_s());
         let places = place::places(recording);
         let options = options(place::is_simulated(recording), &roles.sensors);
         let one_clock = devices == DeviceClocks::One;
@@ -457,6 +456,11 @@ impl Field {
         out
     }
 
+    /// When the last sample was taken of the sensors of which the log does not tell (s); 0 where it tells of all.
+    pub fn last_s(&self) -> f64 {
+        self.own_s.values().map(|e| e.1).fold(0.0, f64::max)
+    }
+
     /// Whether there is a truth to judge by.
     pub fn has_truth(&self) -> bool {
         self.judge.is_some()
@@ -553,8 +557,7 @@ impl Columns {
             let [sec, nanosec] = self.stamps(topic)?;
             // A clock that is not set yet says 0.
             let set = sec.iter().zip(nanosec).map(|(s, ns)| s + ns / 1e9);
-            let set = set.filter(|s| *s != 0.0).map(|s| (s, s));
-            set.reduce(|a, b| (a.0.min(b.0), a.1.max(b.1)))
+            ends_s(set.filter(|s| *s != 0.0))
         };
         let own = ends(topic)?;
         let meanwhile = |t: &&&str| ends(t).is_some_and(|(a, b)| a <= own.1 && own.0 <= b);
