@@ -124,8 +124,8 @@ fn explore(scene: Scene) -> Findings {
                 let [a, b] = cost_ns([&a, &b]);
                 effect.cost_ns = Some(a - b);
                 // In proportion, where the scene with it alone is not the whole.
-                if let (Ok(ms), [Ok(with_ms), Ok(without_ms)]) =
-                    (&ms, ms_per_s([&with, &without], most))
+                if let Ok(ms) = &ms
+                    && let [Ok(with_ms), Ok(without_ms)] = ms_per_s([&with, &without], most)
                 {
                     effect.without_ms = Some(ms * without_ms / with_ms);
                 }
@@ -135,7 +135,10 @@ fn explore(scene: Scene) -> Findings {
         .collect();
     Findings {
         rhs_ns,
-        freedoms: try_freedoms(&trial, most),
+        freedoms: match ms {
+            Ok(_) => try_freedoms(&trial, most),
+            Err(_) => Vec::new(),
+        },
         trial_s: trial.duration_s,
         failed,
         ms_per_s: ms,
