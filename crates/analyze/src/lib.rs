@@ -18,6 +18,7 @@ pub mod field;
 pub mod filter;
 pub mod imu;
 pub mod inputs;
+mod line;
 pub mod mechanism;
 mod median;
 pub mod metrics;

@@ -1,6 +1,6 @@
 //! What drives the roll: the support that modulates the pendulum's gravity, or a force at the roll's own frequency.
 
-use crate::metrics::FEWEST_PERIODS;
+use crate::line::FEWEST_PERIODS;
 use std::fmt;
 use std::ops::Range;
 

@@ -1,10 +1,12 @@
 //! The body's coordinates: how a state places the handles, and what forces do to it.
 
+mod choose;
 mod gimbal;
 mod hinge;
+mod pinned;
 mod reduced;
 
-pub use reduced::{Pinned, choose};
+pub use choose::choose;
 
 use crate::body::Body;
 #[cfg(target_arch = "x86_64")]

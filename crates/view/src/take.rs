@@ -63,6 +63,24 @@ pub struct Pose {
     pub orientation: Vec<[f64; 4]>,
 }
 
+impl Pose {
+    /// A vector of the body (m) in the world's axes at sample `k`, for a unit quaternion: v + 2w(u × v) + 2u × (u × v).
+    pub fn in_world(&self, k: usize, v: &[f64; 3]) -> [f64; 3] {
+        let cross = |a: [f64; 3], b: [f64; 3]| {
+            [
+                a[1] * b[2] - a[2] * b[1],
+                a[2] * b[0] - a[0] * b[2],
+                a[0] * b[1] - a[1] * b[0],
+            ]
+        };
+        let [x, y, z, w] = self.orientation[k];
+        let u = [x, y, z];
+        let once = cross(u, *v);
+        let twice = cross(u, once);
+        [0, 1, 2].map(|i| v[i] + 2.0 * (w * once[i] + twice[i]))
+    }
+}
+
 /// The carriers' points over time.
 #[derive(Clone, Debug, Default)]
 pub struct Carriers {
@@ -190,6 +208,24 @@ impl Default for Take {
             events: Vec::new(),
             remarks: Vec::new(),
             notes: Vec::new(),
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_quarter_turn_about_x_takes_y_to_z() {
+        let h = 0.5f64.sqrt();
+        let pose = Pose {
+            orientation: vec![[h, 0.0, 0.0, h]],
+            ..Pose::default()
+        };
+        let v = pose.in_world(0, &[1.0, 2.0, 0.0]);
+        for (got, expected) in v.iter().zip([1.0, 0.0, 2.0]) {
+            assert!((got - expected).abs() < 1e-12, "{v:?}");
         }
     }
 }

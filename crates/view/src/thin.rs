@@ -1,5 +1,7 @@
 //! Making a curve coarser without losing its extremes: the smallest and the largest value of every interval, at their own times.
 
+use analyze::summary::Times;
+
 use crate::take::Curve;
 
 /// Thins a curve that arrives in pieces, in memory that does not grow with it.
@@ -72,6 +74,38 @@ impl Thin {
                 self.high = (t, x);
             }
         }
+    }
+
+    /// The next values of a column; `rows` are their places among the times, where not every message has one. Nothing is drawn through where
+    /// messages were lost ([`Times::gaps`]).
+    pub fn push_between_gaps(
+        &mut self,
+        times_ns: &[i64],
+        rows: Option<&[u32]>,
+        values: &[f64],
+        times: &Times,
+    ) {
+        let own: Vec<i64>;
+        let times_ns = match rows {
+            None => times_ns,
+            Some(rows) => {
+                own = rows.iter().map(|row| times_ns[*row as usize]).collect();
+                &own
+            }
+        };
+        let mut from = 0;
+        for gap in times.gaps() {
+            let before = rows.map_or(gap.before, |rows| {
+                rows.partition_point(|row| (*row as usize) < gap.before)
+            });
+            let Some(next_ns) = times_ns.get(before) else {
+                break;
+            };
+            self.push(&times_ns[from..before], &values[from..before]);
+            self.push(&[next_ns.saturating_sub(1)], &[f64::NAN]);
+            from = before;
+        }
+        self.push(&times_ns[from..], &values[from..]);
     }
 
     fn flush(&mut self) {
@@ -185,5 +219,18 @@ mod tests {
         assert_eq!(curve.values.iter().filter(|x| x.is_nan()).count(), 1);
         let all_nan = thinned(&vec![f64::NAN; 1000], 20, 64);
         assert!(all_nan.values.iter().all(|x| x.is_nan()) && all_nan.values.len() == 10);
+    }
+
+    #[test]
+    fn a_hole_breaks_a_curve_that_not_every_message_has_too() {
+        let times_ns: Vec<i64> = (0..100).chain(200..300).map(|k| k * 10_000_000).collect();
+        let rows: Vec<u32> = (0..100).map(|k| 2 * k).collect();
+        let mut times = Times::default();
+        times.push(&times_ns);
+        let mut thin = Thin::new("x", 0, 3_000_000_000, 0, 1);
+        thin.push_between_gaps(&times_ns, Some(&rows), &[1.0; 100], &times);
+        let curve = thin.finish();
+        assert_eq!(curve.values.len(), 101);
+        assert!(curve.values[50].is_nan() && curve.times_ns.is_sorted());
     }
 }

@@ -6,8 +6,9 @@
 use super::rath::{Motion, Mounting};
 use super::unloading::unloadings;
 use crate::inputs::{Inputs, Window, between};
+use crate::line::rival_hz;
 use crate::median::median;
-use crate::metrics::{Datum, Metrics, metrics_of, rival_hz};
+use crate::metrics::{Datum, Metrics, metrics_of};
 use crate::random::Random;
 use std::ops::Range;
 

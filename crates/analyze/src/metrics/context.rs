@@ -3,9 +3,9 @@
 use std::borrow::Cow;
 use std::cell::OnceCell;
 
-use super::lines::{Line, NEAR};
 use crate::beat::adler::Adler;
 use crate::inputs::{Inputs, Window, mean_step_s};
+use crate::line::{Line, NEAR};
 
 /// A column that a metric cannot do without.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -210,7 +210,7 @@ impl<'a> Context<'a> {
     /// The strongest line of the height.
     pub fn height_line(&self) -> Option<&Line> {
         self.height_line
-            .get_or_init(|| Line::strongest(self.height()))
+            .get_or_init(|| Line::strongest(&self.height().t_s, &self.height().x))
             .as_ref()
     }
 

@@ -1,8 +1,8 @@
 //! What drives the roll, as one word with its evidence.
 
-use super::lines::Shares;
 use super::{Context, Value};
 use crate::inputs::{between, stretches};
+use crate::line::Shares;
 use crate::mechanism::{self, Evidence, Verdict};
 
 /// The evidence for this window. `None` where the roll does not move or has no step.
@@ -11,7 +11,7 @@ pub fn evidence(c: &Context) -> Option<Evidence> {
     let step_s = roll.step_s()?;
     let rms_roll_rad = (roll.x.iter().map(|x| x * x).sum::<f64>() / roll.x.len() as f64).sqrt();
     let f_hz = c.height_line().map(|l| l.hz);
-    let shares = f_hz.and_then(|f| Shares::of(roll, f));
+    let shares = f_hz.and_then(|f| Shares::of(&roll.t_s, &roll.x, f));
     let forces = c.forces();
     let on_roll: Vec<Vec<f64>> = if forces.is_empty() {
         Vec::new()

@@ -14,7 +14,6 @@ mod together;
 pub use contact::FLOAT_SHARE;
 pub use context::{Context, Need};
 pub use drive::evidence as mechanism_evidence;
-pub(crate) use lines::{FEWEST_PERIODS, rival_hz};
 pub use onset::{ONSET_ROLL_DEG, ONSET_STRETCH_S, onset_s, stretch_samples};
 
 use serde::ser::{Serialize, SerializeMap, Serializer};

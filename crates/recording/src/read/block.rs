@@ -6,7 +6,8 @@ use super::{
     ReadOptions, Recording, Tally,
     chunk::{self, Loss, Unpacker, WHOLE_BYTES},
     container::{Block, Definitions, Fields, op},
-    decode::{self, Decoder, NoDecoder, Place, SchemaRef},
+    decode::{Decoder, Place, SchemaRef},
+    decoders::{self, NoDecoder},
     rows::{Rows, Selection},
 };
 use crate::finding::Kind;
@@ -377,7 +378,7 @@ impl<'a> ChannelState<'a> {
             encoding: &info.schema_encoding,
             data: &info.schema_data,
         };
-        let state = match decode::open(&info.encoding, &schema, &mut rows) {
+        let state = match decoders::open(&info.encoding, &schema, &mut rows) {
             Ok(decoder) => State::Ready(decoder),
             Err(NoDecoder::Unknown) => State::Closed(
                 Kind::NoDecoder,

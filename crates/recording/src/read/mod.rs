@@ -11,6 +11,7 @@ mod clock;
 mod collect;
 mod container;
 mod decode;
+mod decoders;
 mod idl;
 mod json;
 mod layout;
@@ -36,7 +37,7 @@ use std::{
 use container::{Container, Damage, Definitions};
 
 pub use container::ends_whole;
-pub use decode::supported;
+pub use decoders::supported;
 pub use stream::{Batch, Column, RawMessage};
 
 use crate::{Finding, Kind, Signal};

@@ -6,151 +6,18 @@
 //! ```
 //! J holds the columns of the free angles; τ torque on the body in its axes (N·m). These are Lagrange's equations of the body with ideal
 //! (workless) constraints, in Kane's form: the held coordinates cost nothing, neither states nor equations. A held coordinate keeps its
-//! value at t = 0; `start` velocities along it are dropped. With all three angles free the attitude stays a quaternion ([`Pinned`]), with
+//! value at t = 0; `start` velocities along it are dropped. With all three angles free the attitude stays a quaternion (`pinned.rs`), with
 //! two it is a gimbal (`gimbal.rs`), with one or none a hinge (`hinge.rs`), so no choice of freedoms has a singular
 //! attitude that motion can reach; roll and yaw alone need the held tilt away from ±90°, which the scene's check asks for.
 //! Source: Landau & Lifshitz, *Mechanics*, §35 (Euler angles); Kane & Levinson, *Dynamics* (1985), ch. 6.
 
-use super::gimbal::Gimbal;
-use super::hinge::{ASKEW, Hinge};
-use super::{Coordinates, Freedoms, Pose, Six, cross, dot, pull, times};
+use super::{Coordinates, Freedoms, Pose, cross, dot, pull, times};
 use crate::body::Body;
 use crate::lanes::{Moments, Number, f64x2, pack, sum};
 use crate::model::{All, Block, Pair, Part, Workspace};
-use crate::scene::{Freedom, Start};
+use crate::scene::Start;
 use nalgebra::{DMatrix, DVector, Matrix3, Rotation3, UnitQuaternion, Vector3};
 use std::ops::Range;
-
-/// The coordinates for a choice of freedoms.
-pub fn choose(
-    body: &Body,
-    handles_m: &[[f64; 3]],
-    free: &[Freedom],
-    start: &Start,
-    height_m: f64,
-) -> Box<dyn Freedoms> {
-    let is_free = Freedom::ALL.map(|f| free.contains(&f));
-    let six = || Six::new(body, handles_m);
-    let rails = || Rails::new(body, is_free, start, height_m);
-    match is_free {
-        [true, true, true, true, true, true] => Box::new(six()),
-        [x, y, z, true, true, true] => Box::new(Pinned {
-            six: six(),
-            free: [x, y, z],
-        }),
-        [.., roll, tilt, yaw] if u8::from(roll) + u8::from(tilt) + u8::from(yaw) == 2 => {
-            Box::new(Reduced::<Gimbal>::new(rails(), handles_m))
-        }
-        [.., roll, tilt, yaw] => {
-            let [_, pitch_deg, yaw_deg] = start.roll_pitch_yaw_deg;
-            match (roll, tilt, yaw) {
-                (true, ..) if pitch_deg == 0.0 && yaw_deg == 0.0 => {
-                    Box::new(Reduced::<Hinge<0>>::new(rails(), handles_m))
-                }
-                (_, true, _) if yaw_deg == 0.0 => {
-                    Box::new(Reduced::<Hinge<1>>::new(rails(), handles_m))
-                }
-                (.., true) => Box::new(Reduced::<Hinge<2>>::new(rails(), handles_m)),
-                _ => Box::new(Reduced::<Hinge<ASKEW>>::new(rails(), handles_m)),
-            }
-        }
-    }
-}
-
-/// Three free angles, some of the translations held: the attitude of [`Six`] with a centre of mass on rails.
-pub struct Pinned {
-    six: Six,
-    free: [bool; 3],
-}
-
-impl Pinned {
-    fn hold(&self, v: &mut [f64]) {
-        for (v, free) in v.iter_mut().zip(self.free) {
-            if !free {
-                *v = 0.0;
-            }
-        }
-    }
-}
-
-impl Coordinates for Pinned {
-    #[inline(always)]
-    fn gaps_at<N: Moments>(&self, y: &[N::Each], w: &mut Workspace<N>, part: impl Part) {
-        self.six.gaps_at(y, w, part);
-    }
-    #[inline(always)]
-    fn rates_at<N: Moments>(&self, y: &[N::Each], w: &Workspace<N>, dy: &mut [N::Each]) {
-        self.six.rates_at(y, w, dy);
-        for (dy, free) in dy[7..10].iter_mut().zip(self.free) {
-            if !free {
-                *dy = N::Each::splat(0.0);
-            }
-        }
-    }
-}
-
-impl Freedoms for Pinned {
-    fn size(&self) -> usize {
-        self.six.size()
-    }
-    fn names(&self) -> &[&'static str] {
-        self.six.names()
-    }
-    fn positions(&self) -> usize {
-        self.six.positions()
-    }
-    fn place(&self, start: &Start, height_m: f64, y: &mut [f64]) {
-        self.six.place(start, height_m, y);
-        self.hold(&mut y[7..10]);
-    }
-    fn gaps(&self, y: &[f64], w: &mut Workspace) {
-        self.six.gaps(y, w);
-    }
-    fn gaps_of(&self, y: &[f64], w: &mut Workspace, block: Block) {
-        self.six.gaps_of(y, w, block);
-    }
-    fn accelerate(&self, y: &[f64], w: &mut Workspace, dy: &mut [f64]) {
-        self.rates_at(y, w, dy);
-    }
-    fn attitude(&self) -> Range<usize> {
-        self.six.attitude()
-    }
-    fn levers(&self, y: &[f64], handle_m: [f64; 3], axis: usize) -> [f64; 6] {
-        self.six.levers(y, handle_m, axis)
-    }
-    fn inverse_masses(&self, y: &[f64]) -> [f64; 6] {
-        let mut inverse = self.six.inverse_masses(y);
-        self.hold(&mut inverse[..3]);
-        inverse
-    }
-    fn spin_rad_per_s(&self, y: &[f64]) -> [f64; 3] {
-        self.six.spin_rad_per_s(y)
-    }
-    fn pose(&self, y: &[f64]) -> Pose {
-        self.six.pose(y)
-    }
-    fn acceleration(&self, y: &[f64], dy: &[f64]) -> [[f64; 3]; 2] {
-        self.six.acceleration(y, dy)
-    }
-    fn project(&self, y: &mut [f64]) {
-        self.six.project(y);
-    }
-    fn drift(&self, h_s: f64, y: &mut [f64]) {
-        self.six.drift(h_s, y);
-    }
-    fn energy_j(&self, y: &[f64]) -> [f64; 2] {
-        self.six.energy_j(y)
-    }
-    fn rotation(&self) -> Option<[usize; 2]> {
-        self.six.rotation()
-    }
-    fn scales(&self) -> &[f64] {
-        self.six.scales()
-    }
-    fn damping_per_s(&self, y: &[f64], pairs: &[Pair], damping: [&[f64x2]; 2], rates: &mut [f64]) {
-        self.six.damping_per_s(y, pairs, damping, rates);
-    }
-}
 
 /// Which coordinates are free and where the others are held, and the body that they place.
 pub(super) struct Rails {
@@ -180,7 +47,7 @@ const NAMES: [[&str; 2]; 6] = [
 ];
 
 impl Rails {
-    fn new(body: &Body, free: [bool; 6], start: &Start, height_m: f64) -> Self {
+    pub(super) fn new(body: &Body, free: [bool; 6], start: &Start, height_m: f64) -> Self {
         let mut place = [None; 6];
         let mut count = 0;
         for (p, is_free) in place.iter_mut().zip(free) {
@@ -269,7 +136,7 @@ pub(super) struct Reduced<T> {
 }
 
 impl<T: Turning> Reduced<T> {
-    fn new(rails: Rails, handles_m: &[[f64; 3]]) -> Self {
+    pub(super) fn new(rails: Rails, handles_m: &[[f64; 3]]) -> Self {
         let [x, y, z] = [0, 1, 2].map(|a| pack(handles_m.iter().map(|h| h[a])));
         let handles: Vec<_> = (0..x.len()).map(|p| [x[p], y[p], z[p]]).collect();
         Self {

@@ -1,6 +1,5 @@
 //! Which way the party walks and at what height, without the sway of each step: figures and camera go by it.
 
-use super::space::rotate;
 use crate::take::Pose;
 
 /// Half the time that a heading is averaged over, s: several steps.
@@ -16,12 +15,10 @@ const SURE: f64 = 0.3;
 
 /// Direction of the body's x axis over the ground at every moment, rad; the last one known while the body does not stand upright.
 pub fn headings(pose: &Pose) -> Vec<f64> {
-    let (x, y): (Vec<f64>, Vec<f64>) = pose
-        .orientation
-        .iter()
-        .map(|q| {
-            let upright = rotate(q, &[0.0, 0.0, 1.0])[2].max(0.0);
-            let ahead = rotate(q, &[1.0, 0.0, 0.0]);
+    let (x, y): (Vec<f64>, Vec<f64>) = (0..pose.orientation.len())
+        .map(|k| {
+            let upright = pose.in_world(k, &[0.0, 0.0, 1.0])[2].max(0.0);
+            let ahead = pose.in_world(k, &[1.0, 0.0, 0.0]);
             (upright * ahead[0], upright * ahead[1])
         })
         .unzip();

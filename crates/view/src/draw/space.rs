@@ -430,9 +430,7 @@ fn people(
 /// Where the handles are in the world at one moment of the pose.
 fn handles_at(handles_m: &[[f64; 3]], pose: &Pose, at: usize) -> Vec<[f64; 3]> {
     let place = pose.position_m[at];
-    let turned = handles_m
-        .iter()
-        .map(|handle| rotate(&pose.orientation[at], handle));
+    let turned = handles_m.iter().map(|handle| pose.in_world(at, handle));
     turned
         .map(|[x, y, z]| [place[0] + x, place[1] + y, place[2] + z])
         .collect()
@@ -528,36 +526,12 @@ fn forces(
     Ok(Some(unit))
 }
 
-/// A vector turned by a unit quaternion (x, y, z, w): v + 2w(u × v) + 2u × (u × v).
-pub fn rotate(q: &[f64; 4], v: &[f64; 3]) -> [f64; 3] {
-    let cross = |a: [f64; 3], b: [f64; 3]| {
-        [
-            a[1] * b[2] - a[2] * b[1],
-            a[2] * b[0] - a[0] * b[2],
-            a[0] * b[1] - a[1] * b[0],
-        ]
-    };
-    let u = [q[0], q[1], q[2]];
-    let once = cross(u, *v);
-    let twice = cross(u, once);
-    [0, 1, 2].map(|i| v[i] + 2.0 * (q[3] * once[i] + twice[i]))
-}
-
 #[cfg(test)]
 mod tests {
     use std::f64::consts::PI;
 
     use super::*;
     use crate::draw::sent;
-
-    #[test]
-    fn a_quarter_turn_about_x_takes_y_to_z() {
-        let h = 0.5f64.sqrt();
-        let v = rotate(&[h, 0.0, 0.0, h], &[1.0, 2.0, 0.0]);
-        for (got, expected) in v.iter().zip([1.0, 0.0, 2.0]) {
-            assert!((got - expected).abs() < 1e-12, "{v:?}");
-        }
-    }
 
     #[test]
     fn legs_step_where_the_figure_walks() {

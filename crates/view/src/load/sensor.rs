@@ -6,7 +6,6 @@ use analyze::summary::{self, Times};
 use recording::read::Batch;
 use recording::signal::field_of;
 
-use super::stream::push;
 use crate::take::{Curve, Sensor};
 use crate::thin::Thin;
 
@@ -62,7 +61,7 @@ impl Stream {
                 0..3 => (&mut self.gyro[k], &mut self.gyro_spectra[k]),
                 _ => (&mut self.accel[k - 3], &mut self.accel_spectra[k - 3]),
             };
-            push(thin, batch.times_ns, column.rows, column.values, times);
+            thin.push_between_gaps(batch.times_ns, column.rows, column.values, times);
             if column.rows.is_some() {
                 self.own[k].get_or_insert_default();
             }

@@ -121,13 +121,9 @@ pub fn others(
                     continue;
                 }
             };
-            push(
-                &mut topic[at].2,
-                batch.times_ns,
-                column.rows,
-                column.values,
-                times,
-            );
+            topic[at]
+                .2
+                .push_between_gaps(batch.times_ns, column.rows, column.values, times);
         }
     })?;
     for finding in more {
@@ -182,38 +178,6 @@ pub fn others(
     Ok(())
 }
 
-/// The next values of a column; `rows` are their places among the times, where not every message has one. Nothing is drawn through where messages
-/// were lost ([`Times::gaps`]).
-pub fn push(
-    thin: &mut Thin,
-    times_ns: &[i64],
-    rows: Option<&[u32]>,
-    values: &[f64],
-    times: &Times,
-) {
-    let own: Vec<i64>;
-    let times_ns = match rows {
-        None => times_ns,
-        Some(rows) => {
-            own = rows.iter().map(|row| times_ns[*row as usize]).collect();
-            &own
-        }
-    };
-    let mut from = 0;
-    for gap in times.gaps() {
-        let before = rows.map_or(gap.before, |rows| {
-            rows.partition_point(|row| (*row as usize) < gap.before)
-        });
-        let Some(next_ns) = times_ns.get(before) else {
-            break;
-        };
-        thin.push(&times_ns[from..before], &values[from..before]);
-        thin.push(&[next_ns.saturating_sub(1)], &[f64::NAN]);
-        from = before;
-    }
-    thin.push(&times_ns[from..], &values[from..]);
-}
-
 /// A plain topic: curves of one unit share a plot.
 fn topic(name: String, curves: Vec<(String, String, Thin)>) -> Topic {
     let mut plots: Vec<(String, Vec<Curve>)> = Vec::new();
@@ -228,22 +192,4 @@ fn topic(name: String, curves: Vec<(String, String, Thin)>) -> Topic {
         }
     }
     Topic { name, plots }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn a_hole_breaks_a_curve_that_not_every_message_has_too() {
-        let times_ns: Vec<i64> = (0..100).chain(200..300).map(|k| k * 10_000_000).collect();
-        let rows: Vec<u32> = (0..100).map(|k| 2 * k).collect();
-        let mut times = Times::default();
-        times.push(&times_ns);
-        let mut thin = Thin::new("x", 0, 3_000_000_000, 0, 1);
-        push(&mut thin, &times_ns, Some(&rows), &[1.0; 100], &times);
-        let curve = thin.finish();
-        assert_eq!(curve.values.len(), 101);
-        assert!(curve.values[50].is_nan() && curve.times_ns.is_sorted());
-    }
 }

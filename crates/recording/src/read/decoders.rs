@@ -1,0 +1,52 @@
+//! The table of decoders: message encoding and schema encoding to the code that turns messages into numbers.
+
+use super::{
+    cdr,
+    decode::{Decoder, SchemaRef},
+    json, protobuf, ros1,
+    rows::Rows,
+};
+
+/// What [`open`] can say instead of a decoder.
+#[derive(Debug)]
+pub(super) enum NoDecoder {
+    /// No line of the table fits.
+    Unknown,
+    /// The schema cannot be understood: why.
+    BadSchema(String),
+}
+
+type Open = fn(&SchemaRef<'_>, &mut Rows) -> Result<Box<dyn Decoder>, String>;
+
+/// Message encoding, schema encoding (`*`: any, or none) and how to begin.
+const DECODERS: &[(&str, &str, Open)] = &[
+    ("cdr", "ros2msg", cdr::open_ros2msg),
+    ("cdr", "ros2idl", cdr::open_idl),
+    ("cdr", "omgidl", cdr::open_idl),
+    ("ros1", "ros1msg", ros1::open),
+    ("protobuf", "protobuf", protobuf::open),
+    ("json", "*", json::open),
+];
+
+/// The encodings that can be read, as `message encoding/schema encoding`.
+pub fn supported() -> impl Iterator<Item = (&'static str, &'static str)> {
+    DECODERS
+        .iter()
+        .map(|(message, schema, _)| (*message, *schema))
+}
+
+/// Finds the decoder of a channel and lets it read the schema.
+pub(super) fn open(
+    message_encoding: &str,
+    schema: &SchemaRef<'_>,
+    rows: &mut Rows,
+) -> Result<Box<dyn Decoder>, NoDecoder> {
+    let open = DECODERS
+        .iter()
+        .find(|(message, encoding, _)| {
+            *message == message_encoding && (*encoding == "*" || *encoding == schema.encoding)
+        })
+        .map(|(_, _, open)| open)
+        .ok_or(NoDecoder::Unknown)?;
+    open(schema, rows).map_err(NoDecoder::BadSchema)
+}
