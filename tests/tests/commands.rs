@@ -455,12 +455,27 @@ fn a_full_disk_is_said_in_one_sentence() {
     assert_eq!(said.trim().lines().count(), 1, "{said}");
 }
 
-/// `sim record --out - | head -c 10`, of a run that is longer than any pipe.
+/// `sim record --out - | head -c 10`, of a run that is longer than any pipe; `analyze ingest` alike.
 #[test]
 fn a_reader_that_leaves_is_no_error() {
+    leaves("sim", &["record", "--duration", "600"]);
+    let sample = |name: &str| {
+        format!(
+            "{}/../data-samples/phones/{name}",
+            env!("CARGO_MANIFEST_DIR")
+        )
+    };
+    leaves(
+        "analyze",
+        &["ingest", &sample("rath.zip"), &sample("drum.wav")],
+    );
+}
+
+fn leaves(program: &str, args: &[&str]) {
     let folder = tempfile::tempdir().expect("a folder");
-    let mut child = Command::new(bin("sim"))
-        .args(["record", "--duration", "600", "--out", "-"])
+    let mut child = Command::new(bin(program))
+        .args(args)
+        .args(["--out", "-"])
         .current_dir(folder.path())
         .stdout(Stdio::piped())
         .stderr(Stdio::piped())

@@ -188,6 +188,14 @@ impl RecordingWriter {
         }
     }
 
+    /// Begins a recording where a user asked for it: `-` is standard output, anything else a path for [`create`](Self::create).
+    pub fn to(out: &Path, options: &WriterOptions) -> Result<Self, WriteError> {
+        match out.as_os_str() == "-" {
+            true => Self::to_stream(io::stdout(), options),
+            false => Self::create(out, options),
+        }
+    }
+
     /// Begins a recording on a stream such as standard output; nothing is sought.
     pub fn to_stream(
         stream: impl Write + Send + 'static,

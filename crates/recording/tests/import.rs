@@ -451,6 +451,126 @@ fn several_devices_by_layout() {
     assert_eq!(got.values("/imu/belt.linear_acceleration.z"), [9.81]);
 }
 
+/// As the app writes it where a comma is the decimal sign: an empty line first, the minus of typography, the last value held between samples.
+#[test]
+fn physics_toolbox_holds_each_sensor_between_its_samples() {
+    let folder = folder();
+    let mut text = "\ntime;gFx;gFy;gFz;wx;wy;wz;Gain\n".to_owned();
+    // A row each 4 ms; a new acceleration each second row, a new angular velocity each fourth.
+    for row in 0..80 {
+        let (force, rate) = (row / 2 * 2, row / 4 * 4);
+        text += &format!(
+            "0,{:03};0,{:03};\u{2212}0,5;0,8;0;\u{2212}0,{:03};0;\u{2212}\u{221e}\n",
+            4 * row,
+            force,
+            rate
+        );
+    }
+    let path = file(folder.path(), "ptb.csv", &text);
+    let got = ingest(folder.path(), &[path], None).expect("ingests");
+    let times: Vec<i64> = (0..40).map(|k| k * 8_000_000).collect();
+    assert_eq!(got.times("/imu/ptb"), times);
+    let close = |a: f64, b: f64| (a - b).abs() < 1e-12;
+    for (k, x) in got
+        .values("/imu/ptb.linear_acceleration.x")
+        .iter()
+        .enumerate()
+    {
+        assert!(close(*x, 9.80665 * 2e-3 * k as f64), "{k}: {x}");
+    }
+    assert!(
+        got.values("/imu/ptb.linear_acceleration.y")
+            .iter()
+            .all(|y| close(*y, -9.80665 * 0.5))
+    );
+    // A ramp of the angular velocity comes back as one, not as stairs; after its last sample it is not known.
+    let rates = got.values("/imu/ptb.angular_velocity.y");
+    for (k, x) in rates[..39].iter().enumerate() {
+        assert!(close(*x, -2e-3 * k as f64), "{k}: {x}");
+    }
+    let covariance = got.values("/imu/ptb.angular_velocity_covariance[0]");
+    assert_eq!((covariance[38], covariance[39]), (0.0, -1.0));
+    let held = |what| got.ingested.notes.iter().any(|note| note.contains(what));
+    assert!(
+        held("40 of 80 rows repeat the acceleration")
+            && held("60 of 80 rows repeat the angular velocity")
+    );
+}
+
+#[test]
+fn times_may_be_dates_or_clocks_and_text_of_another_encoding() {
+    let folder = folder();
+    let dated = "time,gFx,gFy,gFz,gFTotal\n2018-10-03 17:23:55.4640,0,0,1,1\n2018-10-03 17:23:55.4650,0,0,2,2\n";
+    let path = file(folder.path(), "sensor.csv", dated);
+    let got = ingest(folder.path(), std::slice::from_ref(&path), None).expect("ingests");
+    let first = 1_538_587_435_464_000_000;
+    assert_eq!(got.times("/imu/sensor"), [first, first + 1_000_000]);
+    assert_eq!(
+        got.values("/imu/sensor.linear_acceleration.z"),
+        [9.80665, 2.0 * 9.80665]
+    );
+    // What a spreadsheet calls Unicode text.
+    let wide: Vec<u8> = [0xfeff]
+        .into_iter()
+        .chain(dated.replace(',', "\t").encode_utf16())
+        .flat_map(u16::to_le_bytes)
+        .collect();
+    fs::write(&path, wide).expect("writes");
+    let got = ingest(folder.path(), &[path], None).expect("ingests");
+    assert_eq!(got.times("/imu/sensor"), [first, first + 1_000_000]);
+    // Latin-1.
+    let layout = "[time]\ncolumn = \"Uhr\"\nunit = \"s\"\n[acceleration]\ncolumns = [\"x (m/s²)\", \"y (m/s²)\", \"z (m/s²)\"]\nunit = \"m/s^2\"\n";
+    let layout = file(folder.path(), "layout.toml", layout);
+    let path = folder.path().join("uhr.csv");
+    let text =
+        b"Uhr;x (m/s\xb2);y (m/s\xb2);z (m/s\xb2)\n23:59:59:500;1;2;9,8\n0:00:00:500;3;4;9,7\n";
+    fs::write(&path, text).expect("writes");
+    let got = ingest(folder.path(), &[path], layout.to_str()).expect("ingests");
+    let midnight = 86_400_000_000_000;
+    assert_eq!(
+        got.times("/imu/uhr"),
+        [midnight - 500_000_000, midnight + 500_000_000]
+    );
+    assert_eq!(got.values("/imu/uhr.linear_acceleration.z"), [9.8, 9.7]);
+}
+
+#[test]
+fn shimmer_units_clocks_and_the_accelerometer_that_is_not_at_its_end() {
+    let folder = folder();
+    let text = |low_noise: f64| {
+        format!(
+            "\"sep=,\"\nbelt_Timestamp_Unix_CAL,belt_TimestampSync_Unix_CAL,belt_Accel_LN_X_CAL,belt_Accel_LN_Y_CAL,belt_Accel_LN_Z_CAL,\
+             belt_Accel_WR_X_CAL,belt_Accel_WR_Y_CAL,belt_Accel_WR_Z_CAL,belt_Gyro_X_CAL,belt_Gyro_Y_CAL,belt_Gyro_Z_CAL,\n\
+             ms,ms,m/(s^2),m/(s^2),m/(s^2),m/(s^2),m/(s^2),m/(s^2),deg/s,deg/s,deg/s,\n\
+             5,1700000000000.5,0,0,9.8,0,0,9.5,90,0,0,\n\
+             15,1700000000010.5,0,0,{low_noise},0,0,9.6,0,0,0,\n"
+        )
+    };
+    let z = |low_noise| {
+        let path = file(folder.path(), "belt.csv", &text(low_noise));
+        let got = ingest(folder.path(), &[path], None).expect("ingests");
+        let start = 1_700_000_000_000_500_000;
+        for (t_ns, expected) in got
+            .times("/imu/belt")
+            .iter()
+            .zip([start, start + 10_000_000])
+        {
+            // Milliseconds since 1970 have no more digits.
+            assert!((t_ns - expected).abs() < 300, "{t_ns}");
+        }
+        let turn = got.values("/imu/belt.angular_velocity.x")[0];
+        assert!((turn - std::f64::consts::FRAC_PI_2).abs() < 1e-15);
+        (
+            got.values("/imu/belt.linear_acceleration.z").to_vec(),
+            got.ingested.notes.join(" "),
+        )
+    };
+    assert_eq!(z(9.9), (vec![9.8, 9.9], String::new()));
+    let (wide, notes) = z(19.6);
+    assert_eq!(wide, [9.5, 9.6]);
+    assert!(notes.contains("came to its end at 2 g"), "{notes}");
+}
+
 #[test]
 fn what_is_missing_or_odd_is_named() {
     let folder = folder();
@@ -468,7 +588,7 @@ fn what_is_missing_or_odd_is_named() {
     };
     assert_eq!(
         error("a.csv", "foo,bar\n1,2\n", None),
-        "a.csv: is no log of phyphox, Sensor Logger or Movella DOT / Xsens, and no layout is given; found \"foo,bar\""
+        "a.csv: is no log of Sensor Logger, phyphox, Movella DOT / Xsens, Shimmer, x-io, physics-toolbox, and no layout is given; found \"foo,bar\""
     );
     assert_eq!(
         error("b.csv", "Time (s),gyro\n1,2\n", Some("x-io")),
@@ -491,6 +611,13 @@ fn what_is_missing_or_odd_is_named() {
         "c.csv: has an empty SampleTimeFine in row 1; expected a count below 2^32"
     );
     assert_eq!(error("d.csv", "", None), "d.csv: is empty; expected a log");
+    let twice = vec![folder.path().join("d.csv"); 2];
+    let twice = ingest(folder.path(), &twice, None).err().expect("refused");
+    assert!(
+        twice
+            .to_string()
+            .ends_with("d.csv: is given twice; expected each log once")
+    );
     assert_eq!(
         error("e.csv", "a\n1\n", Some("nothing")),
         "nothing: is neither a file nor a built-in layout; built in are x-io, physics-toolbox"

@@ -4,7 +4,7 @@ use std::path::PathBuf;
 
 use anyhow::bail;
 use clap::Args;
-use recording::import;
+use recording::import::{self, ImportError};
 use recording::whole::apart;
 use recording::write::{RecordingWriter, WriterOptions};
 
@@ -13,7 +13,7 @@ use super::Done;
 const EXAMPLES: &str = "\
 Examples:
   analyze ingest logs.npz --out run.mcap                     a log of the paper's archive
-  analyze ingest phone.zip --out walk.mcap                   phyphox or Sensor Logger
+  analyze ingest phone.zip --out walk.mcap                   phyphox or Sensor Logger; other apps and sensors: their .csv
   analyze ingest rath.zip carrier_1.csv carrier_2.csv --out walk.mcap  several devices, one recording
   analyze ingest rath.zip carrier_1.zip carrier_2.zip drum.wav --out walk.mcap  with sound
   analyze ingest sensor.csv --layout columns.toml --out walk.mcap
@@ -24,13 +24,14 @@ A file's name says whose device it was: carrier, bearer, walker or person in it 
 #[derive(Args)]
 #[command(after_help = EXAMPLES)]
 pub(super) struct IngestArgs {
-    /// Logs: .npz of the archive; .zip, .csv or folders of phone apps and inertial sensors; .wav of a sound recorder
+    /// Logs: .npz of the archive; .zip, .csv or folders of phone apps and inertial sensors (phyphox, Sensor Logger, Physics Toolbox, Movella DOT,
+    /// Xsens, Shimmer, x-io); .wav of a sound recorder
     #[arg(required = true, value_name = "FILE")]
     files: Vec<PathBuf>,
     /// The recording to write; `-` is standard output
     #[arg(long, value_name = "FILE.mcap")]
     out: PathBuf,
-    /// How the columns are laid out, where the files do not tell: a built-in name (x-io, physics-toolbox) or a TOML file (docs/recording.md)
+    /// How the columns are laid out, where the files do not tell: a TOML file (docs/recording.md), or a built-in name (x-io, physics-toolbox)
     #[arg(long, value_name = "NAME|FILE.toml")]
     layout: Option<String>,
     /// When the sound begins after the first inertial sample; taps that both noticed put it right later
@@ -44,6 +45,15 @@ pub(super) struct IngestArgs {
 }
 
 pub(super) fn run(args: &IngestArgs) -> anyhow::Result<Done> {
+    match ingest(args) {
+        Err(error) if matches!(error.downcast_ref(), Some(ImportError::Write(e)) if e.reader_left()) => {
+            Ok(Done::Well)
+        }
+        outcome => outcome,
+    }
+}
+
+fn ingest(args: &IngestArgs) -> anyhow::Result<Done> {
     apart([&*args.out], args.files.iter().map(AsRef::as_ref)).map_err(anyhow::Error::msg)?;
     if args.sound_start.abs() > 1e6 || args.sound_start.is_nan() {
         bail!(
@@ -55,13 +65,9 @@ pub(super) fn run(args: &IngestArgs) -> anyhow::Result<Done> {
         layout: args.layout.as_deref(),
         sound_start_s: args.sound_start,
     };
-    let piped = args.out.as_os_str() == "-";
-    let mut writer = match piped {
-        true => RecordingWriter::to_stream(std::io::stdout(), &WriterOptions::default())?,
-        false => RecordingWriter::create(&args.out, &WriterOptions::default())?,
-    };
+    let mut writer = RecordingWriter::to(&args.out, &WriterOptions::default())?;
     let done = import::ingest(&args.files, &options, &mut writer)?;
-    writer.finish()?;
+    writer.finish().map_err(ImportError::Write)?;
     for note in done.notes.iter().chain(&done.losses) {
         recording::note!("analyze: {note}");
     }
@@ -70,7 +76,7 @@ pub(super) fn run(args: &IngestArgs) -> anyhow::Result<Done> {
         .iter()
         .map(|(topic, messages)| format!("{topic} ({messages})"))
         .collect();
-    let out = match piped {
+    let out = match args.out.as_os_str() == "-" {
         true => "standard output".into(),
         false => args.out.to_string_lossy(),
     };

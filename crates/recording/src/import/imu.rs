@@ -77,6 +77,21 @@ impl Log {
     }
 }
 
+/// A track without the rows in which a logger only repeated it: one that writes several sensors into one table holds each one's last value
+/// between its samples. `None` where it does not: at least a quarter of the rows then repeat the one before to the last digit.
+///
+/// A track that all but stands still, as that of a broken sensor, is none that is held: fewer than one row in 50 is new.
+pub(super) fn without_repeats(track: &Track) -> Option<Track> {
+    let bits = |row: &(i64, [f64; 3])| row.1.map(f64::to_bits);
+    let new = track
+        .iter()
+        .enumerate()
+        .filter(|(k, row)| *k == 0 || bits(row) != bits(&track[k - 1]));
+    let new: Track = new.map(|(_, row)| *row).collect();
+    let held = new.len() * 4 <= track.len() * 3 && new.len() * 50 >= track.len();
+    (held && new.len() >= 8).then_some(new)
+}
+
 /// The median interval of a track, ns.
 fn usual_interval(track: &Track) -> i64 {
     let mut intervals: Vec<i64> = track.windows(2).map(|pair| pair[1].0 - pair[0].0).collect();

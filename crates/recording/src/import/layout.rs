@@ -5,8 +5,9 @@ use std::path::Path;
 use serde::Deserialize;
 
 use super::{
-    ImportError,
-    imu::{self, Log, STANDARD_GRAVITY, Sample},
+    Files, HEADER_LINES, ImportError,
+    date::Dates,
+    imu::{self, Log, STANDARD_GRAVITY, Track},
     table::Table,
 };
 use crate::text::read_text;
@@ -22,7 +23,8 @@ pub const BUILT_IN: &[(&str, &str)] = &[
     (
         "physics-toolbox",
         "header = \"time\"\n[time]\ncolumn = \"time\"\nunit = \"s\"\n\
-         [acceleration]\ncolumns = [\"gFx\", \"gFy\", \"gFz\"]\nunit = \"g\"\n",
+         [acceleration]\ncolumns = [\"gFx\", \"gFy\", \"gFz\"]\nunit = \"g\"\n\
+         [angular_velocity]\ncolumns = [\"wx\", \"wy\", \"wz\"]\nunit = \"rad/s\"\noptional = true\n",
     ),
 ];
 
@@ -34,6 +36,17 @@ pub(super) struct Layout {
     time: Time,
     acceleration: Option<Vector>,
     angular_velocity: Option<Vector>,
+}
+
+impl Layout {
+    fn is_header(&self, line: &str) -> bool {
+        match &self.header {
+            Some(header) => line
+                .trim_start_matches(['\u{feff}', '"'])
+                .starts_with(header.as_str()),
+            None => !line.is_empty(),
+        }
+    }
 }
 
 #[derive(Debug, Deserialize)]
@@ -75,6 +88,9 @@ struct Vector {
     unit: String,
     #[serde(default = "one")]
     sign: f64,
+    /// Its columns may be missing.
+    #[serde(default)]
+    optional: bool,
 }
 
 fn one() -> f64 {
@@ -107,6 +123,25 @@ pub(super) fn find(name: &str) -> Result<Layout, ImportError> {
         .map_err(|error| problem(format!("is no layout: {}", error.to_string().trim_end())))
 }
 
+/// The built-in layout that fits the files: its header is there, with the columns that it needs.
+pub(super) fn fitting(files: &Files) -> Option<(Layout, &str)> {
+    let built_in = BUILT_IN
+        .iter()
+        .filter_map(|(_, text)| toml::from_str::<Layout>(text).ok());
+    let mut found = built_in.filter_map(|layout| {
+        let fits = |line: &str| {
+            let needed = [&layout.acceleration, &layout.angular_velocity];
+            let mut needed = needed.into_iter().flatten().filter(|v| !v.optional);
+            layout.is_header(line) && needed.all(|v| v.columns.iter().all(|c| line.contains(c)))
+        };
+        let (_, text) = files
+            .texts()
+            .find(|(_, text)| text.lines().take(HEADER_LINES).any(fits))?;
+        Some((layout, text))
+    });
+    found.next()
+}
+
 fn factor(vector: &Vector, units: &[(&str, f64)], name: &str) -> Result<f64, ImportError> {
     match units.iter().find(|(unit, _)| *unit == vector.unit) {
         Some((_, factor)) => Ok(factor * vector.sign),
@@ -126,23 +161,18 @@ fn factor(vector: &Vector, units: &[(&str, f64)], name: &str) -> Result<f64, Imp
 }
 
 pub(super) fn read(layout: &Layout, name: &str, text: &str) -> Result<Log, ImportError> {
-    let mut table = Table::parse(name, text, |line| match &layout.header {
-        Some(header) => line
-            .trim_start_matches(['\u{feff}', '"'])
-            .starts_with(header.as_str()),
-        None => !line.is_empty(),
-    })?;
+    let mut table = Table::parse(name, text, |line| layout.is_header(line))?;
     let mut notes = Vec::new();
+    table.take_units();
     table.drop_cut_row(name, &mut notes);
     let time = table.find_all([layout.time.column.as_str()])?[0];
-    let columns = |vector: &Option<Vector>, units: &[(&str, f64)]| match vector {
-        Some(vector) => {
-            let found = table.find_all(
-                [&vector.columns[0], &vector.columns[1], &vector.columns[2]].map(String::as_str),
-            )?;
-            Ok::<_, ImportError>(Some((found, factor(vector, units, name)?)))
-        }
-        None => Ok(None),
+    let columns = |vector: &Option<Vector>, units: &[(&str, f64)]| {
+        let there = |v: &&Vector| !v.optional || v.columns.iter().any(|c| table.find(c).is_some());
+        let Some(vector) = vector.as_ref().filter(there) else {
+            return Ok(None);
+        };
+        let found = table.find_all(vector.columns.each_ref().map(String::as_str))?;
+        Ok::<_, ImportError>(Some((found, factor(vector, units, name)?)))
     };
     let force = columns(
         &layout.acceleration,
@@ -157,44 +187,62 @@ pub(super) fn read(layout: &Layout, name: &str, text: &str) -> Result<Log, Impor
             table.problem("the layout names neither acceleration nor angular_velocity".to_owned())
         );
     }
-    let start = imu::nanoseconds(layout.time.start_s)
-        .ok_or_else(|| table.problem("the layout's start_s is no time since 1970".to_owned()))?;
-    let mut samples = Vec::with_capacity(table.len());
-    for row in 0..table.len() {
-        let t_ns = match table.text(row, time).parse::<i64>() {
-            // Whole numbers keep all their digits.
-            Ok(whole) => whole.checked_mul(layout.time.unit.ns()),
-            Err(_) => {
-                imu::nanoseconds(table.number(row, time)? * (layout.time.unit.ns() as f64 / 1e9))
+    let times_ns = times_ns(&table, time, &layout.time)?;
+    let mut track = |columns: Option<([usize; 3], f64)>, what: &str| {
+        let mut track = Track::new();
+        let Some((columns, factor)) = columns else {
+            return Ok::<_, ImportError>(track);
+        };
+        for (row, t_ns) in times_ns.iter().enumerate() {
+            let values = table.vector(row, columns)?;
+            // Others may have a row of their own.
+            if !values.iter().all(|x| x.is_nan()) {
+                track.push((*t_ns, values.map(|x| x * factor)));
             }
-        };
-        let Some(t_ns) = t_ns
-            .and_then(|t_ns| t_ns.checked_add(start))
-            .filter(|t_ns| *t_ns >= 0)
-        else {
-            let found = table.text(row, time);
-            return Err(table.problem(format!(
-                "has the time {found:?} in row {}; expected a time from 0 on",
-                row + 1
-            )));
-        };
-        let vector = |columns: Option<([usize; 3], f64)>| match columns {
-            Some((columns, factor)) => Ok::<_, ImportError>(Some(
-                table.vector(row, columns)?.map(|value| value * factor),
-            )),
-            None => Ok(None),
-        };
-        samples.push(Sample {
-            t_ns,
-            force: vector(force)?,
-            rate: vector(rate)?,
-            orientation: None,
-        });
-    }
+        }
+        // The sensors of one table may come late, not before each other.
+        track.sort_by_key(|row| row.0);
+        if let Some(new) = imu::without_repeats(&track) {
+            notes.push(format!(
+                "{} of {} rows repeat the {what} of the one before: they hold no sample of it and are left out",
+                track.len() - new.len(),
+                track.len()
+            ));
+            track = new;
+        }
+        Ok(track)
+    };
+    let (force, rate) = (
+        track(force, "acceleration")?,
+        track(rate, "angular velocity")?,
+    );
     let device = layout.device.as_deref().unwrap_or(name);
-    Ok(Log {
-        name: imu::device_name(device),
-        samples,
-        notes,
-    })
+    Ok(Log::join(imu::device_name(device), force, rate, notes))
+}
+
+/// The time of every row, ns: a number in the layout's unit, or a date and a clock.
+fn times_ns(table: &Table, column: usize, time: &Time) -> Result<Vec<i64>, ImportError> {
+    let start = imu::nanoseconds(time.start_s)
+        .ok_or_else(|| table.problem("the layout's start_s is no time since 1970".to_owned()))?;
+    let mut dates = Dates::default();
+    let read = |row| {
+        let cell = table.text(row, column);
+        let t_ns = if cell.contains(':') {
+            dates.read(cell)
+        } else if let Ok(whole) = cell.parse::<i64>() {
+            // Whole numbers keep all their digits.
+            whole.checked_mul(time.unit.ns())
+        } else {
+            imu::nanoseconds(table.number(row, column)? * (time.unit.ns() as f64 / 1e9))
+        };
+        t_ns.and_then(|t_ns| t_ns.checked_add(start))
+            .filter(|t_ns| *t_ns >= 0)
+            .ok_or_else(|| {
+                table.problem(format!(
+                    "has the time {cell:?} in row {}; expected a time from 0 on, or a date and a clock",
+                    row + 1
+                ))
+            })
+    };
+    (0..table.len()).map(read).collect()
 }

@@ -3,11 +3,13 @@
 //! [`ingest`] finds out what each file is. Inertial logs become `sensor_msgs/msg/Imu` in the convention of REP-145, WAV files
 //! `foxglove.RawAudio`, several devices in one recording, in the order of time.
 
+mod date;
 mod imu;
 pub mod layout;
 pub mod npz;
 mod phyphox;
 mod sensor_logger;
+mod shimmer;
 mod table;
 mod wav;
 mod xsens;
@@ -89,6 +91,12 @@ impl Files {
         self.texts().find(|(name, _)| name.ends_with(end))
     }
 
+    /// The first text with such a header.
+    fn with_header(&self, is_header: fn(&str) -> bool) -> Option<(&str, &str)> {
+        self.texts()
+            .find(|(_, text)| text.lines().take(HEADER_LINES).any(is_header))
+    }
+
     /// The file of a name, in whatever folder.
     fn named(&self, file: &str) -> Option<(&str, &str)> {
         self.texts()
@@ -124,6 +132,14 @@ pub fn ingest(
             notes: vec!["the archive's axes were turned: (x, y, z) became (x, -z, y); its pitch is yaw here".to_owned()],
             losses: Vec::new(),
         });
+    }
+    for (k, path) in paths.iter().enumerate() {
+        if paths[..k].contains(path) {
+            return Err(ImportError::Content {
+                name: path.display().to_string(),
+                problem: "is given twice; expected each log once".to_owned(),
+            });
+        }
     }
     let layout = options.layout.map(layout::find).transpose()?;
     let (mut logs, mut sounds) = (Vec::new(), Vec::new());
@@ -244,54 +260,74 @@ fn write(
     Ok(topics)
 }
 
+/// A kind of log, known by its header.
+struct Format {
+    name: &'static str,
+    is_header: fn(&str) -> bool,
+    read: fn(&Files) -> Result<imu::Log, ImportError>,
+}
+
+/// The kinds of log that are known without a layout; a file that fits two is of the first.
+const FORMATS: &[Format] = &[
+    Format {
+        name: "Sensor Logger",
+        is_header: sensor_logger::is_header,
+        read: sensor_logger::read,
+    },
+    Format {
+        name: "phyphox",
+        is_header: phyphox::is_header,
+        read: phyphox::read,
+    },
+    Format {
+        name: "Movella DOT / Xsens",
+        is_header: xsens::is_header,
+        read: xsens::read,
+    },
+    Format {
+        name: "Shimmer",
+        is_header: shimmer::is_header,
+        read: shimmer::read,
+    },
+];
+
+/// A header stands among so many first lines.
+const HEADER_LINES: usize = 50;
+
 fn read(files: &Files, layout: Option<&layout::Layout>) -> Result<imu::Log, ImportError> {
-    let has = |is_header: fn(&str) -> bool| {
-        files
-            .texts()
-            .any(|(_, text)| text.lines().take(50).any(is_header))
-    };
-    let one = || files.texts().next().unwrap_or(("", ""));
     if let Some(layout) = layout {
-        let (_, text) = one();
+        let (_, text) = files.texts().next().unwrap_or(("", ""));
         return layout::read(layout, &files.name, text);
     }
-    if has(sensor_logger::is_header) {
-        sensor_logger::read(files)
-    } else if has(phyphox::is_header) {
-        phyphox::read(files)
-    } else if has(xsens::is_header) {
-        let found = files
-            .texts()
-            .find(|(_, text)| text.lines().take(50).any(xsens::is_header));
-        xsens::read(&files.name, found.unwrap_or(one()).1)
-    } else {
-        let heads: Vec<String> = files
-            .texts()
-            .take(8)
-            .map(|(_, text)| {
-                format!(
-                    "{:?}",
-                    text.lines()
-                        .next()
-                        .unwrap_or_default()
-                        .chars()
-                        .take(120)
-                        .collect::<String>()
-                )
-            })
-            .collect();
-        Err(ImportError::Content {
-            name: files.name.clone(),
-            problem: format!(
-                "is no log of phyphox, Sensor Logger or Movella DOT / Xsens, and no layout is given; found {}",
-                if heads.is_empty() {
-                    "no CSV".to_owned()
-                } else {
-                    heads.join(", ")
-                }
-            ),
-        })
+    if let Some(format) = FORMATS
+        .iter()
+        .find(|f| files.with_header(f.is_header).is_some())
+    {
+        return (format.read)(files);
     }
+    if let Some((layout, text)) = layout::fitting(files) {
+        return layout::read(&layout, &files.name, text);
+    }
+    let head = |(_, text): (&str, &str)| {
+        let line = text.lines().next().unwrap_or_default();
+        format!("{:?}", line.chars().take(120).collect::<String>())
+    };
+    let heads: Vec<String> = files.texts().take(8).map(head).collect();
+    let found = if heads.is_empty() {
+        "no CSV".to_owned()
+    } else {
+        heads.join(", ")
+    };
+    let layouts = layout::BUILT_IN.iter().map(|(name, _)| *name);
+    let known: Vec<&str> = FORMATS.iter().map(|f| f.name).chain(layouts).collect();
+    let problem = format!(
+        "is no log of {}, and no layout is given; found {found}",
+        known.join(", ")
+    );
+    Err(ImportError::Content {
+        name: files.name.clone(),
+        problem,
+    })
 }
 
 /// Reads the texts of a file, folder or zip.
@@ -316,7 +352,7 @@ fn open(path: &Path) -> Result<Files, ImportError> {
                 "holds more than {MAX_TEXT_BYTES} bytes of text, the limit"
             ))
         })?;
-        Ok(String::from_utf8_lossy(&bytes).into_owned())
+        Ok(decoded(bytes))
     };
     let mut texts = Vec::new();
     if path.is_dir() {
@@ -367,6 +403,20 @@ fn open(path: &Path) -> Result<Files, ImportError> {
     }
     texts.push((name.clone(), read));
     Ok(Files { name, texts })
+}
+
+/// UTF-8; UTF-16 by its byte order mark, as spreadsheets write it; or else Latin-1.
+fn decoded(bytes: Vec<u8>) -> String {
+    let utf_16 = |unit: fn([u8; 2]) -> u16| {
+        let units: Vec<u16> = bytes[2..].as_chunks().0.iter().map(|b| unit(*b)).collect();
+        String::from_utf16_lossy(&units)
+    };
+    match bytes[..] {
+        [0xff, 0xfe, ..] => utf_16(u16::from_le_bytes),
+        [0xfe, 0xff, ..] => utf_16(u16::from_be_bytes),
+        _ => String::from_utf8(bytes)
+            .unwrap_or_else(|error| error.as_bytes().iter().map(|b| char::from(*b)).collect()),
+    }
 }
 
 fn is_text(name: &str) -> bool {

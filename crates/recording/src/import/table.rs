@@ -3,7 +3,7 @@
 use super::ImportError;
 
 /// How programs write a value that is missing.
-const NOTHING: [&str; 4] = ["null", "none", "na", "n/a"];
+const NOTHING: [&str; 7] = ["null", "none", "na", "n/a", "∞", "+∞", "-∞"];
 
 /// A table of text cells.
 pub(super) struct Table {
@@ -116,6 +116,18 @@ impl Table {
         self.rows.pop();
     }
 
+    /// Takes out the row under the header where that tells units: it has no number in it.
+    pub fn take_units(&mut self) -> Option<csv::StringRecord> {
+        let first = self.rows.first()?;
+        let a_number = |cell: &str| cell.replace(',', ".").parse::<f64>().is_ok();
+        let told = first.iter().any(|cell| !cell.is_empty()) && !first.iter().any(a_number);
+        // A row of missing values is none of units.
+        let missing = |cell: &str| {
+            cell.is_empty() || NOTHING.iter().any(|word| cell.eq_ignore_ascii_case(word))
+        };
+        (told && !first.iter().all(missing)).then(|| self.rows.remove(0))
+    }
+
     /// The number of rows.
     pub fn len(&self) -> usize {
         self.rows.len()
@@ -171,7 +183,8 @@ impl Table {
 
     /// A cell's number; one that is empty, or says that there is none, is NaN.
     pub fn number(&self, row: usize, column: usize) -> Result<f64, ImportError> {
-        let cell = self.text(row, column);
+        // Some programs write the minus of typography.
+        let cell = &self.text(row, column).replace('\u{2212}', "-");
         if cell.is_empty() || NOTHING.iter().any(|word| cell.eq_ignore_ascii_case(word)) {
             return Ok(f64::NAN);
         }

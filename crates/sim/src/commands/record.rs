@@ -128,11 +128,7 @@ fn record(args: &Args) -> Result<()> {
         .unwrap_or_else(|| file_of(&scene.name, scene.seed));
     apart([path.as_path()], [Path::new(&args.scene)]).map_err(anyhow::Error::msg)?;
     let options = WriterOptions::beside();
-    let writer = if to_stdout {
-        RecordingWriter::to_stream(std::io::stdout(), &options)?
-    } else {
-        RecordingWriter::create(&path, &options)?
-    };
+    let writer = RecordingWriter::to(&path, &options)?;
 
     let began = Instant::now();
     let model = Model::new(&scene);

@@ -1,0 +1,90 @@
+//! Times that a log writes as a date and a clock, or as a clock alone.
+
+use std::str::FromStr as _;
+
+use prost_types::Timestamp;
+
+const DAY_NS: i64 = 86_400_000_000_000;
+
+/// Reads the times of a column, row by row.
+#[derive(Debug, Default)]
+pub(super) struct Dates {
+    /// Midnights passed by a clock that tells no date.
+    days: i64,
+    last_ns: i64,
+}
+
+impl Dates {
+    /// Nanoseconds since 1970 (UTC where no zone is given) of `2018-10-03 17:23:55.464`, RFC 3339 or the same with slashes; of a clock alone,
+    /// `17:23:55.464` or `17:23:55:464`, since its first midnight. `None` for anything else, and for times before 1970.
+    pub fn read(&mut self, cell: &str) -> Option<i64> {
+        let cell = cell.replace('/', "-").replace(',', ".");
+        if cell.find(':')? > 2 {
+            return nanoseconds(&cell);
+        }
+        // The last colon of four parts stands for the point.
+        let clock = match cell.rsplit_once(':') {
+            Some((whole, part)) if whole.matches(':').count() == 2 => format!("{whole}.{part}"),
+            _ => cell,
+        };
+        let padding = if clock.find(':')? == 1 { "0" } else { "" };
+        let ns = nanoseconds(&format!("1970-01-01 {padding}{clock}"))?;
+        // Half a day back is no sample that came late.
+        if self.last_ns - ns > DAY_NS / 2 {
+            self.days += 1;
+        }
+        self.last_ns = ns;
+        self.days.checked_mul(DAY_NS)?.checked_add(ns)
+    }
+}
+
+fn nanoseconds(text: &str) -> Option<i64> {
+    let time = Timestamp::from_str(text).ok()?;
+    let ns = time
+        .seconds
+        .checked_mul(1_000_000_000)?
+        .checked_add(i64::from(time.nanos))?;
+    (ns >= 0).then_some(ns)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn dates_and_clocks() {
+        // 17,807 days after 1970-01-01, as `date -d @1538587435 -u` says.
+        let expected = 1_538_587_435_464_000_000;
+        for text in [
+            "2018-10-03 17:23:55.4640",
+            "2018-10-03T17:23:55.464Z",
+            "2018/10/03 17:23:55.464",
+            "2018-10-03 17:23:55,464",
+            "2018-10-03T19:23:55.464+02:00",
+        ] {
+            assert_eq!(Dates::default().read(text), Some(expected), "{text}");
+        }
+        let mut clock = Dates::default();
+        let hour = 3_600_000_000_000;
+        for (text, ns) in [
+            ("9:00:00.5", 9 * hour + 500_000_000),
+            ("23:00:00:500", 23 * hour + 500_000_000),
+            ("22:59:59.9", 23 * hour - 100_000_000),
+            ("00:00:00.25", 24 * hour + 250_000_000),
+            ("01:00:00", 25 * hour),
+        ] {
+            assert_eq!(clock.read(text), Some(ns), "{text}");
+        }
+        for text in [
+            "",
+            "12",
+            "1.5",
+            "x:y:z",
+            "25:00:00",
+            "1969-12-31 23:59:59",
+            "2018-13-03 00:00:00",
+        ] {
+            assert_eq!(Dates::default().read(text), None, "{text}");
+        }
+    }
+}
