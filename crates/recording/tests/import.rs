@@ -610,6 +610,10 @@ fn what_is_missing_or_odd_is_named() {
         ),
         "c.csv: has an empty SampleTimeFine in row 1; expected a count below 2^32"
     );
+    // A stray quote takes the lines after it into the header's last name.
+    let quoted = format!("SampleTimeFine,\"Acc_X\n{}", "1,2\n".repeat(99));
+    let said = error("q.csv", &quoted, None);
+    assert!(said.lines().count() == 1 && said.len() < 200, "{said}");
     assert_eq!(error("d.csv", "", None), "d.csv: is empty; expected a log");
     let twice = vec![folder.path().join("d.csv"); 2];
     let twice = ingest(folder.path(), &twice, None).err().expect("refused");

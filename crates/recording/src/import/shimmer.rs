@@ -100,7 +100,7 @@ pub(super) fn read(files: &Files) -> Result<Log, ImportError> {
     if force.is_empty() && rate.is_empty() {
         return Err(table.problem(format!(
             "has neither {device}_Accel_LN_X_CAL, {device}_Accel_WR_X_CAL nor {device}_Gyro_X_CAL; found {}",
-            table.columns.join(", ")
+            table.listed()
         )));
     }
     Ok(Log::join(imu::device_name(&files.name), force, rate, notes))

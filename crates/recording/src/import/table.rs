@@ -152,10 +152,22 @@ impl Table {
                 "lacks the column{} {}; found {}",
                 if missing.len() == 1 { "" } else { "s" },
                 missing.join(", "),
-                self.columns.join(", ")
+                self.listed()
             )));
         }
         Ok(names.map(|name| self.find(name).unwrap_or(0)))
+    }
+
+    /// The columns' names for a message: the first few, each cut to what one line takes.
+    pub fn listed(&self) -> String {
+        const MOST: usize = 30;
+        let one_line = |c: char| if c.is_control() { ' ' } else { c };
+        let short = |name: &String| name.chars().take(60).map(one_line).collect::<String>();
+        let mut names: Vec<String> = self.columns.iter().take(MOST).map(short).collect();
+        if self.columns.len() > MOST {
+            names.push(format!("… ({} in all)", self.columns.len()));
+        }
+        names.join(", ")
     }
 
     /// An error about this table.

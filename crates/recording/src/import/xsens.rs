@@ -47,7 +47,7 @@ pub(super) fn read(files: &Files) -> Result<Log, ImportError> {
     if force.is_none() && free.is_none() && rate.is_none() {
         return Err(table.problem(format!(
             "has neither Acc_X, FreeAcc_X nor Gyr_X; found {}",
-            table.columns.join(", ")
+            table.listed()
         )));
     }
     let radians = text.trim_start().starts_with("//");
