@@ -7,6 +7,7 @@
 
 pub mod cdr;
 pub mod finding;
+mod foreign;
 pub mod import;
 pub mod load;
 pub mod read;

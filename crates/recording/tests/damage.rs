@@ -633,6 +633,23 @@ fn what_is_no_recording_is_refused_in_a_sentence() {
         error(b"t,x,y\n1,2,3\n"),
         "standard input: is not an MCAP recording (it begins with \"t,x,y\\n1,\"); `analyze ingest` turns logs of other formats into one"
     );
+    for (begin, what) in [
+        (
+            &b"#ROSBAG V2.0\n"[..],
+            "but a ROS 1 bag; `mcap convert` makes",
+        ),
+        (b"SQLite format 3\0", "but a ROS 2 bag in SQLite"),
+        (
+            b"\x1f\x8b\x08\0\0\0\0\0\0",
+            "but packed with gzip; unpack it first",
+        ),
+    ] {
+        let said = error(begin);
+        assert!(
+            said.contains(&format!("is not an MCAP recording {what}")),
+            "{said}"
+        );
+    }
     let error = Recording::open(std::path::Path::new("no/such.mcap"), &options())
         .expect_err("refused")
         .to_string();
@@ -644,6 +661,19 @@ fn what_is_no_recording_is_refused_in_a_sentence() {
         .expect_err("refused")
         .to_string();
     assert_eq!(error, ".: cannot be read: it is a folder");
+    // As ROS 2 leaves a bag.
+    let bag = tempfile::tempdir().expect("a folder");
+    for name in ["bag_0.mcap", "bag_1.mcap", "metadata.yaml"] {
+        std::fs::write(bag.path().join(name), "").expect("writes");
+    }
+    let error = Recording::open(bag.path(), &options()).expect_err("refused");
+    let inside = |name| bag.path().join(name).display().to_string();
+    let expected = format!(
+        "give what is in it: {} {}",
+        inside("bag_0.mcap"),
+        inside("bag_1.mcap")
+    );
+    assert!(error.to_string().ends_with(&expected), "{error}");
 }
 
 /// A sound file but for its summary, which holds the records given.

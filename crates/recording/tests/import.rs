@@ -535,6 +535,64 @@ fn times_may_be_dates_or_clocks_and_text_of_another_encoding() {
 }
 
 #[test]
+fn phone_apps_and_sensors_by_their_columns() {
+    let folder = folder();
+    let read = |paths: &[PathBuf]| ingest(folder.path(), paths, None).expect("ingests");
+    // Apple's sign; the time of day of a zone.
+    for rate in ["gyroRotation", "motionRotationRate"] {
+        let text = format!(
+            "loggingTime(txt),loggingSample(N),accelerometerAccelerationX(G),accelerometerAccelerationY(G),accelerometerAccelerationZ(G),\
+             {rate}X(rad/s),{rate}Y(rad/s),{rate}Z(rad/s)\n2018-10-03 19:23:55.464 +0200,1,0,0,-1,0.5,0,0\n"
+        );
+        let got = read(&[file(folder.path(), "watch.csv", &text)]);
+        assert_eq!(got.times("/imu/watch"), [1_538_587_435_464_000_000]);
+        assert_eq!(got.values("/imu/watch.linear_acceleration.z"), [9.80665]);
+        assert_eq!(got.values("/imu/watch.angular_velocity.x"), [0.5]);
+    }
+    let text = b"LIGHT (lux);ACCELEROMETER X (m/s\xb2);ACCELEROMETER Y (m/s\xb2);ACCELEROMETER Z (m/s\xb2);Time since start in ms ;YYYY-MO-DD HH-MI-SS_SSS\n\
+        3;0.5;0;9.8;20;2018-10-03 17:23:55:464\n";
+    let path = folder.path().join("phone.csv");
+    fs::write(&path, text).expect("writes");
+    let got = read(&[path]);
+    assert_eq!(got.times("/imu/phone"), [20_000_000]);
+    assert_eq!(got.values("/imu/phone.linear_acceleration.x"), [0.5]);
+    // Two tables of one device; those of two are refused.
+    let table = |unit: &str, x: f64| {
+        format!(
+            "epoc (ms),timestamp (+0100),elapsed (s),x-axis ({unit}),y-axis ({unit}),z-axis ({unit})\n1538587435464,2018-10-03T18:23:55.464,0,{x},0,0\n"
+        )
+    };
+    let [force, rate] = [
+        ("Accelerometer.csv", table("g", 2.0)),
+        ("Gyroscope.csv", table("deg/s", 90.0)),
+    ];
+    let device = zipped(folder.path(), "left.zip", &[force.clone(), rate.clone()]);
+    let got = read(&[device]);
+    assert_eq!(got.times("/imu/left"), [1_538_587_435_464_000_000]);
+    assert_eq!(
+        got.values("/imu/left.linear_acceleration.x"),
+        [2.0 * 9.80665]
+    );
+    assert_eq!(
+        got.values("/imu/left.angular_velocity.x"),
+        [std::f64::consts::FRAC_PI_2]
+    );
+    let two = zipped(
+        folder.path(),
+        "two.zip",
+        &[force.clone(), rate, ("Right.csv", force.1)],
+    );
+    let refused = ingest(folder.path(), &[two], None)
+        .err()
+        .expect("refused")
+        .to_string();
+    assert!(
+        refused.contains("two files with x-axis (g), Accelerometer.csv and Right.csv"),
+        "{refused}"
+    );
+}
+
+#[test]
 fn shimmer_units_clocks_and_the_accelerometer_that_is_not_at_its_end() {
     let folder = folder();
     let text = |low_noise: f64| {
@@ -588,7 +646,7 @@ fn what_is_missing_or_odd_is_named() {
     };
     assert_eq!(
         error("a.csv", "foo,bar\n1,2\n", None),
-        "a.csv: is no log of Sensor Logger, phyphox, Movella DOT / Xsens, Shimmer, x-io, physics-toolbox, and no layout is given; found \"foo,bar\""
+        "a.csv: is no log of Sensor Logger, phyphox, Movella DOT / Xsens, Shimmer, MetaBase, x-io, physics-toolbox, sensorlog, sensorlog-motion, androsensor, and no layout is given; found \"foo,bar\""
     );
     assert_eq!(
         error("b.csv", "Time (s),gyro\n1,2\n", Some("x-io")),
@@ -610,6 +668,24 @@ fn what_is_missing_or_odd_is_named() {
         ),
         "c.csv: has an empty SampleTimeFine in row 1; expected a count below 2^32"
     );
+    // What people take for a log.
+    assert_eq!(
+        error("run.bag", "#ROSBAG V2.0\n", None),
+        "run.bag: is a ROS 1 bag; `mcap convert` makes a recording of it"
+    );
+    let book = zipped(
+        folder.path(),
+        "book.xlsx",
+        &[("xl/workbook.xml", String::new())],
+    );
+    let book = ingest(folder.path(), &[book], None)
+        .err()
+        .expect("refused")
+        .to_string();
+    assert!(
+        book.ends_with("book.xlsx: is a table of Excel; export CSV instead"),
+        "{book}"
+    );
     // A stray quote takes the lines after it into the header's last name.
     let quoted = format!("SampleTimeFine,\"Acc_X\n{}", "1,2\n".repeat(99));
     let said = error("q.csv", &quoted, None);
@@ -624,7 +700,7 @@ fn what_is_missing_or_odd_is_named() {
     );
     assert_eq!(
         error("e.csv", "a\n1\n", Some("nothing")),
-        "nothing: is neither a file nor a built-in layout; built in are x-io, physics-toolbox"
+        "nothing: is neither a file nor a built-in layout; built in are x-io, physics-toolbox, sensorlog, sensorlog-motion, androsensor"
     );
     assert_eq!(
         error(

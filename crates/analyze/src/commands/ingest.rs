@@ -24,14 +24,14 @@ A file's name says whose device it was: carrier, bearer, walker or person in it 
 #[derive(Args)]
 #[command(after_help = EXAMPLES)]
 pub(super) struct IngestArgs {
-    /// Logs: .npz of the archive; .zip, .csv or folders of phone apps and inertial sensors (phyphox, Sensor Logger, Physics Toolbox, Movella DOT,
-    /// Xsens, Shimmer, x-io); .wav of a sound recorder
+    /// Logs: .npz of the archive; .zip, .csv or folders of phone apps and inertial sensors (phyphox, Sensor Logger, SensorLog, Physics
+    /// Toolbox, AndroSensor; Movella DOT, Xsens, Shimmer, MetaBase, x-io); .wav of a sound recorder
     #[arg(required = true, value_name = "FILE")]
     files: Vec<PathBuf>,
     /// The recording to write; `-` is standard output
     #[arg(long, value_name = "FILE.mcap")]
     out: PathBuf,
-    /// How the columns are laid out, where the files do not tell: a TOML file (docs/recording.md), or a built-in name (x-io, physics-toolbox)
+    /// How the columns are laid out, where the files do not tell: a TOML file, or a built-in name (docs/recording.md has both)
     #[arg(long, value_name = "NAME|FILE.toml")]
     layout: Option<String>,
     /// When the sound begins after the first inertial sample; taps that both noticed put it right later

@@ -26,6 +26,25 @@ pub const BUILT_IN: &[(&str, &str)] = &[
          [acceleration]\ncolumns = [\"gFx\", \"gFy\", \"gFz\"]\nunit = \"g\"\n\
          [angular_velocity]\ncolumns = [\"wx\", \"wy\", \"wz\"]\nunit = \"rad/s\"\noptional = true\n",
     ),
+    // Apple's accelerometers read −1 on the axis that points up. Two of the app's columns give angular velocities, one at a time.
+    (
+        "sensorlog",
+        "header = \"loggingTime\"\n[time]\ncolumn = \"loggingTime(txt)\"\nunit = \"s\"\n\
+         [acceleration]\ncolumns = [\"accelerometerAccelerationX(G)\", \"accelerometerAccelerationY(G)\", \"accelerometerAccelerationZ(G)\"]\nunit = \"g\"\nsign = -1\n\
+         [angular_velocity]\ncolumns = [\"gyroRotationX(rad/s)\", \"gyroRotationY(rad/s)\", \"gyroRotationZ(rad/s)\"]\nunit = \"rad/s\"\n",
+    ),
+    (
+        "sensorlog-motion",
+        "header = \"loggingTime\"\n[time]\ncolumn = \"loggingTime(txt)\"\nunit = \"s\"\n\
+         [acceleration]\ncolumns = [\"accelerometerAccelerationX(G)\", \"accelerometerAccelerationY(G)\", \"accelerometerAccelerationZ(G)\"]\nunit = \"g\"\nsign = -1\n\
+         [angular_velocity]\ncolumns = [\"motionRotationRateX(rad/s)\", \"motionRotationRateY(rad/s)\", \"motionRotationRateZ(rad/s)\"]\nunit = \"rad/s\"\noptional = true\n",
+    ),
+    (
+        "androsensor",
+        "[time]\ncolumn = \"Time since start in ms\"\nunit = \"ms\"\n\
+         [acceleration]\ncolumns = [\"ACCELEROMETER X (m/s²)\", \"ACCELEROMETER Y (m/s²)\", \"ACCELEROMETER Z (m/s²)\"]\nunit = \"m/s^2\"\n\
+         [angular_velocity]\ncolumns = [\"GYROSCOPE X (rad/s)\", \"GYROSCOPE Y (rad/s)\", \"GYROSCOPE Z (rad/s)\"]\nunit = \"rad/s\"\noptional = true\n",
+    ),
 ];
 
 #[derive(Debug, Deserialize)]
@@ -132,7 +151,9 @@ pub(super) fn fitting(files: &Files) -> Option<(Layout, &str)> {
         let fits = |line: &str| {
             let needed = [&layout.acceleration, &layout.angular_velocity];
             let mut needed = needed.into_iter().flatten().filter(|v| !v.optional);
-            layout.is_header(line) && needed.all(|v| v.columns.iter().all(|c| line.contains(c)))
+            layout.is_header(line)
+                && line.contains(&layout.time.column)
+                && needed.all(|v| v.columns.iter().all(|c| line.contains(c)))
         };
         let (_, text) = files
             .texts()

@@ -6,6 +6,7 @@
 mod date;
 mod imu;
 pub mod layout;
+mod metabase;
 pub mod npz;
 mod phyphox;
 mod sensor_logger;
@@ -22,6 +23,7 @@ use std::{
 };
 
 use crate::{
+    foreign,
     topics::MessageKind,
     write::{RecordingWriter, WriteError},
 };
@@ -289,6 +291,11 @@ const FORMATS: &[Format] = &[
         is_header: shimmer::is_header,
         read: shimmer::read,
     },
+    Format {
+        name: "MetaBase",
+        is_header: metabase::is_header,
+        read: metabase::read,
+    },
 ];
 
 /// A header stands among so many first lines.
@@ -378,10 +385,13 @@ fn open(path: &Path) -> Result<Files, ImportError> {
         return Ok(Files { name, texts });
     }
     let mut file = fs::File::open(path).map_err(io)?;
-    let mut head = [0; 4];
-    let read = file.read(&mut head).map_err(io)?;
+    let mut head = Vec::new();
+    (&file).take(8).read_to_end(&mut head).map_err(io)?;
     io::Seek::rewind(&mut file).map_err(io)?;
-    if &head[..read] == b"PK\x03\x04" {
+    if let Some(kind) = foreign::kind(&head) {
+        return Err(content(format!("is {kind}")));
+    }
+    if head.starts_with(b"PK\x03\x04") {
         let mut zip = zip::ZipArchive::new(io::BufReader::new(file))
             .map_err(|error| content(format!("is no zip: {error}")))?;
         for position in 0..zip.len() {
@@ -389,6 +399,9 @@ fn open(path: &Path) -> Result<Files, ImportError> {
                 .by_index(position)
                 .map_err(|error| content(format!("cannot be unpacked: {error}")))?;
             let entry_name = entry.name().to_owned();
+            if entry_name == "xl/workbook.xml" {
+                return Err(content(format!("is {}", foreign::EXCEL)));
+            }
             if !is_text(&entry_name) {
                 continue;
             }

@@ -34,6 +34,7 @@ use std::{
     },
 };
 
+use crate::foreign;
 use container::{Container, Damage, Definitions};
 
 pub use container::ends_whole;
@@ -91,13 +92,11 @@ pub enum ReadError {
         name: String,
     },
     /// It is something else.
-    #[error(
-        "{name}: is not an MCAP recording (it begins with {found}); `analyze ingest` turns logs of other formats into one"
-    )]
+    #[error("{name}: is not an MCAP recording {found}")]
     NotMcap {
         /// The file.
         name: String,
-        /// Its first bytes.
+        /// What it is instead, as far as that can be told, and what to do.
         found: String,
     },
 }
@@ -241,7 +240,7 @@ impl Recording {
         if kind.is_dir() {
             return Err(io(std::io::Error::new(
                 std::io::ErrorKind::IsADirectory,
-                "it is a folder",
+                folder(path),
             )));
         }
         let data = if kind.is_file() && kind.len() > 0 {
@@ -438,11 +437,40 @@ impl Recording {
     }
 }
 
+/// That a folder is one, and which recordings are in it: a bag of ROS 2 is a folder of them.
+fn folder(path: &Path) -> String {
+    let entries = path.read_dir().into_iter().flatten().flatten();
+    let mut inside: Vec<String> = entries
+        .map(|entry| entry.path())
+        .filter(|path| path.extension().is_some_and(|end| end == "mcap"))
+        .map(|path| path.display().to_string())
+        .collect();
+    inside.sort();
+    let more = inside.len().saturating_sub(3);
+    inside.truncate(3);
+    match inside.is_empty() {
+        true => "it is a folder".to_owned(),
+        false if more > 0 => format!(
+            "it is a folder; give what is in it: {} and {more} more",
+            inside.join(" ")
+        ),
+        false => format!("it is a folder; give what is in it: {}", inside.join(" ")),
+    }
+}
+
 fn not_mcap(name: &str, data: &[u8]) -> ReadError {
-    let begin = data[..data.len().min(container::MAGIC.len())].escape_ascii();
+    let found = match foreign::kind(data) {
+        Some(kind) => format!("but {kind}"),
+        None => {
+            let begin = data[..data.len().min(container::MAGIC.len())].escape_ascii();
+            format!(
+                "(it begins with \"{begin}\"); `analyze ingest` turns logs of other formats into one"
+            )
+        }
+    };
     ReadError::NotMcap {
         name: name.to_owned(),
-        found: format!("\"{begin}\""),
+        found,
     }
 }
 

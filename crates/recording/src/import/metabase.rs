@@ -1,0 +1,65 @@
+//! MetaBase exports of MbientLab sensors: a CSV for the accelerometer (`x-axis (g)`) and one for the gyroscope (`x-axis (deg/s)`), each with its time as
+//! `epoc (ms)` since 1970. Both of one device come as a folder or zip; of more than one, nothing tells which belong together.
+
+use super::{
+    Files, ImportError,
+    imu::{self, Log, STANDARD_GRAVITY, Track},
+    table::Table,
+};
+
+const FORCE: &str = "x-axis (g)";
+const RATE: &str = "x-axis (deg/s)";
+
+/// Whether a line is the header of an export.
+pub(super) fn is_header(line: &str) -> bool {
+    line.contains("epoc") && (line.contains(FORCE) || line.contains(RATE))
+}
+
+pub(super) fn read(files: &Files) -> Result<Log, ImportError> {
+    let mut notes = Vec::new();
+    let mut track = |first: &str, unit: &str, factor: f64| {
+        let head = |text: &str| {
+            text.lines()
+                .next()
+                .is_some_and(|line| is_header(line) && line.contains(first))
+        };
+        let mut found = files.texts().filter(|(_, text)| head(text));
+        let Some((name, text)) = found.next() else {
+            return Ok(Track::new());
+        };
+        if let Some((other, _)) = found.next() {
+            return Err(ImportError::Content {
+                name: files.name.clone(),
+                problem: format!(
+                    "has two files with {first}, {name} and {other}; expected those of one device: give each device a folder of its own"
+                ),
+            });
+        }
+        let mut table = Table::parse(name, text, is_header)?;
+        table.drop_cut_row(&files.name, &mut notes);
+        let epoch = if table.find("epoch (ms)").is_some() {
+            "epoch (ms)"
+        } else {
+            "epoc (ms)"
+        };
+        let time = table.find_all([epoch])?[0];
+        let names = ["x", "y", "z"].map(|axis| format!("{axis}-axis ({unit})"));
+        let axes = table.find_all(names.each_ref().map(String::as_str))?;
+        let mut track = Track::new();
+        for row in 0..table.len() {
+            let t_ms = table.number(row, time)?;
+            let Some(t_ns) = imu::nanoseconds(t_ms * 1e-3) else {
+                return Err(table.problem(format!(
+                    "has the time {:?} in row {}; expected milliseconds since 1970",
+                    table.text(row, time),
+                    row + 1
+                )));
+            };
+            track.push((t_ns, table.vector(row, axes)?.map(|x| x * factor)));
+        }
+        Ok(track)
+    };
+    let force = track(FORCE, "g", STANDARD_GRAVITY)?;
+    let rate = track(RATE, "deg/s", 1f64.to_radians())?;
+    Ok(Log::join(imu::device_name(&files.name), force, rate, notes))
+}
