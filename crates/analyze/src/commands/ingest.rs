@@ -13,7 +13,8 @@ use super::Done;
 const EXAMPLES: &str = "\
 Examples:
   analyze ingest logs.npz --out run.mcap                     a log of the paper's archive
-  analyze ingest phone.zip --out walk.mcap                   phyphox or Sensor Logger; other apps and sensors: their .csv
+  analyze ingest phone.zip --out walk.mcap                   phyphox or Sensor Logger
+  analyze ingest belt.csv --out walk.mcap                    another app or sensor
   analyze ingest rath.zip carrier_1.csv carrier_2.csv --out walk.mcap  several devices, one recording
   analyze ingest rath.zip carrier_1.zip carrier_2.zip drum.wav --out walk.mcap  with sound
   analyze ingest sensor.csv --layout columns.toml --out walk.mcap
