@@ -1,0 +1,365 @@
+//! What is gathered of every signal while the recording streams by.
+
+use std::collections::{BTreeSet, HashMap};
+
+use recording::read::{Batch, ReadError, Recording};
+use recording::signal::unit_of;
+
+use super::analysis::Topic;
+use super::request::Request;
+use crate::arrivals::{Arrivals, Axis};
+use crate::envelope::Envelope;
+use crate::quality::Quality;
+use crate::quaternion::Quaternions;
+use crate::roles::{Role, Roles};
+use crate::summary::{Stream, Times, segment};
+
+/// So many times tell a rate.
+const FEW: u64 = 17;
+/// So many values at most are put in the order of their times.
+const MOST_SORTED: u64 = 1 << 24;
+
+/// One signal on the way.
+pub(super) struct Entry {
+    pub path: String,
+    pub unit: &'static str,
+    pub channel: usize,
+    pub listed: bool,
+    /// Whether a spectrum is made of it.
+    pub lines: bool,
+    pub role: Option<Role>,
+    pub stream: Stream,
+    /// Times of its own where not every message has it.
+    pub times: Option<Times>,
+    /// Kept values, where it plays a role, and of which messages of the topic they are.
+    pub kept: Vec<(usize, f64)>,
+    /// Its outline, where it is to be drawn.
+    pub outline: Option<Envelope>,
+}
+
+impl Entry {
+    /// Takes all values anew, in the order of their times.
+    fn take_sorted(&mut self, (times_ns, x): (Vec<i64>, Vec<f64>)) {
+        let mut times = Times::default();
+        times.push(&times_ns);
+        let hz = times.hz_between_gaps().unwrap_or(0.0);
+        let nperseg = match self.lines {
+            true => segment(hz, x.len() as u64),
+            false => 0,
+        };
+        self.stream = Stream::new(hz, nperseg);
+        self.stream.push(&x, false, times.gaps());
+        self.times = Some(times);
+    }
+}
+
+/// What is gathered while batches stream by.
+pub(super) struct Pass<'a> {
+    pub recording: &'a Recording,
+    pub request: &'a Request,
+    pub roles: &'a Roles,
+    pub times: Vec<Times>,
+    /// The first channel of each channel's topic.
+    pub first: Vec<usize>,
+    /// By first channel of a topic: how many messages all its channels have.
+    pub messages: Vec<u64>,
+    /// By first channel of a topic: its messages, where it may feed metrics.
+    pub arrivals: Vec<Arrivals>,
+    /// Where the messages of the batch begin in `arrivals`.
+    pub row: usize,
+    /// By first channel of a topic: when its messages were taken, where it feeds metrics.
+    pub axes: HashMap<usize, Axis>,
+    /// Rough rate of each channel, for the length of the segments (Hz).
+    pub rough_hz: Vec<f64>,
+    pub entries: Vec<Entry>,
+    /// Entry of a column of the stream.
+    pub by_column: Vec<Option<usize>>,
+    /// Entries of the angles of a quaternion, by the path of the quaternion.
+    pub quaternions: Quaternions,
+    pub by_path: HashMap<String, usize>,
+    pub scratch: Vec<i64>,
+}
+
+impl<'a> Pass<'a> {
+    pub(super) fn new(recording: &'a Recording, request: &'a Request, roles: &'a Roles) -> Self {
+        let info = recording.info();
+        let span_s = (info.end_ns.saturating_sub(info.start_ns)) as f64 / 1e9;
+        let rough = |messages: u64| {
+            if span_s > 0.0 {
+                messages.saturating_sub(1) as f64 / span_s
+            } else {
+                0.0
+            }
+        };
+        let mut known = HashMap::new();
+        let mut messages = vec![0; info.channels.len()];
+        let mut first = Vec::with_capacity(info.channels.len());
+        for (k, channel) in info.channels.iter().enumerate() {
+            let topic = *known.entry(&channel.topic).or_insert(k);
+            messages[topic] += channel.messages;
+            first.push(topic);
+        }
+        Pass {
+            first,
+            messages,
+            arrivals: vec![Arrivals::default(); info.channels.len()],
+            row: 0,
+            axes: HashMap::new(),
+            recording,
+            request,
+            roles,
+            times: vec![Times::default(); info.channels.len()],
+            rough_hz: info.channels.iter().map(|c| rough(c.messages)).collect(),
+            entries: Vec::new(),
+            by_column: Vec::new(),
+            quaternions: Quaternions::default(),
+            by_path: HashMap::new(),
+            scratch: Vec::new(),
+        }
+    }
+
+    pub(super) fn take(&mut self, batch: &Batch<'_>) {
+        self.times[batch.channel].push(batch.times_ns);
+        if self.roles.feeds(batch.topic) {
+            let arrivals = &mut self.arrivals[self.first[batch.channel]];
+            self.row = arrivals.len();
+            arrivals.take(batch);
+        }
+        for column in batch.columns {
+            if self.by_column.len() <= column.id {
+                self.by_column.resize(column.id + 1, None);
+            }
+            let entry = match self.by_column[column.id] {
+                Some(entry) => entry,
+                None => {
+                    let unit = unit_of(batch.schema, field(batch.topic, column.path));
+                    let entry = self.entry(batch, column.path, unit);
+                    self.by_column[column.id] = Some(entry);
+                    entry
+                }
+            };
+            self.push(entry, batch, column.rows, column.values, column.finite);
+        }
+        let mut quaternions = std::mem::take(&mut self.quaternions);
+        quaternions.each(batch, |path, rows, values| {
+            if wanted(path, self.request, self.roles) {
+                let entry = match self.by_path.get(path) {
+                    Some(entry) => *entry,
+                    None => {
+                        let entry = self.entry(batch, path, "rad");
+                        self.by_path.insert(path.to_owned(), entry);
+                        entry
+                    }
+                };
+                self.push(entry, batch, rows, values, false);
+            }
+        });
+        self.quaternions = quaternions;
+    }
+
+    fn entry(&mut self, batch: &Batch<'_>, path: &str, unit: &'static str) -> usize {
+        let field = field(batch.topic, path);
+        // The batch's own rate, where it shows one: a topic need not last as long as the file.
+        let times = &self.times[batch.channel];
+        let hz = match times.count() >= FEW {
+            true => times.hz_between_gaps(),
+            false => None,
+        }
+        .unwrap_or(self.rough_hz[batch.channel]);
+        let mut messages = self.messages[self.first[batch.channel]];
+        if let (from, Some(to)) = self.request.window {
+            let window = ((to - from.unwrap_or(0.0)).max(0.0) * hz).ceil();
+            messages = messages.min(window as u64);
+        }
+        let listed = self.request.lists(batch.topic, path);
+        // A stamp's seconds and nanoseconds are a clock, not a signal with lines.
+        let clock = field.contains("stamp.") || field == "time_s";
+        let lines = listed && !clock;
+        let nperseg = if lines { segment(hz, messages) } else { 0 };
+        self.entries.push(Entry {
+            path: path.to_owned(),
+            unit,
+            channel: batch.channel,
+            listed,
+            lines,
+            role: self.roles.of_signal(path),
+            stream: Stream::new(hz, nperseg),
+            times: None,
+            kept: Vec::new(),
+            outline: (self.request.traces && listed && !clock && !field.contains("covariance"))
+                .then(Envelope::default),
+        });
+        self.entries.len() - 1
+    }
+
+    fn push(
+        &mut self,
+        entry: usize,
+        batch: &Batch<'_>,
+        rows: Option<&[u32]>,
+        values: &[f64],
+        finite: bool,
+    ) {
+        let entry = &mut self.entries[entry];
+        let times = match rows {
+            None => batch.times_ns,
+            Some(rows) => {
+                self.scratch.clear();
+                self.scratch
+                    .extend(rows.iter().map(|r| batch.times_ns[*r as usize]));
+                &self.scratch
+            }
+        };
+        if entry.listed {
+            let start_ns = i128::from(self.recording.info().start_ns);
+            match self.request.window {
+                (None, None) => {
+                    if rows.is_some() && entry.times.is_none() {
+                        entry.times = Some(Times::default());
+                    }
+                    // A topic may come on several channels.
+                    if batch.channel != entry.channel && entry.times.is_none() {
+                        entry.times = Some(self.times[entry.channel].clone());
+                    }
+                    let gaps = match &mut entry.times {
+                        Some(own) => {
+                            own.push(times);
+                            own.gaps()
+                        }
+                        None => self.times[batch.channel].gaps(),
+                    };
+                    entry.stream.push(values, finite, gaps);
+                }
+                _ => {
+                    let inside =
+                        |t: i64| (self.request).holds((i128::from(t) - start_ns) as f64 / 1e9);
+                    let (kept, x): (Vec<i64>, Vec<f64>) = (times.iter().zip(values))
+                        .filter(|(t, _)| inside(**t))
+                        .map(|(t, x)| (*t, *x))
+                        .unzip();
+                    let own = entry.times.get_or_insert_default();
+                    own.push(&kept);
+                    entry.stream.push(&x, finite, own.gaps());
+                }
+            }
+        }
+        if let Some(outline) = &mut entry.outline {
+            let start_ns = i128::from(self.recording.info().start_ns);
+            times
+                .iter()
+                .zip(values)
+                .for_each(|(t, x)| outline.push((i128::from(*t) - start_ns) as f64 / 1e9, *x));
+        }
+        if entry.role.is_some() {
+            let row = |k: usize| self.row + rows.map_or(k, |rows| rows[k] as usize);
+            entry
+                .kept
+                .extend(values.iter().enumerate().map(|(k, x)| (row(k), *x)));
+        }
+    }
+
+    pub(super) fn topics(&self) -> Vec<Topic> {
+        let mut topics: Vec<Topic> = (self.recording.info().channels.iter().zip(&self.times))
+            .map(|(c, times)| Topic {
+                name: c.topic.clone(),
+                schema: c.schema.clone(),
+                encoding: c.encoding.clone(),
+                messages: c.messages.max(times.count()),
+                hz: times.hz(),
+            })
+            .collect();
+        topics.sort_by(|a, b| a.name.cmp(&b.name));
+        topics
+    }
+
+    /// The times of a signal's values.
+    pub(super) fn times_of<'b>(&'b self, entry: &'b Entry) -> &'b Times {
+        entry.times.as_ref().unwrap_or(&self.times[entry.channel])
+    }
+
+    /// Reads listed signals again whose values do not come in the order of their times, and takes them in that order. Where these are more than
+    /// memory should hold, a remark says that they have neither jitter nor spectrum.
+    pub(super) fn put_in_order(&mut self) -> Result<Vec<Quality>, ReadError> {
+        let entries = self.entries.iter().enumerate();
+        let tangled: HashMap<String, usize> = entries
+            .filter(|(_, e)| e.listed && self.times_of(e).backward())
+            .map(|(k, e)| (e.path.clone(), k))
+            .collect();
+        let values = |k: &usize| self.times_of(&self.entries[*k]).count();
+        let all: u64 = tangled.values().map(values).sum();
+        if all > MOST_SORTED {
+            let topics: BTreeSet<usize> = (tangled.values())
+                .map(|k| self.first[self.entries[*k].channel])
+                .collect();
+            let told = |k: &usize| {
+                let text = format!(
+                    "messages do not come in the order of their times, and {all} values are more than are sorted ({MOST_SORTED}): their signals have neither jitter nor spectrum; --topic or --signal asks for fewer"
+                );
+                Quality::remark(&self.recording.info().channels[*k].topic, "unsorted", text)
+            };
+            return Ok(topics.iter().map(told).collect());
+        }
+        if tangled.is_empty() {
+            return Ok(Vec::new());
+        }
+        let mut found: Vec<Vec<(i64, f64)>> = vec![Vec::new(); self.entries.len()];
+        let mut quaternions = Quaternions::default();
+        let select = |path: &str| with_angles(path, |path| tangled.contains_key(path));
+        self.recording.stream(&select, &mut |batch| {
+            let mut keep = |path: &str, rows: Option<&[u32]>, values: &[f64]| {
+                if let Some(entry) = tangled.get(path) {
+                    let time = |k: usize| batch.times_ns[rows.map_or(k, |rows| rows[k] as usize)];
+                    found[*entry].extend(values.iter().enumerate().map(|(k, x)| (time(k), *x)));
+                }
+            };
+            for column in batch.columns {
+                keep(column.path, column.rows, column.values);
+            }
+            quaternions.each(batch, keep);
+        })?;
+        let start_ns = i128::from(self.recording.info().start_ns);
+        for (entry, mut values) in self.entries.iter_mut().zip(found) {
+            values.retain(|(t, _)| self.request.holds((i128::from(*t) - start_ns) as f64 / 1e9));
+            values.sort_by_key(|(t, _)| *t);
+            if !values.is_empty() {
+                entry.take_sorted(values.into_iter().unzip());
+            }
+        }
+        Ok(Vec::new())
+    }
+
+    /// The topic of a signal, and its path in the message.
+    pub(super) fn names<'s>(&'s self, entry: &'s Entry) -> (&'s str, &'s str) {
+        let topic = self.recording.info().channels[entry.channel].topic.as_str();
+        (topic, field(topic, &entry.path))
+    }
+}
+
+/// Whether a field has to be decoded: it is listed, plays a role, or is part of a quaternion whose angles are or do.
+pub(super) fn wanted(path: &str, request: &Request, roles: &Roles) -> bool {
+    let wants = |path: &str| request.lists_path(path) || roles.of_signal(path).is_some();
+    let times = |topic: &str| roles.feeds(topic);
+    path.strip_suffix(".time_s").is_some_and(times) || with_angles(path, wants)
+}
+
+/// Whether a field is wanted, or an angle of the quaternion that it is part of.
+fn with_angles(path: &str, wants: impl Fn(&str) -> bool) -> bool {
+    if wants(path) {
+        return true;
+    }
+    let part = path
+        .rsplit_once('.')
+        .filter(|(_, last)| matches!(*last, "x" | "y" | "z" | "w"));
+    part.is_some_and(|(prefix, _)| {
+        crate::quaternion::ANGLES
+            .iter()
+            .any(|angle| wants(&format!("{prefix}.{angle}")))
+    })
+}
+
+/// The path of a signal in its message.
+pub(super) fn field<'a>(topic: &str, path: &'a str) -> &'a str {
+    path.strip_prefix(topic)
+        .unwrap_or(path)
+        .trim_start_matches('.')
+}

@@ -1,0 +1,42 @@
+//! What is asked of a recording.
+
+use crate::field::DeviceClocks;
+use crate::roles::{RolesFile, matches, of_topic};
+
+/// What is asked of a recording.
+#[derive(Clone, Debug, Default)]
+pub struct Request {
+    /// First and last moment of the window (s); what is `None` is decided by the recording.
+    pub window: (Option<f64>, Option<f64>),
+    /// Signals to list, with wildcards; empty means all.
+    pub signals: Vec<String>,
+    /// Topics to list, with wildcards; empty means all.
+    pub topics: Vec<String>,
+    /// Who plays which role, where the user says so.
+    pub roles: Option<RolesFile>,
+    /// Judge estimates by the recorded truth.
+    pub truth: bool,
+    /// What is done about the clocks of sensors.
+    pub clocks: DeviceClocks,
+    /// Keep the outlines of signals for drawing.
+    pub traces: bool,
+}
+
+impl Request {
+    /// Whether a signal of a topic is to be listed.
+    pub fn lists(&self, topic: &str, path: &str) -> bool {
+        (self.topics.is_empty() || self.topics.iter().any(|p| matches(p, topic)))
+            && (self.signals.is_empty() || self.signals.iter().any(|p| matches(p, path)))
+    }
+
+    /// The same where the topic is not known apart from the path.
+    pub(crate) fn lists_path(&self, path: &str) -> bool {
+        (self.topics.is_empty() || self.topics.iter().any(|t| of_topic(t, path)))
+            && (self.signals.is_empty() || self.signals.iter().any(|p| matches(p, path)))
+    }
+
+    /// Whether a moment is in the window that was asked for, s.
+    pub(crate) fn holds(&self, t_s: f64) -> bool {
+        self.window.0.is_none_or(|a| t_s >= a) && self.window.1.is_none_or(|b| t_s <= b)
+    }
+}
