@@ -1,11 +1,13 @@
 //! Errors of estimates where the recording holds the truth (`--truth`).
 
+use std::collections::BTreeMap;
+
+use nalgebra::{UnitQuaternion, Vector3};
 use recording::read::Recording;
 use recording::signal::Signal;
 
-use super::{ACCEL, Columns, Records};
-use nalgebra::{UnitQuaternion, Vector3};
-
+use super::carriers::{self, Carriers};
+use super::columns::{ACCEL, Columns};
 use crate::clock::{Clock, from_signals};
 use crate::filter::{Band, butter, sosfiltfilt};
 use crate::imu::orientation::causal;
@@ -14,12 +16,10 @@ use crate::imu::track::period_s;
 use crate::imu::truth::{Truth, inclination_error_deg, relative_error};
 use crate::imu::unloading::unloadings;
 use crate::imu::{Track, interval, vertical};
+use crate::inputs::{Inputs, Window, interpolate};
 use crate::metrics::{Datum, Metrics, Value, metrics_of};
 use crate::roles::{Role, Roles};
 use crate::steps::agreement;
-
-use super::carriers::{self, Carriers};
-use crate::inputs::{Inputs, Window, interpolate};
 
 /// Where a recording holds the moments of true steps.
 pub const STEP_TOPIC: &str = "/truth/step";
@@ -542,6 +542,9 @@ fn rate(t_s: &[f64]) -> Option<f64> {
     let span_s = t_s.last()? - t_s.first()?;
     (span_s > 0.0).then(|| (t_s.len() - 1) as f64 / span_s)
 }
+
+/// Metadata records by name, as a reader gives them.
+type Records = BTreeMap<String, BTreeMap<String, String>>;
 
 /// The spans that count, s since `start_ns`: metadata record `broad`, key `movement`, a list of [from, to] in nanoseconds.
 fn movement(records: &Records, start_ns: i64) -> Vec<(f64, f64)> {

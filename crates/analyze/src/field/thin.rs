@@ -6,7 +6,7 @@ use recording::Signal;
 use recording::read::{Batch, ReadError, Recording};
 use recording::signal::field_of;
 
-use super::{ACCEL, GYRO, GYRO_MARK, STAMPS};
+use super::columns::{ACCEL, GYRO, GYRO_MARK, STAMPS};
 use crate::roles::{Role, Roles};
 
 /// Bytes that the estimates hold per sample of the rath's sensor, and of a carrier's (measured on 300,000 and 600,000; they hold many columns at once).

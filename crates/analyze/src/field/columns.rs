@@ -1,0 +1,341 @@
+//! What is read of sensors and beats: their columns by topic, and when each value was taken.
+
+use recording::signal::{Signal, field_of, seconds_since};
+
+use super::dates::{Dated, dated, delay_s, ends_s};
+use crate::imu::Track;
+
+/// The six columns of an inertial message.
+pub(crate) const GYRO: [&str; 3] = [
+    "angular_velocity.x",
+    "angular_velocity.y",
+    "angular_velocity.z",
+];
+pub(crate) const ACCEL: [&str; 3] = [
+    "linear_acceleration.x",
+    "linear_acceleration.y",
+    "linear_acceleration.z",
+];
+/// ROS's mark of a field that the sensor does not have.
+pub(super) const GYRO_MARK: &str = "angular_velocity_covariance[0]";
+pub(super) const ACCEL_MARK: &str = "linear_acceleration_covariance[0]";
+
+/// Seconds and nanoseconds of a header's stamp, as ROS 2 and as ROS 1 name them.
+pub(super) const STAMPS: [[&str; 2]; 2] = [
+    ["header.stamp.sec", "header.stamp.nanosec"],
+    ["header.stamp.sec", "header.stamp.nsec"],
+];
+/// Fields of a beat: its number and its own time.
+pub(super) const BEAT: [&str; 2] = ["number", "time_s"];
+/// More samples than this share left out are worth a word.
+const MANY: f64 = 0.01;
+
+/// What is read of an inertial sensor.
+pub(super) struct Sensor {
+    pub track: Track,
+    /// Whether it has a gyroscope, and an accelerometer.
+    pub turns: bool,
+    pub feels: bool,
+    pub remarks: Vec<(&'static str, String)>,
+}
+
+/// Signals by topic.
+pub(super) struct Columns {
+    pub signals: Vec<Signal>,
+    pub start_ns: i64,
+}
+
+impl Columns {
+    pub(super) fn get(&self, topic: &str, field: &str) -> Option<&Signal> {
+        self.signals
+            .iter()
+            .find(|s| field_of(&s.path, topic) == Some(field))
+    }
+
+    pub(super) fn values<const N: usize>(
+        &self,
+        topic: &str,
+        fields: [&str; N],
+    ) -> Option<[&[f64]; N]> {
+        let found: Vec<&[f64]> = fields
+            .iter()
+            .filter_map(|f| Some(&self.get(topic, f)?.values[..]))
+            .collect();
+        found.try_into().ok()
+    }
+
+    /// A sensor's header stamps, seconds and nanoseconds.
+    fn stamps(&self, topic: &str) -> Option<[&[f64]; 2]> {
+        STAMPS.iter().find_map(|names| self.values(topic, *names))
+    }
+
+    /// A topic's stamps (s), on one clock with those of the others that were stamped in the same span of time.
+    fn stamp_s(&self, topic: &str, stamped: &[&str]) -> Option<Vec<f64>> {
+        let ends = |topic: &str| {
+            let [sec, nanosec] = self.stamps(topic)?;
+            // A clock that is not set yet says 0.
+            let set = sec.iter().zip(nanosec).map(|(s, ns)| s + ns / 1e9);
+            ends_s(set.filter(|s| *s != 0.0))
+        };
+        let own = ends(topic)?;
+        let meanwhile = |t: &&&str| ends(t).is_some_and(|(a, b)| a <= own.1 && own.0 <= b);
+        let beside: Vec<&str> = stamped.iter().filter(meanwhile).copied().collect();
+        let firsts = beside.iter().filter_map(|t| Some(ends(t)?.0));
+        let first_s = firsts.fold(own.0, f64::min);
+        let since = |topic: &str| {
+            let [sec, nanosec] = self.stamps(topic)?;
+            // Whole seconds first: a date has no digits left for nanoseconds.
+            let (whole_s, part_s) = (first_s.floor(), first_s.fract());
+            let since = move |(s, ns): (&f64, &f64)| (s - whole_s) + (ns / 1e9 - part_s);
+            Some(sec.iter().zip(nanosec).map(since))
+        };
+        let moved_s = delay_s(beside.iter().flat_map(|t| {
+            let log_s = self.get(t, STAMPS[0][0]).map(|s| s.times_s(self.start_ns));
+            let each = log_s
+                .into_iter()
+                .flatten()
+                .zip(since(t).into_iter().flatten());
+            each.map(|(l, s)| l - s)
+        }));
+        Some(since(topic)?.map(|s| s + moved_s).collect())
+    }
+
+    /// When the values of a topic's field were taken.
+    pub(super) fn dates(&self, topic: &str, field: &str, stamped: &[&str]) -> Option<Dated> {
+        let signal = self.get(topic, field)?;
+        let stamp_s = self.stamp_s(topic, stamped);
+        Some(dated(signal.times_s(self.start_ns), stamp_s))
+    }
+
+    pub(super) fn sensor(&self, topic: &str, dated: Dated) -> Option<Sensor> {
+        let accel = self.values(topic, ACCEL)?;
+        let n = accel[0].len();
+        let Dated {
+            mut t_s,
+            overtaken,
+            remark,
+            ..
+        } = dated;
+        let mut remarks: Vec<_> = remark.into_iter().collect();
+        let gyro = self.values(topic, GYRO);
+        // Samples without a rate among others that have one are holes; a sensor that never gives one still tells steps.
+        let mark = self.get(topic, GYRO_MARK).map(|s| &s.values[..]);
+        let mark = mark.filter(|mark| mark.len() == n);
+        let marked = |k: usize| mark.is_some_and(|mark| mark[k] == -1.0);
+        let without = (0..n).filter(|k| marked(*k)).count();
+        let turns = gyro.is_some() && without < n;
+        let feels = self.get(topic, ACCEL_MARK);
+        let feels = feels.is_none_or(|mark| mark.values.iter().any(|m| *m != -1.0));
+        if turns && without > 0 {
+            for (k, t) in t_s.iter_mut().enumerate() {
+                if marked(k) {
+                    *t = f64::NAN;
+                }
+            }
+            remarks.push((
+                "no_rate",
+                format!("{without} of {n} samples have no angular velocity and are left out"),
+            ));
+        }
+        let still = vec![0.0; n];
+        let gyro = gyro.filter(|_| turns).unwrap_or([&still, &still, &still]);
+        let [x, y, z] = gyro;
+        let mut columns = [&t_s, x, y, z, accel[0], accel[1], accel[2]];
+        let sorted;
+        if overtaken {
+            let mut order: Vec<usize> = (0..n).collect();
+            // What has no time comes last and is left out.
+            order.sort_by(|a, b| t_s[*a].total_cmp(&t_s[*b]));
+            sorted = columns.map(|x| order.iter().map(|k| x[*k]).collect::<Vec<f64>>());
+            columns = sorted.each_ref().map(|x| &x[..]);
+        }
+        let [t_s, x, y, z, accel @ ..] = columns;
+        let track = Track::from_columns(t_s, [x, y, z], accel);
+        let dropped = track.dropped - if turns { without } else { 0 };
+        if dropped as f64 > MANY * n as f64 {
+            remarks.push((
+                "left_out",
+                format!("{dropped} of {n} samples are left out: not finite, beyond any sensor's range, or no later than the one before"),
+            ));
+        }
+        Some(Sensor {
+            track,
+            turns,
+            feels,
+            remarks,
+        })
+    }
+
+    fn any(&self, topic: &str) -> Option<&Signal> {
+        let mut all = self.signals.iter();
+        all.find(|s| field_of(&s.path, topic).is_some())
+    }
+
+    /// Times of a topic's messages, s.
+    pub(super) fn times(&self, topic: &str) -> Vec<f64> {
+        let of = |s: &Signal| seconds_since(&s.times_ns, self.start_ns);
+        let mut t_s = self.any(topic).map(of).unwrap_or_default();
+        t_s.dedup();
+        t_s
+    }
+
+    /// When a topic's beats are (s), their numbers where each has one, and what there is to say. Messages may come late, in packets, or not at all:
+    /// a beat's own time and number know better.
+    pub(super) fn beats(
+        &self,
+        topic: &str,
+    ) -> (Vec<f64>, Option<Vec<f64>>, Option<(&'static str, String)>) {
+        let Some(any) = self.any(topic) else {
+            return Default::default();
+        };
+        let [number, own_s] = BEAT.map(|field| {
+            let values = self.get(topic, field).map(|s| &s.values[..]);
+            values.filter(|v| v.len() == any.values.len() && v.iter().all(|v| v.is_finite()))
+        });
+        let log_s = seconds_since(&any.times_ns, self.start_ns);
+        let (t_s, remark) = match own_s {
+            Some(own_s) => (never_early(own_s, &log_s), None),
+            None => {
+                let Dated { t_s, remark, .. } = dated(log_s, None);
+                (t_s, remark)
+            }
+        };
+        let mut beats: Vec<(f64, usize)> = t_s.into_iter().zip(0..).collect();
+        beats.sort_by(|a, b| a.0.total_cmp(&b.0));
+        beats.dedup_by(|b, a| b.0 <= a.0);
+        let number = number.map(|number| beats.iter().map(|(_, k)| number[*k]).collect());
+        (beats.into_iter().map(|b| b.0).collect(), number, remark)
+    }
+}
+
+/// Beats' own times on the log's clock: moved so that none lies behind its log time, and stretched where the delays surely grow or fall. Beats are
+/// few: the clocks' drift from the earliest of them alone would bend how carriers come to the beat.
+fn never_early(own_s: &[f64], log_s: &[f64]) -> Vec<f64> {
+    let n = own_s.len() as f64;
+    let delay_s: Vec<f64> = log_s.iter().zip(own_s).map(|(l, s)| l - s).collect();
+    let mean = |x: &[f64]| x.iter().sum::<f64>() / n;
+    let (middle_s, usual_s) = (mean(own_s), mean(&delay_s));
+    let (mut tt, mut td, mut dd) = (0.0, 0.0, 0.0);
+    for (s, d) in own_s.iter().zip(&delay_s) {
+        let (t, d) = (s - middle_s, d - usual_s);
+        (tt, td, dd) = (tt + t * t, td + t * d, dd + d * d);
+    }
+    // Squares of the slope and of three of its standard errors.
+    let sure = td * td * (n - 2.0) > 9.0 * (dd * tt - td * td);
+    let slope = if sure { td / tt } else { 0.0 };
+    let late = |(d, s): (&f64, &f64)| d - slope * (s - middle_s);
+    let least_s = delay_s.iter().zip(own_s).map(late).fold(f64::MAX, f64::min);
+    let moved = |s: &f64| s + least_s + slope * (s - middle_s);
+    own_s.iter().map(moved).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::beat::lock::Course;
+    use crate::inputs::Window;
+
+    /// Of 100 samples every 10 ms those that have a rate.
+    fn read(has_rate: impl Fn(usize) -> bool) -> Sensor {
+        let times_ns: std::sync::Arc<[i64]> = (0..100).map(|k| k * 10_000_000).collect();
+        let column = |field: &str, values: Vec<f64>| Signal {
+            path: format!("/imu/rath.{field}"),
+            unit: String::new(),
+            times_ns: times_ns.clone(),
+            values,
+        };
+        let mark = |k| if has_rate(k) { 0.0 } else { -1.0 };
+        let mut signals = vec![column(GYRO_MARK, (0..100).map(mark).collect())];
+        for field in GYRO.iter().chain(&ACCEL) {
+            signals.push(column(field, vec![1.0; 100]));
+        }
+        let start_ns = 0;
+        let columns = Columns { signals, start_ns };
+        let dates = columns
+            .dates("/imu/rath", ACCEL[0], &["/imu/rath"])
+            .unwrap();
+        columns.sensor("/imu/rath", dates).unwrap()
+    }
+
+    #[test]
+    fn samples_without_a_rate_are_left_out_where_others_have_one() {
+        let late = read(|k| (3..50).contains(&k) || k > 60);
+        assert!(late.turns && late.track.len() == 86);
+        assert_eq!((late.track.t_s[0], late.track.t_s[47]), (0.03, 0.61));
+        assert!(late.track.gyro_rad_per_s.iter().all(|w| *w == [1.0; 3]));
+        let [(kind, text)] = &late.remarks[..] else {
+            panic!("{:?}", late.remarks)
+        };
+        assert!(
+            *kind == "no_rate" && text.starts_with("14 of 100"),
+            "{text}"
+        );
+        // A pedometer has none at all, and its steps still count.
+        let never = read(|_| false);
+        assert!(!never.turns && never.track.len() == 100);
+    }
+
+    #[test]
+    fn sensors_of_a_log_that_was_written_at_once_keep_their_clock() {
+        // One began 2 s after the other; ROS 1 and ROS 2 name their stamps differently.
+        let since_s = [
+            ("/imu/rath", "nanosec", 0.0),
+            ("/imu/carrier_1", "nsec", 2.0),
+        ];
+        let mut signals = Vec::new();
+        for (topic, nanosec, begins_s) in since_s {
+            let mut column = |field: &str, value: &dyn Fn(i64) -> f64| {
+                signals.push(Signal {
+                    path: format!("{topic}.{field}"),
+                    unit: String::new(),
+                    times_ns: vec![9; 600].into(),
+                    values: (0..600).map(value).collect(),
+                });
+            };
+            let ns = |k: i64| 1_764_000_000_900_000_000 + (begins_s * 1e9) as i64 + 10_000_000 * k;
+            column(ACCEL[0], &|_| 9.8);
+            column("header.stamp.sec", &|k| (ns(k) / 1_000_000_000) as f64);
+            let rest = |k| (ns(k) % 1_000_000_000) as f64;
+            column(&format!("header.stamp.{nanosec}"), &rest);
+        }
+        let start_ns = 9;
+        let columns = Columns { signals, start_ns };
+        let topics = since_s.map(|s| s.0);
+        for (topic, _, begins_s) in since_s {
+            let dates = columns.dates(topic, ACCEL[0], &topics).unwrap();
+            let off = |(k, t): (usize, &f64)| (t - begins_s - 0.01 * k as f64).abs();
+            let worst = dates.t_s.iter().enumerate().map(off).fold(0.0, f64::max);
+            assert!(worst < 1e-6, "{topic}: {worst}");
+        }
+    }
+
+    #[test]
+    fn beats_that_come_late_or_together_keep_their_own_times_and_numbers() {
+        let mut random = crate::random::Random(3);
+        let mut loose = || 2e7 - 3e6 * random.normal();
+        let late_ns: Vec<f64> = (0..120).map(|_| loose()).collect();
+        let together = |k: usize| f64::from(u8::try_from(4 - k % 5).unwrap()) * 4.65e8;
+        for packets in [false, true] {
+            let kept = |k: &usize| k % 11 != 3 && !(50..70).contains(k);
+            let number: Vec<usize> = (0..120).filter(kept).collect();
+            let came = |k: &usize| {
+                let late_ns = if packets { together(*k) } else { late_ns[*k] };
+                (*k as f64 * 4.65e8 + late_ns) as i64
+            };
+            let times_ns: std::sync::Arc<[i64]> = number.iter().map(came).collect();
+            let column = |field: &str, scale: f64| Signal {
+                path: format!("/beat.{field}"),
+                unit: String::new(),
+                times_ns: times_ns.clone(),
+                values: number.iter().map(|k| scale * *k as f64).collect(),
+            };
+            let signals = vec![column("number", 1.0), column("time_s", 0.465)];
+            let start_ns = 0;
+            let (t_s, numbers, _) = Columns { signals, start_ns }.beats("/beat");
+            let course = Course::of(&t_s, numbers.as_deref());
+            let (hz, _) = course.tempo(Window::ALL).unwrap();
+            assert!((hz * 0.465 - 1.0).abs() < 1e-9, "{hz}");
+            assert!(course.phase(&[30.0])[0].is_finite());
+        }
+    }
+}
