@@ -497,6 +497,24 @@ fn physics_toolbox_holds_each_sensor_between_its_samples() {
     );
 }
 
+/// A sensor of few digits that hardly moves repeats itself too, now short, now long.
+#[test]
+fn a_coarse_sensor_at_rest_keeps_its_samples() {
+    let folder = folder();
+    let mut text = "time,gFx,gFy,gFz\n".to_owned();
+    for row in 0..400 {
+        let drift = (f64::from(row) / 60.0).sin();
+        text += &format!("{:.2},{:.1},0.0,1.0\n", f64::from(row) * 0.01, drift);
+    }
+    let got = ingest(
+        folder.path(),
+        &[file(folder.path(), "old.csv", &text)],
+        None,
+    )
+    .expect("ingests");
+    assert_eq!(got.times("/imu/old").len(), 400);
+}
+
 #[test]
 fn times_may_be_dates_or_clocks_and_text_of_another_encoding() {
     let folder = folder();

@@ -78,18 +78,27 @@ impl Log {
 }
 
 /// A track without the rows in which a logger only repeated it: one that writes several sensors into one table holds each one's last value
-/// between its samples. `None` where it does not: at least a quarter of the rows then repeat the one before to the last digit.
+/// between its samples. `None` where it does not.
 ///
-/// A track that all but stands still, as that of a broken sensor, is none that is held: fewer than one row in 50 is new.
+/// Held is what repeats the row before to the last digit in at least a quarter of the rows, about as often each time: of a sensor with few digits
+/// that hardly moves, values last now short, now long.
 pub(super) fn without_repeats(track: &Track) -> Option<Track> {
     let bits = |row: &(i64, [f64; 3])| row.1.map(f64::to_bits);
-    let new = track
-        .iter()
-        .enumerate()
-        .filter(|(k, row)| *k == 0 || bits(row) != bits(&track[k - 1]));
-    let new: Track = new.map(|(_, row)| *row).collect();
-    let held = new.len() * 4 <= track.len() * 3 && new.len() * 50 >= track.len();
-    (held && new.len() >= 8).then_some(new)
+    let mut lasts: Vec<usize> = track
+        .chunk_by(|a, b| bits(a) == bits(b))
+        .map(<[_]>::len)
+        .collect();
+    let new = lasts.len();
+    lasts.sort_unstable();
+    let evenly = *lasts.get(new * 19 / 20)? <= lasts[new / 2] * 3 / 2 + 1;
+    let held = new >= 8 && new * 4 <= track.len() * 3 && evenly;
+    let first = |same: &[(i64, [f64; 3])]| same[0];
+    held.then(|| {
+        track
+            .chunk_by(|a, b| bits(a) == bits(b))
+            .map(first)
+            .collect()
+    })
 }
 
 /// The median interval of a track, ns.
