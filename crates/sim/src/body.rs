@@ -1,6 +1,6 @@
 //! The rigid body: what is constant of it.
 
-use crate::scene::BodySpec;
+use crate::scene::parts::BodySpec;
 use nalgebra::{Matrix3, SymmetricEigen, Vector3};
 
 /// Mass properties. The inertia is about the centre of mass, in body axes.
@@ -65,7 +65,7 @@ impl Body {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::scene::Inertia;
+    use crate::scene::parts::Inertia;
 
     fn with(inertia: Inertia) -> Result<Body, String> {
         Body::new(&BodySpec {

@@ -56,12 +56,6 @@ impl Energy {
     }
 }
 
-/// The unit of an energy of the ledger in an error norm, J: the body at 1.4 m/s, and lifted by 1 m.
-pub(crate) fn unit_j(scene: &Scene) -> f64 {
-    let gravity = scene.body.gravity_m_per_s2.iter().map(|g| g * g);
-    scene.body.mass_kg * (1.0 + gravity.sum::<f64>().sqrt())
-}
-
 /// Whether a run can be believed, as it goes on.
 ///
 /// A step that is too large makes energy out of nothing and often loses it in the dampers again, so neither the motion nor the
@@ -71,7 +65,7 @@ pub(crate) fn unit_j(scene: &Scene) -> f64 {
 /// supplied = K₀ + S₀ + max(0, P₀ − P) + |∫ work|        [J]
 /// ```
 /// A run whose unexplained rest exceeds that is an artefact of its method, and stops; one whose method promises a tolerance stops at a
-/// hundred times that part of it, and a thousandth at least. The floor is rounding, and what the tolerance allows in units of [`unit_j`].
+/// hundred times that part of it, and a thousandth at least. The floor is rounding, and what the tolerance allows in units of the body's `ledger_unit_j`.
 ///
 /// A law may give back what it has taken, and one that is used beyond its range (straps that swing wider than they are long) may
 /// give more, for ever. What springs hold and laws have taken is never less than nothing but for what springs held at first: a run in which
@@ -111,7 +105,7 @@ impl Belief {
         } else {
             (1.0, 0.0)
         };
-        let unit_j = unit_j(scene);
+        let unit_j = scene.body.ledger_unit_j();
         Self {
             part,
             floor_j: allowed * unit_j,

@@ -12,8 +12,8 @@ use crate::body::Body;
 #[cfg(target_arch = "x86_64")]
 use crate::lanes::{Avx2, Avx512, FusedEach};
 use crate::lanes::{Eight, Moments, Number, Plain8, Slope, Slopes, f64x2, pack, sum};
-use crate::model::{All, Block, Pair, Part, Workspace};
-use crate::scene::Start;
+use crate::model::workspace::{All, Block, Pair, Part, Workspace};
+use crate::scene::parts::Start;
 use nalgebra::{Matrix3, Quaternion, UnitQuaternion, Vector3};
 use std::ops::Range;
 

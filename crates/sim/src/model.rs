@@ -18,7 +18,7 @@ mod rhs;
 mod sideways;
 mod slopes;
 mod term;
-mod workspace;
+pub(crate) mod workspace;
 
 pub use eight::Registers;
 pub(crate) use eight::{Octet, SideBySide};

@@ -16,7 +16,9 @@
 
 use crate::lanes::{Moments, Now, Number, f64x2, pack};
 use crate::model::{Book, Local, Model, Pair, Part, Power, Stage, Workspace};
-use crate::scene::{Checker, PerCarrier, Problem, Scene, problem, shown};
+use crate::scene::Scene;
+use crate::scene::per_carrier::PerCarrier;
+use crate::scene::problem::{Checker, Problem, problem, shown};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 

@@ -11,7 +11,9 @@
 
 use crate::lanes::{LANES, Moments, Number};
 use crate::model::{AsWhole, Model, Stage, Whole, Workspace};
-use crate::scene::{Carriers, Checker, Problem, Scene, problem};
+use crate::scene::Scene;
+use crate::scene::parts::Carriers;
+use crate::scene::problem::{Checker, Problem, problem};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 

@@ -3,7 +3,8 @@
 //! It needs `effects.music`, whose strokes it sounds, and changes nothing about the motion.
 
 use crate::model::Model;
-use crate::scene::{Checker, Problem, Scene, problem, shown};
+use crate::scene::Scene;
+use crate::scene::problem::{Checker, Problem, problem, shown};
 use crate::sensors::drum::Track;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};

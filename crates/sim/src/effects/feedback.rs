@@ -13,7 +13,8 @@
 
 use crate::lanes::Moments;
 use crate::model::{AsWhole, Model, Stage, Whole, Workspace};
-use crate::scene::{Checker, Problem, Scene};
+use crate::scene::Scene;
+use crate::scene::problem::{Checker, Problem};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 

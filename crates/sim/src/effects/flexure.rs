@@ -15,7 +15,8 @@
 
 use crate::lanes::{Moments, Number, f64x2, pack};
 use crate::model::{AsWhole, Bend, Book, Model, Pair, Power, Stage, Whole, Workspace};
-use crate::scene::{Checker, Problem, Scene};
+use crate::scene::Scene;
+use crate::scene::problem::{Checker, Problem};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 

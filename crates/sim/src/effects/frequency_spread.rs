@@ -4,7 +4,8 @@
 
 use crate::model::Model;
 use crate::random::{Stream, normal};
-use crate::scene::{Checker, Problem, Scene};
+use crate::scene::Scene;
+use crate::scene::problem::{Checker, Problem};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 

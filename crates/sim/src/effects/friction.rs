@@ -22,7 +22,8 @@
 
 use crate::lanes::{LANES, Moments, Number};
 use crate::model::{Local, Model, Part, Sideways, Stage, Workspace};
-use crate::scene::{Checker, Problem, Scene, problem};
+use crate::scene::Scene;
+use crate::scene::problem::{Checker, Problem, problem};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use std::ops::Range;

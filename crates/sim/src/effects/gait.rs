@@ -9,7 +9,9 @@
 
 use crate::lanes::{Moments, Number, f64x2, pack};
 use crate::model::{Local, Model, Pair, Part, Stage, Workspace};
-use crate::scene::{Checker, PerCarrier, Problem, Scene, problem};
+use crate::scene::Scene;
+use crate::scene::per_carrier::PerCarrier;
+use crate::scene::problem::{Checker, Problem, problem};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 

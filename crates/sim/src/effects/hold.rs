@@ -10,7 +10,9 @@
 
 use crate::lanes::{Moments, Number, f64x2, pack};
 use crate::model::{Book, Local, Model, Pair, Part, Power, Sideways, Stage, Workspace};
-use crate::scene::{Checker, PerCarrier, Problem, Scene};
+use crate::scene::Scene;
+use crate::scene::per_carrier::PerCarrier;
+use crate::scene::problem::{Checker, Problem};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 

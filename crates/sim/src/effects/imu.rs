@@ -3,7 +3,8 @@
 //! Sensors watch: the motion is bit for bit the same without them.
 
 use crate::model::Model;
-use crate::scene::{Checker, MOST_SAMPLES, Problem, Scene, problem, shown};
+use crate::scene::Scene;
+use crate::scene::problem::{Checker, MOST_SAMPLES, Problem, problem, shown};
 use crate::sensors::imu::{Draws, Seat, Triad};
 use nalgebra::UnitQuaternion;
 use schemars::JsonSchema;

@@ -8,7 +8,8 @@
 
 use crate::lanes::{Moments, Number};
 use crate::model::{Local, Model, Pair, Part, Stage, Switch, Workspace};
-use crate::scene::{Checker, Problem, Scene, problem};
+use crate::scene::Scene;
+use crate::scene::problem::{Checker, Problem, problem};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 

@@ -10,7 +10,8 @@
 
 use crate::lanes::Moments;
 use crate::model::{AsWhole, Model, Stage, Switch, Whole, Workspace};
-use crate::scene::{Checker, Problem, Scene, problem};
+use crate::scene::Scene;
+use crate::scene::problem::{Checker, Problem, problem};
 use crate::spline::Spline;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};

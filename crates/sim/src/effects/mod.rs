@@ -64,7 +64,7 @@ pub struct Entry {
     /// Takes it out of a scene.
     pub switch_off: fn(&mut Effects),
     /// Checks its parameters.
-    pub check: fn(&Scene) -> Result<(), crate::scene::Problem>,
+    pub check: fn(&Scene) -> Result<(), crate::scene::problem::Problem>,
     /// Adds it to the model.
     pub build: fn(&Scene, &mut Model),
 }
@@ -180,6 +180,6 @@ pub fn idle(effects: &Effects) -> impl Iterator<Item = (&'static str, &'static s
 }
 
 /// Checks the parameters of every effect that is on.
-pub(crate) fn check(scene: &Scene) -> Result<(), crate::scene::Problem> {
+pub(crate) fn check(scene: &Scene) -> Result<(), crate::scene::problem::Problem> {
     TABLE.iter().try_for_each(|e| (e.check)(scene))
 }

@@ -12,7 +12,9 @@
 use crate::beat::{Beat, Pause, TempoChange};
 use crate::lanes::{Moments, Number, f64x2, pack};
 use crate::model::{AsWhole, Model, Stage, Switch, Whole, Workspace};
-use crate::scene::{Checker, PerCarrier, Problem, Scene, problem};
+use crate::scene::Scene;
+use crate::scene::per_carrier::PerCarrier;
+use crate::scene::problem::{Checker, Problem, problem};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 

@@ -10,7 +10,8 @@
 
 use crate::model::{Model, Switch, Workspace};
 use crate::random::{Stream, normal_pair};
-use crate::scene::{Checker, MOST_SAMPLES, Problem, Scene, problem, shown};
+use crate::scene::Scene;
+use crate::scene::problem::{Checker, MOST_SAMPLES, Problem, problem, shown};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 

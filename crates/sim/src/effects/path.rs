@@ -17,7 +17,9 @@
 
 use crate::lanes::Moments;
 use crate::model::{AsWhole, Heading, Model, Stage, Switch, Whole, Workspace};
-use crate::scene::{Checker, Freedom, Problem, Scene, problem, shown};
+use crate::scene::Scene;
+use crate::scene::parts::Freedom;
+use crate::scene::problem::{Checker, Problem, problem, shown};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 

@@ -11,7 +11,8 @@
 
 use crate::lanes::{Moments, Number};
 use crate::model::{AsWhole, Book, Model, Pair, Power, Stage, Whole, Workspace};
-use crate::scene::{Checker, Problem, Scene};
+use crate::scene::Scene;
+use crate::scene::problem::{Checker, Problem};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 

@@ -15,7 +15,8 @@
 
 use crate::lanes::{Moments, Number};
 use crate::model::{Local, Model, Pair, Part, Sideways, Stage, Workspace};
-use crate::scene::{Checker, Problem, Scene};
+use crate::scene::Scene;
+use crate::scene::problem::{Checker, Problem};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 

@@ -6,7 +6,7 @@ use super::pinned::Pinned;
 use super::reduced::{Rails, Reduced};
 use super::{Freedoms, Six};
 use crate::body::Body;
-use crate::scene::{Freedom, Start};
+use crate::scene::parts::{Freedom, Start};
 
 /// The coordinates for a choice of freedoms.
 pub fn choose(

@@ -11,7 +11,7 @@
 use super::reduced::{Rails, Turning};
 use super::{Turned, by_columns, cross, dot, place_handles, times};
 use crate::lanes::{Moments, Number, f64x2};
-use crate::model::{Part, Workspace};
+use crate::model::workspace::{Part, Workspace};
 
 pub(super) struct Gimbal {
     handles: Vec<[f64x2; 3]>,

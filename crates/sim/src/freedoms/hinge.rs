@@ -10,7 +10,7 @@
 use super::reduced::{Rails, Turning};
 use super::{Arms, cross, dot, place_handles, times};
 use crate::lanes::{Moments, Number, f64x2};
-use crate::model::{Part, Workspace};
+use crate::model::workspace::{Part, Workspace};
 use nalgebra::{Rotation3, Vector3};
 
 /// With n along the world's axis `AXIS` (0, 1, 2); any other number: anywhere.

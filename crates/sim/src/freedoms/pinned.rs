@@ -2,8 +2,8 @@
 
 use super::{Coordinates, Freedoms, Pose, Six};
 use crate::lanes::{Moments, Number, f64x2};
-use crate::model::{Block, Pair, Part, Workspace};
-use crate::scene::Start;
+use crate::model::workspace::{Block, Pair, Part, Workspace};
+use crate::scene::parts::Start;
 use std::ops::Range;
 
 /// The attitude of [`Six`] with a centre of mass on rails.

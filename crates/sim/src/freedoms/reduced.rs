@@ -14,8 +14,8 @@
 use super::{Coordinates, Freedoms, Pose, cross, dot, pull, times};
 use crate::body::Body;
 use crate::lanes::{Moments, Number, f64x2, pack, sum};
-use crate::model::{All, Block, Pair, Part, Workspace};
-use crate::scene::Start;
+use crate::model::workspace::{All, Block, Pair, Part, Workspace};
+use crate::scene::parts::Start;
 use nalgebra::{DMatrix, DVector, Matrix3, Rotation3, UnitQuaternion, Vector3};
 use std::ops::Range;
 

@@ -1,5 +1,6 @@
 //! Text → [`Scene`], with errors that point at the line.
 
+use super::nearest::nearest;
 use super::{BUILTIN, Scene, builtin, check};
 use recording::text::read_text;
 use std::path::Path;
@@ -141,20 +142,6 @@ pub fn to_toml(scene: &Scene) -> String {
 /// JSON Schema of a scene (draft 2020-12), for editors that check TOML; made from the types themselves.
 pub fn json_schema() -> serde_json::Value {
     schemars::schema_for!(Scene).to_value()
-}
-
-/// The name nearest to `word` when it is near enough to be a slip, or else the only one that goes on from it, as with a unit.
-pub fn nearest<'a>(word: &str, names: impl Iterator<Item = &'a str>) -> Option<&'a str> {
-    let names: Vec<&str> = names.collect();
-    let near = |n: &&'a str| (strsim::damerau_levenshtein(word, n), *n);
-    let slip = names.iter().map(near).min();
-    let slip = slip.filter(|(d, n)| *d <= 1 + n.len().max(word.len()) / 3);
-    let mut longer = names.iter().filter(|n| n.starts_with(&format!("{word}_")));
-    match (slip, longer.next(), longer.next()) {
-        (Some((_, name)), ..) => Some(name),
-        (None, Some(name), None) => Some(name),
-        _ => None,
-    }
 }
 
 /// A scene that is about to be changed many times: its keys are looked up in a table that is made once.

@@ -294,7 +294,7 @@ pub const METHODS: &[Method] = &[
 pub fn method(name: &str) -> Result<&'static Method, String> {
     METHODS.iter().find(|m| m.name == name).ok_or_else(|| {
         let names = || METHODS.iter().map(|m| m.name);
-        let hint = crate::scene::nearest(name, names())
+        let hint = crate::scene::nearest::nearest(name, names())
             .map(|n| format!(" Did you mean `{n}`?"))
             .unwrap_or_default();
         format!(

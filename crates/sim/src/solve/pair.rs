@@ -16,7 +16,6 @@ use super::course::{Course, SAME_MOMENT_S};
 use super::events::{self, Looks};
 use super::first_steps::FirstSteps;
 use super::{Observer, SLOWEST_PER_S, Settings, Stats, Stopped};
-use crate::energy::unit_j;
 use crate::model::Model;
 
 /// Coefficients `(stage, a)` of one stage, zeros left out.
@@ -292,7 +291,7 @@ impl<'m, P: Pair, const EVENTS: bool> Run<'m, P, EVENTS> {
         // Phases grow without bound and mean nothing modulo a turn: they are held absolutely, the body (see `weigh`) relatively too.
         weight.as_flattened_mut()[body..watched].fill(1.0);
         // The ledger feeds nothing back, yet a rest that is quadrature's own would accuse the motion.
-        let unit_j = unit_j(&model.scene);
+        let unit_j = model.scene.body.ledger_unit_j();
         for d in watched..course.y.len() {
             weight.as_flattened_mut()[d] = LEDGER / unit_j;
             relative.as_flattened_mut()[d] = LEDGER / unit_j;

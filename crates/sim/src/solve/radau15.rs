@@ -31,7 +31,6 @@ mod turn;
 use super::course::{Course, SAME_MOMENT_S};
 use super::events::{self, Looks};
 use super::{Observer, SLOWEST_PER_S, Settings, Stats, Stopped, dop853, pair};
-use crate::energy::unit_j;
 use crate::freedoms::rotation;
 #[cfg(target_arch = "x86_64")]
 use crate::lanes::{Avx2, Avx512};
@@ -295,7 +294,7 @@ impl<'m, E: Solve> Run<'m, E> {
             found: std::iter::repeat_with(nothing).take(KNOWN).collect(),
             holds: 0,
             oldest: 0,
-            ledger_unit_j: unit_j(&model.scene),
+            ledger_unit_j: model.scene.body.ledger_unit_j(),
             looks: Looks::new(),
             margin_n: 0.0,
             h_next: 0.0,
