@@ -12,39 +12,19 @@ use super::{
 };
 use crate::text::read_text;
 
-/// Layouts that come with the program.
+/// Layouts that come with the program; of two that fit a file, the first is taken.
 pub const BUILT_IN: &[(&str, &str)] = &[
-    (
-        "x-io",
-        "header = \"Time (s)\"\n[time]\ncolumn = \"Time (s)\"\nunit = \"s\"\n\
-         [acceleration]\ncolumns = [\"Accelerometer X (g)\", \"Accelerometer Y (g)\", \"Accelerometer Z (g)\"]\nunit = \"g\"\n\
-         [angular_velocity]\ncolumns = [\"Gyroscope X (deg/s)\", \"Gyroscope Y (deg/s)\", \"Gyroscope Z (deg/s)\"]\nunit = \"deg/s\"\n",
-    ),
+    ("x-io", include_str!("layouts/x-io.toml")),
     (
         "physics-toolbox",
-        "header = \"time\"\n[time]\ncolumn = \"time\"\nunit = \"s\"\n\
-         [acceleration]\ncolumns = [\"gFx\", \"gFy\", \"gFz\"]\nunit = \"g\"\n\
-         [angular_velocity]\ncolumns = [\"wx\", \"wy\", \"wz\"]\nunit = \"rad/s\"\noptional = true\n",
+        include_str!("layouts/physics-toolbox.toml"),
     ),
-    // Apple's accelerometers read −1 on the axis that points up. Two of the app's columns give angular velocities, one at a time.
-    (
-        "sensorlog",
-        "header = \"loggingTime\"\n[time]\ncolumn = \"loggingTime(txt)\"\nunit = \"s\"\n\
-         [acceleration]\ncolumns = [\"accelerometerAccelerationX(G)\", \"accelerometerAccelerationY(G)\", \"accelerometerAccelerationZ(G)\"]\nunit = \"g\"\nsign = -1\n\
-         [angular_velocity]\ncolumns = [\"gyroRotationX(rad/s)\", \"gyroRotationY(rad/s)\", \"gyroRotationZ(rad/s)\"]\nunit = \"rad/s\"\n",
-    ),
+    ("sensorlog", include_str!("layouts/sensorlog.toml")),
     (
         "sensorlog-motion",
-        "header = \"loggingTime\"\n[time]\ncolumn = \"loggingTime(txt)\"\nunit = \"s\"\n\
-         [acceleration]\ncolumns = [\"accelerometerAccelerationX(G)\", \"accelerometerAccelerationY(G)\", \"accelerometerAccelerationZ(G)\"]\nunit = \"g\"\nsign = -1\n\
-         [angular_velocity]\ncolumns = [\"motionRotationRateX(rad/s)\", \"motionRotationRateY(rad/s)\", \"motionRotationRateZ(rad/s)\"]\nunit = \"rad/s\"\noptional = true\n",
+        include_str!("layouts/sensorlog-motion.toml"),
     ),
-    (
-        "androsensor",
-        "[time]\ncolumn = \"Time since start in ms\"\nunit = \"ms\"\n\
-         [acceleration]\ncolumns = [\"ACCELEROMETER X (m/s²)\", \"ACCELEROMETER Y (m/s²)\", \"ACCELEROMETER Z (m/s²)\"]\nunit = \"m/s^2\"\n\
-         [angular_velocity]\ncolumns = [\"GYROSCOPE X (rad/s)\", \"GYROSCOPE Y (rad/s)\", \"GYROSCOPE Z (rad/s)\"]\nunit = \"rad/s\"\noptional = true\n",
-    ),
+    ("androsensor", include_str!("layouts/androsensor.toml")),
 ];
 
 #[derive(Debug, Deserialize)]
@@ -266,4 +246,17 @@ fn times_ns(table: &Table, column: usize, time: &Time) -> Result<Vec<i64>, Impor
             })
     };
     (0..table.len()).map(read).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_is_built_in_can_be_read() {
+        for (name, _) in BUILT_IN {
+            let layout = find(name).expect(name);
+            assert!(layout.acceleration.is_some_and(|force| !force.optional));
+        }
+    }
 }
