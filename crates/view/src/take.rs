@@ -155,6 +155,14 @@ pub struct Topic {
     pub plots: Vec<(String, Vec<Curve>)>,
 }
 
+/// Carriers times moments that are drawn one by one: what a viewer loads within seconds.
+const MOST_PLACES: usize = 500_000;
+
+/// Of `rows` moments every so many are drawn where each has `count` carriers.
+pub fn every(rows: usize, count: usize) -> usize {
+    rows.saturating_mul(count).div_ceil(MOST_PLACES).max(1)
+}
+
 impl Take {
     /// Weight M·g, N, where the mass is known.
     pub fn weight_n(&self) -> Option<f64> {

@@ -375,6 +375,9 @@ fn forces(take: &Take) -> Option<(String, Vec<Line<'_>>)> {
         .map(Line::parted),
     );
     let handles = take.inputs.normal_n.len();
+    if handles > palette::CARRIERS {
+        return Some(crowd(take, scale_n, unit, lines));
+    }
     for (i, normal_n) in take.inputs.normal_n.iter().enumerate() {
         let (color, _) = palette::carrier(i);
         let name = format!("N_{}/{unit}", i + 1);
@@ -410,6 +413,47 @@ fn forces(take: &Take) -> Option<(String, Vec<Line<'_>>)> {
         "Support/{unit}, now ± {NEAR_S} s: N_tot (white), N_i ({colours}), {floating} (vermilion)"
     );
     Some((title, lines))
+}
+
+/// More handles than there are colours: the least, the median and the greatest force at every moment, as multiples of a fair share.
+fn crowd<'a>(
+    take: &'a Take,
+    scale_n: f64,
+    unit: &str,
+    mut lines: Vec<Line<'a>>,
+) -> (String, Vec<Line<'a>>) {
+    let handles = take.inputs.normal_n.len();
+    let fair_n = scale_n / handles as f64;
+    let rows = take.force_ns.len();
+    let mut found = [(); 3].map(|()| Vec::with_capacity(rows));
+    let mut shares: Vec<f64> = Vec::with_capacity(handles);
+    for k in 0..rows {
+        shares.clear();
+        let now = take.inputs.normal_n.iter().filter_map(|n| n.get(k));
+        shares.extend(now.filter(|n| n.is_finite()).map(|n| n / fair_n));
+        shares.sort_unstable_by(f64::total_cmp);
+        let at = |share: f64| {
+            let last = shares.len().checked_sub(1)?;
+            shares.get((share * last as f64).round() as usize).copied()
+        };
+        for (values, share) in found.iter_mut().zip([0.0, 0.5, 1.0]) {
+            values.push(at(share).unwrap_or(f64::NAN));
+        }
+    }
+    let kinds = [
+        ("least", palette::ORANGE),
+        ("median", palette::BLUE),
+        ("greatest", palette::ORANGE),
+    ];
+    for ((entity, color), values) in kinds.into_iter().zip(found) {
+        let name = format!("{entity} N_i·{handles}/{unit}");
+        let line = Line::new(entity, name, color, &take.force_ns, values);
+        lines.extend(line.map(Line::parted));
+    }
+    let title = format!(
+        "N_tot/{unit} (white), now ± {NEAR_S} s; N_i·{handles}/{unit}: median (blue), least and greatest (orange)"
+    );
+    (title, lines)
 }
 
 /// The support where it is measured as such.

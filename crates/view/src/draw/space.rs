@@ -14,12 +14,14 @@ use super::course;
 use crate::blueprint::View;
 use crate::palette;
 use crate::store::Store;
-use crate::take::{Carriers, Pose, Take};
+use crate::take::{Carriers, Pose, Take, every};
 
 /// How long the trail of the centre of mass is, s.
 const TRAIL_S: f64 = 5.0;
-/// Length of the arrow of a handle that carries its fair share M·g/N, m.
+/// Length of the arrow of a handle that carries its fair share M·g/N, m, seen from [`NEAR_M`].
 const FAIR_SHARE_M: f64 = 0.5;
+/// From much farther away arrows are twice as long, m.
+const NEAR_M: f64 = 5.0;
 /// Reach of the ground beyond the path, m.
 const MARGIN_M: f32 = 7.0;
 /// Half the width of the ground, m.
@@ -41,23 +43,20 @@ pub fn draw(store: &mut Store<'_>, take: &Take) -> anyhow::Result<Option<View>> 
     if let Some(carriers) = &take.carriers {
         people(store, take, pose, &course::ways(pose, &headings), carriers)?;
     }
-    let forces = forces(store, take, pose, bent.as_deref())?;
     let look_m = follow(store, pose, &headings)?;
-
-    // Far enough to see the longest pole whole, a little from above and ahead.
-    let reach_m = take
-        .shape
-        .handles_m
-        .iter()
-        .map(|h| h[0].abs().max(1.4 * h[1].abs()))
-        .fold(1.2, f64::max) as f32;
+    let mut eye = eye(&take.shape.handles_m, f64::from(look_m));
     // What falls turns as it likes: its pole has to fit in upright too.
-    let back = course::level_m(pose).map_or(1.6, |_| 1.0);
-    let eye = [0.5 * reach_m, -1.2 * reach_m - 0.6, 0.22 * reach_m + 0.4].map(|x| back * x);
+    if course::level_m(pose).is_none() {
+        eye = eye.map(|x| 1.6 * x);
+    }
+    let far = eye.iter().map(|x| x * x).sum::<f64>().sqrt() / NEAR_M;
+    let share_m = FAIR_SHARE_M * far.sqrt().round().clamp(1.0, 2.0);
+    let forces = forces(store, take, pose, bent.as_deref(), share_m)?;
     let target = [0.0, 0.0, look_m];
+    let eye = [0, 1, 2].map(|i| eye[i] as f32 + target[i]);
     let title = match forces {
         Some(unit) => format!(
-            "Scene: {FAIR_SHARE_M} m of arrow = {unit}/{}; blue loaded, yellow nearly unloaded, vermilion slack",
+            "Scene: {share_m} m of arrow = {unit}/{}; blue loaded, yellow nearly unloaded, vermilion slack",
             take.inputs.normal_n.len()
         ),
         None => "Scene".to_owned(),
@@ -66,6 +65,43 @@ pub fn draw(store: &mut Store<'_>, take: &Take) -> anyhow::Result<Option<View>> 
         .contents(["/world/**".to_owned()])
         .trail("/world/trail", TRAIL_S);
     Ok(Some(view))
+}
+
+/// Tangents of half the angles that the camera sees, sideways and upwards: the viewer's 55 degrees of height, in a view about twice as
+/// wide as high, less a margin.
+const SEEN: [f64; 2] = [0.87, 0.45];
+/// What stands above a handle has to be seen so far, m: a head, an arrow.
+const ABOVE_M: f64 = 0.6;
+/// And so far below it, m: feet.
+const BELOW_M: f64 = 1.0;
+
+/// From where all handles and those under them are seen, a little from above and ahead, relative to the place looked at, `look_m` above
+/// the frame's origin.
+fn eye(handles_m: &[[f64; 3]], look_m: f64) -> [f64; 3] {
+    let reach_m = handles_m
+        .iter()
+        .map(|h| h[0].abs().max(1.4 * h[1].abs()))
+        .fold(1.2, f64::max);
+    // Of many, those in front would hide the others.
+    let up = 0.22 * reach_m + 0.4 + 0.4 * (reach_m - 4.0).max(0.0);
+    let eye = [0.5 * reach_m, -1.2 * reach_m - 0.6, up];
+    let length = eye.iter().map(|x| x * x).sum::<f64>().sqrt();
+    let back = eye.map(|x| x / length);
+    let level = back[0].hypot(back[1]);
+    let right = [-back[1] / level, back[0] / level, 0.0];
+    let upward = [-back[2] * right[1], back[2] * right[0], level];
+    let dot = |a: &[f64; 3], b: &[f64; 3]| (0..3).map(|i| a[i] * b[i]).sum::<f64>();
+    let ends = handles_m.iter().flat_map(|&[x, y, z]| {
+        let x = x + 0.3f64.copysign(x);
+        [z + ABOVE_M, z - BELOW_M].map(|z| [x, y, z - look_m])
+    });
+    let far_m = ends
+        .map(|p| {
+            let across = [&right, &upward].map(|axis| dot(&p, axis).abs());
+            dot(&p, &back) + (across[0] / SEEN[0]).max(across[1] / SEEN[1])
+        })
+        .fold(length, f64::max);
+    back.map(|x| far_m * x)
 }
 
 fn f32s(v: &[f64; 3]) -> [f32; 3] {
@@ -351,6 +387,7 @@ fn people(
     };
     let hip_m = (handle_m - TORSO_M).max(0.3);
 
+    // Who has no phase stands.
     let phase_at: Vec<Vec<f64>> = (0..count)
         .map(|i| match take.inputs.phase_rad.get(i) {
             Some(phase) if take.phase_ns == carriers.times_ns => analyze::phase::unwrap(phase),
@@ -359,60 +396,118 @@ fn people(
                 let unwrapped = analyze::phase::unwrap(phase);
                 analyze::inputs::interpolate(&s(&take.phase_ns), &unwrapped, &s(&carriers.times_ns))
             }
-            _ => vec![0.0; rows],
+            _ => vec![f64::NAN; rows],
         })
         .collect();
-    let moments: Vec<usize> = carriers.times_ns.iter().map(|t| moment(pose, *t)).collect();
-    let ways: Vec<f64> = moments.iter().map(|at| ways[*at]).collect();
-    let shoulder = |points: &[[f64; 3]], k: usize| {
-        let [x, y, z] = points[k];
-        [x, y, z + shift_m]
-    };
-    let shown: Vec<bool> = (0..rows)
-        .map(|k| {
-            let handles = handles_at(&take.shape.handles_m, pose, moments[k]);
-            let mut shoulders = carriers.points_m.iter().map(|points| shoulder(points, k));
-            handles.is_empty() || shoulders.all(|point| !is_apart(&point, &handles))
+    let told: Vec<usize> = (0..rows).step_by(every(rows, count)).collect();
+    let figures: Vec<Figures> = told
+        .iter()
+        .map(|&k| {
+            let at = moment(pose, carriers.times_ns[k]);
+            let handles = handles_at(&take.shape.handles_m, pose, at);
+            let shoulders: Vec<[f64; 3]> = carriers
+                .points_m
+                .iter()
+                .map(|points| {
+                    let [x, y, z] = points[k];
+                    [x, y, z + shift_m]
+                })
+                .collect();
+            let can = |(i, shoulder): (usize, &[f64; 3])| {
+                // His own handle is looked at first.
+                let own = handles.get(i).into_iter();
+                own.chain(&handles).any(|handle| is_near(shoulder, handle))
+            };
+            Figures {
+                shown: handles.is_empty() || shoulders.iter().enumerate().all(can),
+                shoulders,
+                way_rad: ways[at],
+            }
         })
         .collect();
-    let mut legs: Vec<Vec<[f32; 3]>> = Vec::with_capacity(rows * count);
-    for k in (0..rows).filter(|k| shown[*k]) {
-        for (points, phase) in carriers.points_m.iter().zip(&phase_at) {
-            legs.push(legs_at(shoulder(points, k), ways[k], phase[k]));
-        }
-    }
-    let colors = || (0..count).map(|i| palette::carrier(i).0);
-    let lengths = shown.iter().map(|shown| if *shown { count } else { 0 });
-    let columns = LineStrips3D::new(legs).columns(lengths)?;
-    store.rows("/world/legs", &carriers.times_ns, columns)?;
+    let times: Vec<i64> = told.iter().map(|k| carriers.times_ns[*k]).collect();
+    let lengths = || figures.iter().map(|f| if f.shown { count } else { 0 });
+    let shown = || told.iter().zip(&figures).filter(|(_, f)| f.shown);
+    let colors: Vec<u32> = (0..count).map(|i| palette::carrier(i).0).collect();
+    let legs = shown().flat_map(|(&k, f)| {
+        let each = f.shoulders.iter().zip(&phase_at);
+        each.map(move |(shoulder, phase)| legs_at(*shoulder, f.way_rad, phase[k]))
+    });
+    let columns = LineStrips3D::new(legs).columns(lengths())?;
+    store.rows("/world/legs", &times, columns)?;
     let style = LineStrips3D::update_fields()
         .with_radii([0.055f32])
-        .with_colors(colors());
+        .with_colors(colors.iter().copied());
     store.fixed("/world/legs", &style)?;
-    // Torsos and heads stay as they are: they are said again only where they come or go.
-    let turns: Vec<usize> = (0..rows)
-        .filter(|k| *k == 0 || shown[*k] != shown[k - 1])
+    let length_m = (handle_m - hip_m - 0.12).max(0.1);
+    if count <= WHOLE_FIGURES {
+        return bodies(store, &times, &figures, length_m);
+    }
+    // A stroke and a dot for each, all in two entities.
+    let parts = |z: f64| {
+        shown().flat_map(move |(_, f)| {
+            let beside = move |shoulder: &[f64; 3]| beside(*shoulder, f.way_rad, 0.0, BESIDE_M, z);
+            f.shoulders.iter().map(beside)
+        })
+    };
+    let torsos = parts(0.02 - TORSO_M)
+        .zip(parts(0.02 - TORSO_M + length_m))
+        .map(|(low, high)| [low, high]);
+    let columns = LineStrips3D::new(torsos).columns(lengths())?;
+    store.rows("/world/torsos", &times, columns)?;
+    let style = LineStrips3D::update_fields()
+        .with_radii([0.13f32])
+        .with_colors(colors.iter().copied());
+    store.fixed("/world/torsos", &style)?;
+    let columns = Points3D::new(parts(0.2)).columns(lengths())?;
+    store.rows("/world/heads", &times, columns)?;
+    let style = Points3D::update_fields()
+        .with_radii([0.11f32])
+        .with_colors(colors);
+    store.fixed("/world/heads", &style)
+}
+
+/// Up to so many figures have bodies and heads of their own shape.
+const WHOLE_FIGURES: usize = 16;
+
+/// All figures at one moment.
+struct Figures {
+    /// Whether they stand where they can carry.
+    shown: bool,
+    shoulders: Vec<[f64; 3]>,
+    way_rad: f64,
+}
+
+/// Torsos and heads, an entity each, that move with their shoulders.
+fn bodies(
+    store: &mut Store<'_>,
+    times: &[i64],
+    figures: &[Figures],
+    length_m: f64,
+) -> anyhow::Result<()> {
+    // They stay as they are: they are said again only where they come or go.
+    let turns: Vec<usize> = (0..figures.len())
+        .filter(|k| *k == 0 || figures[*k].shown != figures[k - 1].shown)
         .collect();
-    let times: Vec<i64> = turns.iter().map(|k| carriers.times_ns[*k]).collect();
-    let lengths = || turns.iter().map(|k| usize::from(shown[*k]));
+    let turn_times: Vec<i64> = turns.iter().map(|k| times[*k]).collect();
+    let lengths = || turns.iter().map(|k| usize::from(figures[*k].shown));
     let each: usize = lengths().sum();
-    for (i, points) in carriers.points_m.iter().enumerate() {
+    for i in 0..figures.first().map_or(0, |f| f.shoulders.len()) {
         let path = format!("/world/carrier_{}", i + 1);
-        let places = (0..rows).map(|k| f32s(&shoulder(points, k)));
         let columns = Transform3D::update_fields()
-            .with_many_translation(places)
-            .with_many_quaternion(ways.iter().map(about_z))
+            .with_many_translation(figures.iter().map(|f| f32s(&f.shoulders[i])))
+            .with_many_quaternion(figures.iter().map(|f| about_z(&f.way_rad)))
             .columns_of_unit_batches()?;
-        store.rows(&path, &carriers.times_ns, columns)?;
+        store.rows(&path, times, columns)?;
         let color = palette::carrier(i).0;
-        let length = (handle_m - hip_m - 0.12).max(0.1) as f32;
-        let torso = Capsules3D::from_lengths_and_radii(vec![length; each], vec![0.13f32; each])
-            .with_translations(vec![[0.0f32, BESIDE_M as f32, 0.02 - TORSO_M as f32]; each]);
+        let torso =
+            Capsules3D::from_lengths_and_radii(vec![length_m as f32; each], vec![0.13f32; each])
+                .with_translations(vec![[0.0f32, BESIDE_M as f32, 0.02 - TORSO_M as f32]; each]);
         let style = Capsules3D::update_fields()
             .with_colors([color])
             .with_fill_mode(FillMode::Solid);
         let path_of = |part: &str| format!("{path}/{part}");
-        store.rows(&path_of("torso"), &times, torso.columns(lengths())?)?;
+        store.rows(&path_of("torso"), &turn_times, torso.columns(lengths())?)?;
         store.fixed(&path_of("torso"), &style)?;
         let head = Ellipsoids3D::from_centers_and_half_sizes(
             vec![[0.0f32, BESIDE_M as f32, 0.2]; each],
@@ -421,7 +516,7 @@ fn people(
         let style = Ellipsoids3D::update_fields()
             .with_colors([color])
             .with_fill_mode(FillMode::Solid);
-        store.rows(&path_of("head"), &times, head.columns(lengths())?)?;
+        store.rows(&path_of("head"), &turn_times, head.columns(lengths())?)?;
         store.fixed(&path_of("head"), &style)?;
     }
     Ok(())
@@ -436,26 +531,33 @@ fn handles_at(handles_m: &[[f64; 3]], pose: &Pose, at: usize) -> Vec<[f64; 3]> {
         .collect()
 }
 
-/// Whether a shoulder is far from all handles.
-fn is_apart(shoulder: &[f64; 3], handles: &[[f64; 3]]) -> bool {
-    handles.iter().all(|handle| {
-        let squares = (0..3).map(|i| (shoulder[i] - handle[i]).powi(2));
-        squares.sum::<f64>() > APART_M * APART_M
-    })
+/// Whether a shoulder is near a handle.
+fn is_near(shoulder: &[f64; 3], handle: &[f64; 3]) -> bool {
+    let squares = (0..3).map(|i| (shoulder[i] - handle[i]).powi(2));
+    // What is no number is nowhere in particular.
+    !(squares.sum::<f64>() > APART_M * APART_M)
 }
 
-/// Foot, hip and foot of a figure that walks towards `heading_rad` beside its shoulder's point.
-fn legs_at(shoulder: [f64; 3], heading_rad: f64, phase_rad: f64) -> Vec<[f32; 3]> {
-    let (sin, cos) = heading_rad.sin_cos();
-    let at = |ahead: f64, left: f64, z: f64| {
-        f32s(&[
-            shoulder[0] + ahead * cos - left * sin,
-            shoulder[1] + ahead * sin + left * cos,
-            z,
-        ])
-    };
+/// A place beside a shoulder of a figure that faces `way_rad`, m ahead, to the left and above it.
+fn beside(shoulder: [f64; 3], way_rad: f64, ahead: f64, left: f64, above: f64) -> [f32; 3] {
+    let (sin, cos) = way_rad.sin_cos();
+    let [x, y, z] = shoulder;
+    f32s(&[
+        x + ahead * cos - left * sin,
+        y + ahead * sin + left * cos,
+        z + above,
+    ])
+}
+
+/// Foot, hip and foot of a figure that walks towards `way_rad` beside its shoulder's point; without a phase it stands.
+fn legs_at(shoulder: [f64; 3], way_rad: f64, phase_rad: f64) -> Vec<[f32; 3]> {
     // A gait cycle of the model is one step; the same foot swings every other.
-    let (stride, swing) = (0.5 * phase_rad).sin_cos();
+    let (stride, swing) = match phase_rad.is_finite() {
+        true => (0.5 * phase_rad).sin_cos(),
+        false => (0.0, 0.0),
+    };
+    let at =
+        |ahead: f64, left: f64, z: f64| beside(shoulder, way_rad, ahead, left, z - shoulder[2]);
     let foot = |side: f64| {
         at(
             side * HALF_STRIDE_M * stride,
@@ -473,6 +575,7 @@ fn forces(
     take: &Take,
     pose: &Pose,
     bent: Option<&[Vec<[f64; 3]>]>,
+    share_m: f64,
 ) -> anyhow::Result<Option<&'static str>> {
     let handles = take.shape.handles_m.len();
     let normal_n = &take.inputs.normal_n;
@@ -482,24 +585,29 @@ fn forces(
     if handles == 0 || normal_n.len() != handles || take.force_ns.is_empty() {
         return Ok(None);
     }
-    let rows = take.force_ns.len();
+    let all = take.force_ns.len();
+    let told: Vec<usize> = (0..all).step_by(every(all, handles)).collect();
+    let (rows, times) = (told.len(), told.iter().map(|k| take.force_ns[*k]));
+    let times: Vec<i64> = times.collect();
     let lengths = || std::iter::repeat_n(handles, rows);
-    let metres_per_newton = FAIR_SHARE_M * handles as f64 / scale_n;
+    let metres_per_newton = share_m * handles as f64 / scale_n;
+    let thick = (share_m / FAIR_SHARE_M) as f32;
     let mut colors = Vec::with_capacity(rows * handles);
     let mut radii = Vec::with_capacity(rows * handles);
     let mut vectors = Vec::with_capacity(rows * handles);
     let mut origins = Vec::with_capacity(rows * handles);
-    for k in 0..rows {
+    for k in told {
         let straight = || handles_at(&take.shape.handles_m, pose, moment(pose, take.force_ns[k]));
         let places = bent.map_or_else(straight, |bent| bent[k].clone());
         for (place, force) in places.iter().zip(normal_n) {
             let load = Load::of(force[k], scale_n, handles);
             colors.push(palette::load(load));
-            radii.push(match load {
+            let radius = match load {
                 Load::Loaded => 0.06f32,
                 Load::NearlyUnloaded => 0.085,
                 Load::Slack => 0.12,
-            });
+            };
+            radii.push(thick * radius);
             let length = if force[k].is_finite() {
                 force[k].max(0.0) * metres_per_newton
             } else {
@@ -513,15 +621,15 @@ fn forces(
         .with_colors(colors.iter().copied())
         .with_radii(radii)
         .columns(lengths())?;
-    store.rows("/world/handles", &take.force_ns, marks)?;
+    store.rows("/world/handles", &times, marks)?;
     let arrows = Arrows3D::from_vectors(vectors)
         .with_origins(origins)
         .with_colors(colors)
         .columns(lengths())?;
-    store.rows("/world/forces", &take.force_ns, arrows)?;
+    store.rows("/world/forces", &times, arrows)?;
     store.fixed(
         "/world/forces",
-        &Arrows3D::update_fields().with_radii([0.03f32]),
+        &Arrows3D::update_fields().with_radii([0.03 * thick]),
     )?;
     Ok(Some(unit))
 }
@@ -547,6 +655,93 @@ mod tests {
         close(hip, 3.0 - BESIDE_M, 5.0);
         close(left, 3.0 - BESIDE_M - 0.1, 5.0 + HALF_STRIDE_M);
         close(right, 3.0 - BESIDE_M + 0.1, 5.0 - HALF_STRIDE_M);
+    }
+
+    #[test]
+    fn who_has_no_phase_stands_on_both_feet() {
+        let [left, _, right] = legs_at([0.0, 0.0, 1.0], 0.0, f64::NAN)[..] else {
+            panic!("two feet and a hip");
+        };
+        assert_eq!([left[0], right[0]], [0.0, 0.0]);
+        assert_eq!([left[2], right[2]], [0.04, 0.04]);
+    }
+
+    /// Handles at equal distances along parallel poles 0.9 m apart.
+    fn along(poles: usize, each: usize, length_m: f64) -> Vec<[f64; 3]> {
+        let at = |k: usize, n: usize| k as f64 / (n - 1) as f64 - 0.5;
+        let pole = |i: usize| {
+            let y = 0.9 * (i as f64 - 0.5 * (poles - 1) as f64);
+            (0..each).map(move |k| [length_m * at(k, each), y, 0.1])
+        };
+        (0..poles).flat_map(pole).collect()
+    }
+
+    #[test]
+    fn every_handle_is_in_the_picture() {
+        for (poles, each, length_m) in [(1, 2, 4.9), (2, 4, 4.9), (4, 16, 10.5), (10, 100, 69.3)] {
+            let handles = along(poles, each, length_m);
+            let from = eye(&handles, 0.0);
+            let unit = |v: [f64; 3]| {
+                let length = v.iter().map(|x| x * x).sum::<f64>().sqrt();
+                v.map(|x| x / length)
+            };
+            let dot = |a: &[f64; 3], b: &[f64; 3]| (0..3).map(|i| a[i] * b[i]).sum::<f64>();
+            let ahead = unit(from.map(|x| -x));
+            let right = unit([ahead[1], -ahead[0], 0.0]);
+            let up = [
+                right[1] * ahead[2],
+                -right[0] * ahead[2],
+                right[0] * ahead[1] - right[1] * ahead[0],
+            ];
+            for h in &handles {
+                let to = [0, 1, 2].map(|i| h[i] - from[i]);
+                let [right, up, deep] = [right, up, ahead].map(|axis| dot(&to, &axis));
+                assert!(deep > 0.0, "{poles} {each}: {h:?}");
+                // The viewer's 55 degrees, twice as wide as high.
+                let half = 27.5f64.to_radians().tan();
+                assert!(right.abs() < 1.9 * half * deep, "{poles} {each}: {h:?}");
+                assert!(up.abs() < half * deep, "{poles} {each}: {h:?}");
+            }
+        }
+    }
+
+    #[test]
+    fn a_crowd_is_drawn_with_all_its_heads() {
+        let count = 1000;
+        let handles = along(10, 100, 69.3);
+        let rows = 900;
+        let mut take = Take {
+            pose: Some(Pose {
+                times_ns: (0..rows).collect(),
+                position_m: vec![[0.0, 0.0, 0.9]; rows as usize],
+                orientation: vec![[0.0, 0.0, 0.0, 1.0]; rows as usize],
+            }),
+            carriers: Some(Carriers {
+                times_ns: (0..rows).collect(),
+                points_m: handles
+                    .iter()
+                    .map(|[x, y, _]| vec![[*x, *y, 1.0]; rows as usize])
+                    .collect(),
+            }),
+            ..Take::default()
+        };
+        take.shape.handles_m = handles;
+        let sent = sent::by(|store| {
+            draw(store, &take).unwrap();
+        });
+        for (entity, component) in [
+            ("/world/legs", "LineStrips3D:strips"),
+            ("/world/torsos", "LineStrips3D:strips"),
+            ("/world/heads", "Points3D:positions"),
+        ] {
+            // Every other moment, all of them.
+            let lengths = sent.lengths(entity, component);
+            assert_eq!(lengths, vec![count; 450], "{entity}");
+        }
+        assert!(
+            sent.lengths("/world/carrier_1/head", "Ellipsoids3D:half_sizes")
+                .is_empty()
+        );
     }
 
     #[test]
