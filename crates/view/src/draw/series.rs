@@ -104,7 +104,8 @@ pub fn lines(store: &mut Store<'_>, origin: &str, lines: Vec<Line<'_>>) -> anyho
     Ok(())
 }
 
-/// Sends the curves of a plot and gives its view. `range` is that of the values to begin with, where the viewer shall not choose.
+/// Sends the curves of a plot and gives its view. `range` is that of the values to begin with, where the viewer shall not choose; the
+/// title says what lies beyond it.
 pub fn plot(
     store: &mut Store<'_>,
     title: String,
@@ -112,12 +113,67 @@ pub fn plot(
     curves: Vec<Line<'_>>,
     range: Option<(f64, f64)>,
 ) -> anyhow::Result<View> {
+    let ends = ends(&curves);
     lines(store, origin, curves)?;
-    let view = View::plot(title, origin);
-    Ok(match range {
-        Some((low, high)) => view.range(low, high),
-        None => view,
-    })
+    let Some((low, high)) = range else {
+        return Ok(View::plot(title, origin));
+    };
+    let off = ends.map_or(String::new(), |(least, greatest)| {
+        let mut off = String::new();
+        if least < low {
+            off += &format!("; down to {}", short(least));
+        }
+        if greatest > high {
+            off += &format!("; up to {}", short(greatest));
+        }
+        off
+    });
+    Ok(View::plot(title + &off, origin).range(low, high))
+}
+
+/// A number in three digits.
+fn short(x: f64) -> String {
+    let digits = (2.0 - x.abs().log10().floor()).clamp(0.0, 6.0);
+    format!("{x:.*}", digits as usize)
+}
+
+/// The least and the greatest value.
+fn ends(curves: &[Line<'_>]) -> Option<(f64, f64)> {
+    let values = curves.iter().flat_map(|line| line.values.iter());
+    let (low, high) = values
+        .filter(|x| x.is_finite())
+        .fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), x| {
+            (l.min(*x), h.max(*x))
+        });
+    (low <= high).then_some((low, high))
+}
+
+/// So many of the values at either end, as a share, may be off the axis.
+const FEW: f64 = 0.005;
+/// That they are only where they would stretch the axis so many times.
+const STRETCHED: f64 = 2.0;
+/// Fewer values have no few.
+const MANY: usize = 400;
+
+/// The ends of the values without the few that would leave the others a sliver of the axis; half as much room again is left about these.
+fn bulk(curves: &[Line<'_>], (low, high): (f64, f64)) -> (f64, f64) {
+    let values = curves.iter().flat_map(|line| line.values.iter().copied());
+    let mut values: Vec<f64> = values.filter(|x| x.is_finite()).collect();
+    if values.len() < MANY {
+        return (low, high);
+    }
+    let few = (FEW * values.len() as f64) as usize;
+    let last = values.len() - 1 - few;
+    let from = *values.select_nth_unstable_by(few, f64::total_cmp).1;
+    let to = *values.select_nth_unstable_by(last, f64::total_cmp).1;
+    let room = 0.25 * (to - from);
+    let kept = (low.max(from - room), high.min(to + room));
+    // What is level but for a few pulses is about these.
+    let level = to - from <= 1e-6 * from.abs().max(to.abs());
+    if level || high - low < STRETCHED * (kept.1 - kept.0) {
+        return (low, high);
+    }
+    kept
 }
 
 /// Room above and below the values, as a share of their range; less where numbers need it.
@@ -127,22 +183,15 @@ const MOST_NUMBERS: f64 = 7.5;
 /// A number that is written whole stands so far from the end of the axis, as a share of it.
 const WHOLE: f64 = 0.045;
 
-/// All values with a little room, and two numbers on the axis. `None` where there is nothing to choose, or where more values may come.
+/// All values but a few far ones, with a little room, and two numbers on the axis. `None` where there is nothing to choose, or where more values may come.
 pub fn spread(curves: &[Line<'_>], growing: bool) -> Option<(f64, f64)> {
     spread_over(curves, growing, 0.0)
 }
 
 /// The same over no less than `least`: what differs by less is level.
 fn spread_over(curves: &[Line<'_>], growing: bool, least: f64) -> Option<(f64, f64)> {
-    let values = curves.iter().flat_map(|line| line.values.iter());
-    let (low, high) = values
-        .filter(|x| x.is_finite())
-        .fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), x| {
-            (l.min(*x), h.max(*x))
-        });
-    if growing || !(low < high) {
-        return None;
-    }
+    let all = ends(curves).filter(|(low, high)| !growing && low < high)?;
+    let (low, high) = bulk(curves, all);
     // The viewer's numbers have few digits: less than a millionth of the value would be none of them.
     let least = least.max(1e-6 * low.abs().max(high.abs()));
     let more = 0.5 * (least - (high - low)).max(0.0);
@@ -617,6 +666,55 @@ mod tests {
         }
         let flat = Line::new("x", "x", 0, &[0, 1], vec![1.0, 1.0]).unwrap();
         assert_eq!(spread(&[flat], false), None);
+    }
+
+    #[test]
+    fn a_few_far_values_do_not_stretch_an_axis_and_are_named() {
+        let times: Vec<i64> = (0..2000).collect();
+        let wave = |k: i64| (0.3 * k as f64).sin();
+        let drawn = |far: &dyn Fn(i64) -> Option<f64>| {
+            let values: Vec<f64> = (times.iter())
+                .map(|k| far(*k).unwrap_or_else(|| wave(*k)))
+                .collect();
+            let line = Line::new("x", "x", 0, &times, values).unwrap();
+            let range = spread(std::slice::from_ref(&line), false).unwrap();
+            let mut title = String::new();
+            crate::draw::sent::by(|store| {
+                let view = plot(store, "x".into(), "/x", vec![line], Some(range)).unwrap();
+                title = view.title().to_owned();
+            });
+            (range, title)
+        };
+        let ((low, high), title) = drawn(&|k| (k < 5).then_some(40.0));
+        assert!(low < -1.0 && high > 1.0 && high - low < 4.0, "{low} {high}");
+        assert_eq!(title, "x; up to 40.0");
+        // A twentieth of all is not few, and twice as far is not far.
+        for far in [
+            &(|k: i64| (k < 100).then_some(40.0)) as &dyn Fn(i64) -> Option<f64>,
+            &|k| (k < 5).then_some(3.0),
+        ] {
+            let ((_, high), title) = drawn(far);
+            assert!(high > 3.0, "{high}");
+            assert_eq!(title, "x");
+        }
+    }
+
+    #[test]
+    fn of_a_crowd_the_least_the_median_and_the_greatest_are_drawn() {
+        let mut take = Take {
+            force_ns: vec![0, 1],
+            ..Take::default()
+        };
+        take.inputs.mass_kg = Some(9.0);
+        take.inputs.gravity_m_per_s2 = 1.0;
+        take.inputs.normal_n = (0..9).map(|i| vec![f64::from(i); 2]).collect();
+        let (title, lines) = forces(&take).unwrap();
+        assert!(title.contains("N_i·9/Mg"), "{title}");
+        let value = |entity: &str| lines.iter().find(|l| l.entity == entity).unwrap().values[0];
+        assert_eq!(["least", "median", "greatest"].map(value), [0.0, 4.0, 8.0]);
+        take.inputs.normal_n.pop();
+        let (_, lines) = forces(&take).unwrap();
+        assert!(lines.iter().any(|l| l.entity == "handle_8"));
     }
 
     #[test]
