@@ -2,7 +2,7 @@
 
 mod circle;
 mod course;
-mod events;
+pub mod events;
 mod sensors;
 mod series;
 mod space;
