@@ -85,10 +85,12 @@ fn lines(take: &Take) -> Vec<Line> {
     // OK because event times lie inside the recording, whose length fits.
     let at = |t_s: f64| take.start_ns.saturating_add((t_s * 1e9).round() as i64);
     for event in counted(take) {
-        // What names only its topic is said with its kind.
-        let what = match event.what.starts_with('/') {
-            true => format!("{}: {}", event.kind.replace('_', " "), once(&event.what)),
-            false => event.what.clone(),
+        // What names only its topic, or says but a word, is said with its kind.
+        let kind = event.kind.replace('_', " ");
+        let what = match event.what.as_str() {
+            what if what.starts_with('/') => format!("{kind}: {}", once(what)),
+            what if !what.contains(' ') => format!("{kind} {what}"),
+            what => what.to_owned(),
         };
         let (level, color) = match event.kind {
             "onset" => ("CRITICAL", palette::WHITE),
@@ -219,5 +221,18 @@ mod tests {
         };
         let color = palette::load(Load::Slack);
         assert_eq!(lines(&take)[0].color, color);
+    }
+
+    #[test]
+    fn a_word_alone_is_said_with_its_kind() {
+        let take = Take {
+            events: vec![Event {
+                t_s: 1.0,
+                kind: "beat",
+                what: "heard".into(),
+            }],
+            ..Take::default()
+        };
+        assert_eq!(lines(&take)[0].text, "1.00 s  beat heard");
     }
 }
