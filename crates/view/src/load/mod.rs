@@ -18,7 +18,7 @@ use recording::{Finding, Kind, topics};
 use crate::take::{Take, every};
 
 /// More messages than this are streamed only: metrics need whole columns in memory.
-const MAX_EXAMINED: u64 = 3_000_000;
+const MAX_EXAMINED: u64 = 10_000_000;
 
 /// Transforms that a message of `/tf` may have: the body's, and one for each of as many people as the project's own lists may hold.
 const MOST_TRANSFORMS: usize = 1 + 4096;
