@@ -1,5 +1,7 @@
 //! Events and the reader's remarks as lines of text on the timeline.
 
+use std::collections::BTreeSet;
+
 use analyze::events::Event;
 use re_sdk_types::archetypes::TextLog;
 use recording::load::Load;
@@ -61,8 +63,14 @@ fn counted(take: &Take) -> Vec<Event> {
             out.extend(group.iter().map(|e| (*e).clone()));
             continue;
         }
-        let lost = group.iter().filter(|e| e.kind == "contact_lost").count();
-        let what = match (lost, group.len() - lost) {
+        // One that chatters is one handle.
+        let handles = |kind: &str| {
+            let of_kind = group.iter().filter(|e| e.kind == kind);
+            let named = of_kind.map(|e| e.what.split(' ').nth(1));
+            named.collect::<BTreeSet<Option<&str>>>().len()
+        };
+        let lost = handles("contact_lost");
+        let what = match (lost, handles("contact_regained")) {
             (0, back) => format!("{back} handles press again"),
             (lost, 0) => format!("{lost} handles go slack"),
             (lost, back) => format!("{lost} handles go slack, {back} press again"),
@@ -179,8 +187,9 @@ mod tests {
         let mut take = Take::default();
         for k in 0..20 {
             let t_s = 1.0 + 0.01 * f64::from(k);
-            take.events
-                .push(event(t_s, "contact_lost", "a handle goes slack"));
+            // The first two of them twice.
+            let what = format!("handle {} goes slack", k % 18);
+            take.events.push(event(t_s, "contact_lost", &what));
         }
         take.events.push(event(1.1, "beat_end", "the beat ends"));
         take.events
@@ -194,7 +203,7 @@ mod tests {
         assert_eq!(
             told,
             [
-                "1.00 s  20 handles go slack, 1 press again",
+                "1.00 s  18 handles go slack, 1 press again",
                 "1.10 s  the beat ends",
                 "1.55 s  handle 4 presses with 4 N",
             ]
