@@ -1,4 +1,4 @@
-//! Curves over time: height, roll and tilt, forces, order parameter, energy. One function for each plot, all in [`PLOTS`].
+//! Curves over time: height, roll and tilt, forces, order parameter, energy. One function for each plot, all in [`MOTION`] and [`ENERGIES`].
 
 use analyze::phase;
 use re_sdk_types::archetypes::{Scalars, SeriesLines};
@@ -235,7 +235,7 @@ fn numbers(low: f64, high: f64) -> (f64, f64, f64) {
 }
 
 /// A plot: where its curves are, and what makes them and the title.
-struct Plot {
+pub struct Plot {
     origin: &'static str,
     make: for<'a> fn(&'a Take) -> Option<(String, Vec<Line<'a>>)>,
     range: Option<(f64, f64)>,
@@ -253,8 +253,8 @@ const NEAR_S: f64 = 5.0;
 /// Values of any size.
 const EVERYWHERE: (f64, f64) = (f64::NEG_INFINITY, f64::INFINITY);
 
-/// The plots, from top to bottom.
-const PLOTS: &[Plot] = &[
+/// Plots of the motion, from top to bottom.
+pub const MOTION: &[Plot] = &[
     Plot {
         origin: "/plots/height",
         make: height,
@@ -287,6 +287,10 @@ const PLOTS: &[Plot] = &[
         ends: EVERYWHERE,
         near_s: None,
     },
+];
+
+/// Plots of the energies, from top to bottom.
+pub const ENERGIES: &[Plot] = &[
     Plot {
         origin: "/plots/energy",
         make: stored,
@@ -305,10 +309,10 @@ const PLOTS: &[Plot] = &[
     },
 ];
 
-/// Draws every plot that has a curve.
-pub fn draw(store: &mut Store<'_>, take: &Take) -> anyhow::Result<Vec<View>> {
+/// Draws every one of `plots` that has a curve.
+pub fn draw(store: &mut Store<'_>, take: &Take, plots: &[Plot]) -> anyhow::Result<Vec<View>> {
     let mut views = Vec::new();
-    for plot in PLOTS {
+    for plot in plots {
         let Some((title, curves)) = (plot.make)(take) else {
             continue;
         };
