@@ -3,6 +3,7 @@
 mod circle;
 mod course;
 pub mod events;
+mod people;
 mod sensors;
 mod series;
 mod space;

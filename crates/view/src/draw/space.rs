@@ -3,18 +3,18 @@
 //! The view's origin is an entity that walks along, so that the camera does and the ground passes by.
 
 use re_sdk_types::archetypes::{
-    Arrows3D, Boxes3D, Capsules3D, Ellipsoids3D, LineStrips3D, Points3D, Transform3D,
-    ViewCoordinates,
+    Arrows3D, Boxes3D, LineStrips3D, Points3D, Transform3D, ViewCoordinates,
 };
 use re_sdk_types::components::FillMode;
 use re_sdk_types::datatypes::Quaternion;
 use recording::load::Load;
 
 use super::course;
+use super::people::{self, APART_M, about_z, f32s};
 use crate::blueprint::View;
 use crate::palette;
 use crate::store::Store;
-use crate::take::{Carriers, Pose, Take, every};
+use crate::take::{Pose, Take, every};
 
 /// How long the trail of the centre of mass is, s.
 const TRAIL_S: f64 = 5.0;
@@ -43,7 +43,7 @@ pub fn draw(store: &mut Store<'_>, take: &Take) -> anyhow::Result<Option<View>> 
     trail(store, pose)?;
     let headings = course::headings(pose);
     if let Some(carriers) = &take.carriers {
-        people(store, take, pose, &course::ways(pose, &headings), carriers)?;
+        people::draw(store, take, pose, &course::ways(pose, &headings), carriers)?;
     }
     let look_m = follow(store, pose, &headings)?;
     let mut eye = eye(&take.shape.handles_m, f64::from(look_m));
@@ -110,10 +110,6 @@ fn eye(handles_m: &[[f64; 3]], look_m: f64) -> [f64; 3] {
     back.map(|x| far_m * x)
 }
 
-fn f32s(v: &[f64; 3]) -> [f32; 3] {
-    v.map(|x| x as f32)
-}
-
 /// The frame that walks along and turns as the path does, at the mean height or, where the body climbs or falls, at its own; gives
 /// where to look in it, m above its origin.
 fn follow(store: &mut Store<'_>, pose: &Pose, headings: &[f64]) -> anyhow::Result<f32> {
@@ -130,12 +126,6 @@ fn follow(store: &mut Store<'_>, pose: &Pose, headings: &[f64]) -> anyhow::Resul
     // Figures that stand on the ground are seen best from about their hips; where none can carry, the body is looked at.
     let level_m = course::level_m(pose).filter(|level_m| level_m.abs() < APART_M);
     Ok(level_m.map_or(0.0, |level_m| 0.78 - level_m as f32))
-}
-
-/// A turn about the vertical.
-fn about_z(angle_rad: &f64) -> Quaternion {
-    let (sin, cos) = (0.5 * angle_rad).sin_cos();
-    Quaternion::from_xyzw([0.0, 0.0, sin as f32, cos as f32])
 }
 
 /// A strip of ground under the whole path, with a line at every metre.
@@ -228,10 +218,10 @@ fn body(
     if let Some(bent) = bent {
         let count = poles.len();
         let strips = bent.iter().zip(&take.force_ns).flat_map(|(places, t)| {
-            let at = moment(pose, *t);
+            let at = pose.moment(*t);
             let middles = poles.iter().map(move |ends| {
                 let [x, y, z] = [0, 1, 2].map(|i| f64::from(0.5 * (ends[0][i] + ends[1][i])));
-                handles_at(&[[x, y, z]], pose, at)[0]
+                pose.places_in_world(at, &[[x, y, z]])[0]
             });
             let handles = &take.shape.handles_m;
             middles
@@ -245,11 +235,6 @@ fn body(
     }
     let strips = poles.into_iter().map(|ends| ends.to_vec());
     store.fixed("/world/rath/poles", &style.with_strips(strips))
-}
-
-/// The pose in force at a time: the last one not after it.
-fn moment(pose: &Pose, t_ns: i64) -> usize {
-    pose.times_ns.partition_point(|p| *p <= t_ns).max(1) - 1
 }
 
 /// A pole that bends by less is drawn straight, m.
@@ -269,7 +254,7 @@ fn bent(take: &Take, pose: &Pose) -> Option<Vec<Vec<[f64; 3]>>> {
     }
     let mut most_m = 0.0f64;
     let places = (0..rows).map(|k| {
-        let mut places = handles_at(handles, pose, moment(pose, take.force_ns[k]));
+        let mut places = pose.places_in_world(pose.moment(take.force_ns[k]), handles);
         for (i, place) in places.iter_mut().enumerate() {
             let z = carriers.points_m[i][k][2] - take.compression_m[i][k];
             if z.is_finite() {
@@ -355,227 +340,6 @@ fn trail(store: &mut Store<'_>, pose: &Pose) -> anyhow::Result<()> {
     store.fixed("/world/trail", &style)
 }
 
-/// Lift of a foot in its swing, m, and half the stride, m: for the eye alone.
-const FOOT_LIFT_M: f64 = 0.10;
-const HALF_STRIDE_M: f64 = 0.27;
-/// The pole lies on one shoulder: the figure stands so far beside it, m.
-const BESIDE_M: f64 = 0.17;
-/// So far from every handle a shoulder carries nothing, m: no figures are drawn then.
-const APART_M: f64 = 2.0;
-/// Shoulder to hip, m.
-const TORSO_M: f64 = 0.52;
-
-/// Figures whose shoulders move as the carriers' points do and whose feet step once per gait cycle.
-fn people(
-    store: &mut Store<'_>,
-    take: &Take,
-    pose: &Pose,
-    ways: &[f64],
-    carriers: &Carriers,
-) -> anyhow::Result<()> {
-    let (rows, count) = (carriers.times_ns.len(), carriers.points_m.len());
-    if rows == 0 || count == 0 || carriers.points_m.iter().any(|p| p.len() != rows) {
-        return Ok(());
-    }
-    // Where a log gives another point of the carriers than the shoulder, the figures are moved by a constant up or down so that their
-    // shoulders are at the handles on average.
-    let mean = |x: &mut dyn Iterator<Item = f64>| {
-        let (sum, n) = x
-            .filter(|x| x.is_finite())
-            .fold((0.0, 0usize), |(s, n), x| (s + x, n + 1));
-        sum / n.max(1) as f64
-    };
-    let handle_m = mean(&mut pose.position_m.iter().map(|p| p[2]))
-        + mean(&mut take.shape.handles_m.iter().map(|h| h[2]));
-    let shoulder_m = mean(&mut carriers.points_m.iter().flatten().map(|p| p[2]));
-    let shift_m = match handle_m - shoulder_m {
-        apart_m if (0.25..APART_M).contains(&apart_m.abs()) => apart_m,
-        _ => 0.0,
-    };
-    let hip_m = (handle_m - TORSO_M).max(0.3);
-
-    // Who has no phase stands.
-    let phase_at: Vec<Vec<f64>> = (0..count)
-        .map(|i| match take.inputs.phase_rad.get(i) {
-            Some(phase) if take.phase_ns == carriers.times_ns => analyze::phase::unwrap(phase),
-            Some(phase) if !take.phase_ns.is_empty() && phase.len() == take.phase_ns.len() => {
-                let s = |t: &[i64]| recording::signal::seconds_since(t, take.start_ns);
-                let unwrapped = analyze::phase::unwrap(phase);
-                analyze::inputs::interpolate(&s(&take.phase_ns), &unwrapped, &s(&carriers.times_ns))
-            }
-            _ => vec![f64::NAN; rows],
-        })
-        .collect();
-    let told: Vec<usize> = (0..rows).step_by(every(rows, count)).collect();
-    let figures: Vec<Figures> = told
-        .iter()
-        .map(|&k| {
-            let at = moment(pose, carriers.times_ns[k]);
-            let handles = handles_at(&take.shape.handles_m, pose, at);
-            let shoulders: Vec<[f64; 3]> = carriers
-                .points_m
-                .iter()
-                .map(|points| {
-                    let [x, y, z] = points[k];
-                    [x, y, z + shift_m]
-                })
-                .collect();
-            let can = |(i, shoulder): (usize, &[f64; 3])| {
-                // His own handle is looked at first.
-                let own = handles.get(i).into_iter();
-                own.chain(&handles).any(|handle| is_near(shoulder, handle))
-            };
-            Figures {
-                shown: handles.is_empty() || shoulders.iter().enumerate().all(can),
-                shoulders,
-                way_rad: ways[at],
-            }
-        })
-        .collect();
-    let times: Vec<i64> = told.iter().map(|k| carriers.times_ns[*k]).collect();
-    let lengths = || figures.iter().map(|f| if f.shown { count } else { 0 });
-    let shown = || told.iter().zip(&figures).filter(|(_, f)| f.shown);
-    let colors: Vec<u32> = (0..count).map(|i| palette::carrier(i).0).collect();
-    let legs = shown().flat_map(|(&k, f)| {
-        let each = f.shoulders.iter().zip(&phase_at);
-        each.map(move |(shoulder, phase)| legs_at(*shoulder, f.way_rad, phase[k]))
-    });
-    let columns = LineStrips3D::new(legs).columns(lengths())?;
-    store.rows("/world/legs", &times, columns)?;
-    let style = LineStrips3D::update_fields()
-        .with_radii([0.055f32])
-        .with_colors(colors.iter().copied());
-    store.fixed("/world/legs", &style)?;
-    let length_m = (handle_m - hip_m - 0.12).max(0.1);
-    if count <= WHOLE_FIGURES {
-        return bodies(store, &times, &figures, length_m);
-    }
-    // A stroke and a dot for each, all in two entities.
-    let parts = |z: f64| {
-        shown().flat_map(move |(_, f)| {
-            let beside = move |shoulder: &[f64; 3]| beside(*shoulder, f.way_rad, 0.0, BESIDE_M, z);
-            f.shoulders.iter().map(beside)
-        })
-    };
-    let torsos = parts(0.02 - TORSO_M)
-        .zip(parts(0.02 - TORSO_M + length_m))
-        .map(|(low, high)| [low, high]);
-    let columns = LineStrips3D::new(torsos).columns(lengths())?;
-    store.rows("/world/torsos", &times, columns)?;
-    let style = LineStrips3D::update_fields()
-        .with_radii([0.13f32])
-        .with_colors(colors.iter().copied());
-    store.fixed("/world/torsos", &style)?;
-    let columns = Points3D::new(parts(0.2)).columns(lengths())?;
-    store.rows("/world/heads", &times, columns)?;
-    let style = Points3D::update_fields()
-        .with_radii([0.11f32])
-        .with_colors(colors);
-    store.fixed("/world/heads", &style)
-}
-
-/// Up to so many figures have bodies and heads of their own shape.
-const WHOLE_FIGURES: usize = 16;
-
-/// All figures at one moment.
-struct Figures {
-    /// Whether they stand where they can carry.
-    shown: bool,
-    shoulders: Vec<[f64; 3]>,
-    way_rad: f64,
-}
-
-/// Torsos and heads, an entity each, that move with their shoulders.
-fn bodies(
-    store: &mut Store<'_>,
-    times: &[i64],
-    figures: &[Figures],
-    length_m: f64,
-) -> anyhow::Result<()> {
-    // They stay as they are: they are said again only where they come or go.
-    let turns: Vec<usize> = (0..figures.len())
-        .filter(|k| *k == 0 || figures[*k].shown != figures[k - 1].shown)
-        .collect();
-    let turn_times: Vec<i64> = turns.iter().map(|k| times[*k]).collect();
-    let lengths = || turns.iter().map(|k| usize::from(figures[*k].shown));
-    let each: usize = lengths().sum();
-    for i in 0..figures.first().map_or(0, |f| f.shoulders.len()) {
-        let path = format!("/world/carrier_{}", i + 1);
-        let columns = Transform3D::update_fields()
-            .with_many_translation(figures.iter().map(|f| f32s(&f.shoulders[i])))
-            .with_many_quaternion(figures.iter().map(|f| about_z(&f.way_rad)))
-            .columns_of_unit_batches()?;
-        store.rows(&path, times, columns)?;
-        let color = palette::carrier(i).0;
-        let torso =
-            Capsules3D::from_lengths_and_radii(vec![length_m as f32; each], vec![0.13f32; each])
-                .with_translations(vec![[0.0f32, BESIDE_M as f32, 0.02 - TORSO_M as f32]; each]);
-        let style = Capsules3D::update_fields()
-            .with_colors([color])
-            .with_fill_mode(FillMode::Solid);
-        let path_of = |part: &str| format!("{path}/{part}");
-        store.rows(&path_of("torso"), &turn_times, torso.columns(lengths())?)?;
-        store.fixed(&path_of("torso"), &style)?;
-        let head = Ellipsoids3D::from_centers_and_half_sizes(
-            vec![[0.0f32, BESIDE_M as f32, 0.2]; each],
-            vec![[0.1f32, 0.09, 0.13]; each],
-        );
-        let style = Ellipsoids3D::update_fields()
-            .with_colors([color])
-            .with_fill_mode(FillMode::Solid);
-        store.rows(&path_of("head"), &turn_times, head.columns(lengths())?)?;
-        store.fixed(&path_of("head"), &style)?;
-    }
-    Ok(())
-}
-
-/// Where the handles are in the world at one moment of the pose.
-fn handles_at(handles_m: &[[f64; 3]], pose: &Pose, at: usize) -> Vec<[f64; 3]> {
-    let place = pose.position_m[at];
-    let turned = handles_m.iter().map(|handle| pose.in_world(at, handle));
-    turned
-        .map(|[x, y, z]| [place[0] + x, place[1] + y, place[2] + z])
-        .collect()
-}
-
-/// Whether a shoulder is near a handle.
-fn is_near(shoulder: &[f64; 3], handle: &[f64; 3]) -> bool {
-    let squares = (0..3).map(|i| (shoulder[i] - handle[i]).powi(2));
-    // What is no number is nowhere in particular.
-    !(squares.sum::<f64>() > APART_M * APART_M)
-}
-
-/// A place beside a shoulder of a figure that faces `way_rad`, m ahead, to the left and above it.
-fn beside(shoulder: [f64; 3], way_rad: f64, ahead: f64, left: f64, above: f64) -> [f32; 3] {
-    let (sin, cos) = way_rad.sin_cos();
-    let [x, y, z] = shoulder;
-    f32s(&[
-        x + ahead * cos - left * sin,
-        y + ahead * sin + left * cos,
-        z + above,
-    ])
-}
-
-/// Foot, hip and foot of a figure that walks towards `way_rad` beside its shoulder's point; without a phase it stands.
-fn legs_at(shoulder: [f64; 3], way_rad: f64, phase_rad: f64) -> Vec<[f32; 3]> {
-    // A gait cycle of the model is one step; the same foot swings every other.
-    let (stride, swing) = match phase_rad.is_finite() {
-        true => (0.5 * phase_rad).sin_cos(),
-        false => (0.0, 0.0),
-    };
-    let at =
-        |ahead: f64, left: f64, z: f64| beside(shoulder, way_rad, ahead, left, z - shoulder[2]);
-    let foot = |side: f64| {
-        at(
-            side * HALF_STRIDE_M * stride,
-            BESIDE_M + side * 0.1,
-            0.04 + FOOT_LIFT_M * (side * swing).max(0.0),
-        )
-    };
-    let hip = at(0.0, BESIDE_M, (shoulder[2] - TORSO_M).max(0.2));
-    vec![foot(1.0), hip, foot(-1.0)]
-}
-
 /// Arrows and handle marks; gives the name of what they are scaled by, and whether any ends before its force does.
 fn forces(
     store: &mut Store<'_>,
@@ -605,7 +369,8 @@ fn forces(
     let mut vectors = Vec::with_capacity(rows * handles);
     let mut origins = Vec::with_capacity(rows * handles);
     for k in told {
-        let straight = || handles_at(&take.shape.handles_m, pose, moment(pose, take.force_ns[k]));
+        let straight =
+            || pose.places_in_world(pose.moment(take.force_ns[k]), &take.shape.handles_m);
         let places = bent.map_or_else(straight, |bent| bent[k].clone());
         for (place, force) in places.iter().zip(normal_n) {
             let load = Load::of(force[k], scale_n, handles);
@@ -649,26 +414,9 @@ fn forces(
 
 #[cfg(test)]
 mod tests {
-    use std::f64::consts::PI;
-
     use super::*;
     use crate::draw::sent;
-
-    #[test]
-    fn legs_step_where_the_figure_walks() {
-        // The middle of a step: the feet are far apart, one ahead and one behind.
-        let [left, hip, right] = legs_at([3.0, 5.0, 1.3], 0.5 * PI, PI)[..] else {
-            panic!("two feet and a hip");
-        };
-        let close = |got: [f32; 3], x: f64, y: f64| {
-            assert!((f64::from(got[0]) - x).abs() < 1e-6, "{got:?}");
-            assert!((f64::from(got[1]) - y).abs() < 1e-6, "{got:?}");
-        };
-        // Towards y: left is towards −x.
-        close(hip, 3.0 - BESIDE_M, 5.0);
-        close(left, 3.0 - BESIDE_M - 0.1, 5.0 + HALF_STRIDE_M);
-        close(right, 3.0 - BESIDE_M + 0.1, 5.0 - HALF_STRIDE_M);
-    }
+    use crate::take::Carriers;
 
     #[test]
     fn an_arrow_ends_within_the_picture_and_the_title_says_so() {
@@ -710,15 +458,6 @@ mod tests {
         };
         assert_eq!(looked_at(-1634.0), 0.0);
         assert!((looked_at(0.8) + 0.02).abs() < 1e-6);
-    }
-
-    #[test]
-    fn who_has_no_phase_stands_on_both_feet() {
-        let [left, _, right] = legs_at([0.0, 0.0, 1.0], 0.0, f64::NAN)[..] else {
-            panic!("two feet and a hip");
-        };
-        assert_eq!([left[0], right[0]], [0.0, 0.0]);
-        assert_eq!([left[2], right[2]], [0.04, 0.04]);
     }
 
     /// Handles at equal distances along parallel poles 0.9 m apart.
