@@ -45,6 +45,12 @@ impl<'a> Line<'a> {
         })
     }
 
+    /// Wide enough to be seen below so many equal curves.
+    fn wider(mut self, above: usize) -> Self {
+        self.width *= 1.0 + above as f32;
+        self
+    }
+
     /// Nothing is drawn through a hole in the times: a value that is none breaks the curve in each.
     fn parted(mut self) -> Self {
         let Some(first_ns) = self.times_ns.first().copied() else {
@@ -407,6 +413,9 @@ fn broken(line: Line<'_>) -> Line<'_> {
     }
 }
 
+/// So many handles' colours are named in the title.
+const FEW_HANDLES: usize = 3;
+
 fn forces(take: &Take) -> Option<(String, Vec<Line<'_>>)> {
     if take.inputs.normal_n.is_empty() {
         return support(take);
@@ -433,17 +442,16 @@ fn forces(take: &Take) -> Option<(String, Vec<Line<'_>>)> {
     }
     for (i, normal_n) in take.inputs.normal_n.iter().enumerate() {
         let (color, _) = palette::carrier(i);
+        let entity = format!("handle_{}", i + 1);
         let name = format!("N_{}/{unit}", i + 1);
-        lines.extend(
-            Line::new(
-                format!("handle_{}", i + 1),
-                name,
-                color,
-                times,
-                share(normal_n),
-            )
-            .map(Line::parted),
-        );
+        let line = Line::new(entity, name, color, times, share(normal_n));
+        // Of few, those that lie below are wider: equal forces would hide each other.
+        let above = if handles <= FEW_HANDLES {
+            handles - 1 - i
+        } else {
+            0
+        };
+        lines.extend(line.map(|line| line.wider(above).parted()));
     }
     let floating = analyze::metrics::FLOAT_SHARE;
     let limit = Line::level(
@@ -456,7 +464,7 @@ fn forces(take: &Take) -> Option<(String, Vec<Line<'_>>)> {
     lines.extend(limit);
     let colours = match handles {
         1 => palette::carrier(0).1.to_owned(),
-        2..=3 => (0..handles)
+        2..=FEW_HANDLES => (0..handles)
             .map(|i| palette::carrier(i).1)
             .collect::<Vec<_>>()
             .join(", "),
@@ -717,8 +725,14 @@ mod tests {
         let value = |entity: &str| lines.iter().find(|l| l.entity == entity).unwrap().values[0];
         assert_eq!(["least", "median", "greatest"].map(value), [0.0, 4.0, 8.0]);
         take.inputs.normal_n.pop();
-        let (_, lines) = forces(&take).unwrap();
-        assert!(lines.iter().any(|l| l.entity == "handle_8"));
+        let width = |take: &Take, entity: &str| {
+            let (_, lines) = forces(take).unwrap();
+            lines.iter().find(|l| l.entity == entity).unwrap().width
+        };
+        assert_eq!(width(&take, "handle_1"), width(&take, "handle_8"));
+        // Equal forces of two: the one below shows on both sides.
+        take.inputs.normal_n.truncate(2);
+        assert!(width(&take, "handle_1") > width(&take, "handle_2"));
     }
 
     #[test]
