@@ -8,10 +8,11 @@ use std::sync::mpsc::{RecvTimeoutError, channel};
 use std::time::{Duration, Instant};
 
 use recording::Finding;
-use recording::read::{ReadError, ReadOptions, Recording, STDIN};
+use recording::read::{ReadError, Recording, STDIN};
 
 use crate::blueprint::{self, Play};
-use crate::load::{Detail, load};
+use crate::draw::events::whole_s;
+use crate::load::{Detail, load, options};
 use crate::store::{Progress, Sink};
 use crate::take::Take;
 
@@ -92,7 +93,7 @@ impl Shown {
     /// Shows what is new while there is more to come. A beginning too short to be read is left for later.
     fn more(&mut self, bytes: &[u8], sink: &mut dyn Sink) -> anyhow::Result<()> {
         self.bytes = bytes.len();
-        let recording = match Recording::from_bytes(bytes.to_vec(), &ReadOptions::default()) {
+        let recording = match Recording::from_bytes(bytes.to_vec(), &options()) {
             Ok(recording) => recording,
             Err(ReadError::Empty { .. }) => return Ok(()),
             // The magic number is 8 bytes long.
@@ -103,15 +104,15 @@ impl Shown {
             return Ok(());
         }
         let (mut take, _) = load(STDIN, &recording, Detail::Whole)?;
-        let settled_s = take.duration_s() - SETTLE_S;
-        take.events.retain(|event| event.t_s <= settled_s);
+        let settled_s = whole_s(take.duration_s() - SETTLE_S);
+        take.events.retain(|event| event.t_s < settled_s);
         // What looks like damage is only what has not come yet.
         take.remarks.clear();
         self.show(&recording, &take, sink)
     }
 
     fn last(mut self, bytes: Vec<u8>, sink: &mut dyn Sink) -> anyhow::Result<(Take, Vec<Finding>)> {
-        let recording = Recording::from_bytes(bytes, &ReadOptions::default())?;
+        let recording = Recording::from_bytes(bytes, &options())?;
         let (take, findings) = load(STDIN, &recording, Detail::Whole)?;
         self.show(&recording, &take, sink)?;
         Ok((take, findings))

@@ -9,9 +9,9 @@ use std::time::Duration;
 use anyhow::{Context, anyhow, bail};
 use clap::Parser;
 use recording::Finding;
-use recording::read::{ReadError, ReadOptions, Recording, STDIN};
+use recording::read::{ReadError, Recording, STDIN};
 use recording::whole::write_whole;
-use view::load::{Detail, load};
+use view::load::{Detail, load, options};
 use view::store::{Encoded, Sink};
 use view::take::Take;
 use view::viewer::{self, Kind};
@@ -104,11 +104,10 @@ fn is_stdin(file: &Path) -> bool {
 /// Opens a recording that is complete.
 fn open(file: &Path) -> anyhow::Result<Recording> {
     if !is_stdin(file) {
-        return Ok(Recording::open(file, &ReadOptions::default())?);
+        return Ok(Recording::open(file, &options())?);
     }
     let mut input = std::io::stdin().lock();
-    let options = ReadOptions::default();
-    Ok(Recording::from_stream(&mut input, STDIN, &options)?)
+    Ok(Recording::from_stream(&mut input, STDIN, &options())?)
 }
 
 /// Name for people: the file's, without folders.
@@ -150,7 +149,7 @@ fn input(file: &Path) -> anyhow::Result<Input> {
             .take(MAGIC_BYTES)
             .read_to_end(&mut begin)
             .with_context(|| format!("{STDIN}: cannot be read"))?;
-        match Recording::from_bytes(begin.clone(), &ReadOptions::default()) {
+        match Recording::from_bytes(begin.clone(), &options()) {
             Err(error @ ReadError::NotMcap { .. }) => return Err(error.into()),
             Err(error) if begin.is_empty() => return Err(error.into()),
             _ => {}

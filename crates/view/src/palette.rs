@@ -36,9 +36,12 @@ pub const DEEP: u32 = 0x4C8BD9_FF;
 /// Grey.
 pub const GREY: u32 = 0xBBBBBB_FF;
 
-/// A carrier's colour and its name; they repeat after eight.
+/// So many carriers have colours of their own.
+pub const CARRIERS: usize = 8;
+
+/// A carrier's colour and its name; they repeat after [`CARRIERS`].
 pub fn carrier(number: usize) -> (u32, &'static str) {
-    const CARRIERS: [(u32, &str); 8] = [
+    const COLORS: [(u32, &str); CARRIERS] = [
         (BLUE, "blue"),
         (ORANGE, "orange"),
         (PURPLE, "purple"),
@@ -48,7 +51,7 @@ pub fn carrier(number: usize) -> (u32, &'static str) {
         (DEEP, "deep blue"),
         (GREY, "grey"),
     ];
-    CARRIERS[number % CARRIERS.len()]
+    COLORS[number % CARRIERS]
 }
 
 /// A handle by what it carries.

@@ -79,6 +79,20 @@ impl Pose {
         let twice = cross(u, once);
         [0, 1, 2].map(|i| v[i] + 2.0 * (w * once[i] + twice[i]))
     }
+
+    /// The sample in force at a time: the last one not after it.
+    pub fn moment(&self, t_ns: i64) -> usize {
+        self.times_ns.partition_point(|p| *p <= t_ns).max(1) - 1
+    }
+
+    /// Places in the body's coordinates, m, in the world at sample `k`.
+    pub fn places_in_world(&self, k: usize, places_m: &[[f64; 3]]) -> Vec<[f64; 3]> {
+        let place = self.position_m[k];
+        let turned = places_m.iter().map(|v| self.in_world(k, v));
+        turned
+            .map(|[x, y, z]| [place[0] + x, place[1] + y, place[2] + z])
+            .collect()
+    }
 }
 
 /// The carriers' points over time.
@@ -153,6 +167,14 @@ pub struct Topic {
     pub name: String,
     /// Curves by unit: those of one unit share a plot.
     pub plots: Vec<(String, Vec<Curve>)>,
+}
+
+/// Carriers times moments that are drawn one by one: what a viewer loads within seconds.
+const MOST_PLACES: usize = 500_000;
+
+/// Of `rows` moments every so many are drawn where each has `count` carriers.
+pub fn every(rows: usize, count: usize) -> usize {
+    rows.saturating_mul(count).div_ceil(MOST_PLACES).max(1)
 }
 
 impl Take {

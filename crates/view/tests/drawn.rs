@@ -4,10 +4,10 @@ mod common;
 
 use common::{ROWS, imus, imus_logged, run, run_logged, taken};
 use recording::cdr::Imu;
-use recording::read::{ReadOptions, Recording};
+use recording::read::Recording;
 use recording::topics::MessageKind;
 use recording::write::{RawChannel, RecordingWriter, WriterOptions};
-use view::load::{Detail, load};
+use view::load::{Detail, load, options};
 
 #[test]
 fn a_run_of_two_shows_everything() {
@@ -83,23 +83,25 @@ fn a_run_of_two_shows_everything() {
 #[test]
 fn there_may_be_any_number_of_carriers() {
     let folder = tempfile::tempdir().unwrap();
-    for carriers in [1, 3, 8, 17] {
+    // Of more than there are colours, and of more than the reader takes of others' lists.
+    for carriers in [1, 3, 8, 17, 70] {
         let path = folder.path().join("run.mcap");
         run(&path, carriers);
         let (sent, _) = taken(&path);
         let rows = sent.rows();
+        let has = |entity: &str| match rows.get(entity) {
+            None => false,
+            Some(&count) => count == ROWS,
+        };
+        let crowd = carriers > 8;
         for i in 1..=carriers {
-            assert_eq!(
-                rows.get(&format!("/plots/forces/handle_{i}")),
-                Some(&ROWS),
-                "{carriers}: {i}"
-            );
-            assert_eq!(
-                rows.get(&format!("/world/carrier_{i}")),
-                Some(&ROWS),
-                "{carriers}: {i}"
-            );
+            assert_eq!(has(&format!("/plots/forces/handle_{i}")), !crowd);
+            assert_eq!(has(&format!("/world/carrier_{i}")), !crowd);
         }
+        for entity in ["plots/forces/median", "world/torsos", "world/heads"] {
+            assert_eq!(has(&format!("/{entity}")), crowd, "{carriers}: {entity}");
+        }
+        assert!(has("/world/legs"), "{carriers}");
         assert!(!rows.contains_key(&format!("/world/carrier_{}", carriers + 1)));
     }
 }
@@ -166,7 +168,7 @@ fn a_sensor_of_one_moment_is_no_sensor() {
         let drawn = sent.rows();
         let curve = drawn.iter().find(|(e, _)| e.starts_with("/topics/imu/s0/"));
         assert_eq!(curve, None, "{drawn:?}");
-        let recording = Recording::open(&path, &ReadOptions::default()).unwrap();
+        let recording = Recording::open(&path, &options()).unwrap();
         let (take, _) = load("imu", &recording, Detail::Thinned).unwrap();
         let said = |note: &String| note.contains("/imu/s0: all 300 messages are of one moment");
         assert_eq!(
@@ -303,7 +305,7 @@ fn values_that_are_none_are_counted() {
             .unwrap();
     }
     writer.finish().unwrap();
-    let recording = Recording::open(&path, &ReadOptions::default()).unwrap();
+    let recording = Recording::open(&path, &options()).unwrap();
     let (take, _) = load("arm", &recording, Detail::Thinned).unwrap();
     let expected = (
         Some(3.0),

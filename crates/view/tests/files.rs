@@ -4,8 +4,8 @@ mod common;
 
 use std::process::Command;
 
-use recording::read::{ReadOptions, Recording};
-use view::load::{Detail, load};
+use recording::read::Recording;
+use view::load::{Detail, load, options};
 use view::store::Encoded;
 
 use common::{ROWS, Taken, imus, rerun, run, taken, view};
@@ -16,7 +16,7 @@ fn the_same_recording_gives_the_same_bytes() {
     let mcap = folder.path().join("run.mcap");
     run(&mcap, 2);
     let bytes = || {
-        let recording = Recording::open(&mcap, &ReadOptions::default()).unwrap();
+        let recording = Recording::open(&mcap, &options()).unwrap();
         let (take, _) = load("run", &recording, Detail::Thinned).unwrap();
         let mut encoded = Encoded::stream(Vec::new()).unwrap();
         view::send(&mut encoded, "id", &take).unwrap();

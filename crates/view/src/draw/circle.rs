@@ -9,7 +9,7 @@ use re_sdk_types::components::Radius;
 use crate::blueprint::View;
 use crate::palette;
 use crate::store::Store;
-use crate::take::Take;
+use crate::take::{Take, every};
 
 /// Radius at which the beat runs.
 const BEAT_RADIUS: f64 = 1.13;
@@ -39,14 +39,17 @@ pub fn draw(store: &mut Store<'_>, take: &Take) -> anyhow::Result<Option<View>> 
         .with_colors([palette::AXIS, palette::GRID, palette::GRID]);
     store.fixed("/phases/circle", &lines)?;
 
-    let mut points: Vec<[f32; 2]> = Vec::with_capacity(rows * carriers);
+    let told = every(rows, carriers);
+    let mut points: Vec<[f32; 2]> = Vec::new();
     let mut resultants: Vec<[f32; 2]> = Vec::with_capacity(rows);
     for k in 0..rows {
         let mut sum = [0.0f64; 2];
         for phase in phases {
             let place = on_circle(phase[k], 1.0);
             sum = [sum[0] + f64::from(place[0]), sum[1] + f64::from(place[1])];
-            points.push(place);
+            if k % told == 0 {
+                points.push(place);
+            }
         }
         resultants.push(sum.map(|x| (x / carriers as f64) as f32));
     }
@@ -58,8 +61,9 @@ pub fn draw(store: &mut Store<'_>, take: &Take) -> anyhow::Result<Option<View>> 
         .with_colors([palette::WHITE]);
     store.fixed("/phases/order", &arrow)?;
 
-    let columns = Points2D::new(points).columns(std::iter::repeat_n(carriers, rows))?;
-    store.rows("/phases/carriers", &take.phase_ns, columns)?;
+    let times: Vec<i64> = take.phase_ns.iter().copied().step_by(told).collect();
+    let columns = Points2D::new(points).columns(std::iter::repeat_n(carriers, times.len()))?;
+    store.rows("/phases/carriers", &times, columns)?;
     let style = Points2D::update_fields()
         .with_radii([0.075f32])
         .with_colors((0..carriers).map(|i| palette::carrier(i).0));

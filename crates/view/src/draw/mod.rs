@@ -2,7 +2,8 @@
 
 mod circle;
 mod course;
-mod events;
+pub mod events;
+mod people;
 mod sensors;
 mod series;
 mod space;
@@ -18,15 +19,18 @@ pub fn all(store: &mut Store<'_>, take: &Take) -> anyhow::Result<Node> {
     let space = space::draw(store, take)?;
     let circle = circle::draw(store, take)?;
     let spectra = spectra::draw(store, take)?;
-    let plots = series::draw(store, take)?;
+    let plots = series::draw(store, take, series::MOTION)?;
+    let energies = series::draw(store, take, series::ENERGIES)?;
     let log = events::draw(store, take)?;
     let page = summary::draw(store, take)?;
     let sensors = sensors::draw(store, take)?;
     Ok(layout(
         Scene {
             space,
-            small: [circle, spectra].into_iter().flatten().collect(),
+            circle,
+            spectra,
             plots,
+            energies,
         },
         log,
         page,
@@ -37,8 +41,18 @@ pub fn all(store: &mut Store<'_>, take: &Take) -> anyhow::Result<Node> {
 /// What is known of the thing carried.
 struct Scene {
     space: Option<View>,
-    small: Vec<View>,
+    circle: Option<View>,
+    spectra: Option<View>,
     plots: Vec<View>,
+    energies: Vec<View>,
+}
+
+impl Scene {
+    /// Whether there is anything but the scene in space.
+    fn has_any(&self) -> bool {
+        let drawings = self.circle.is_some() || self.spectra.is_some();
+        drawings || !self.plots.is_empty() || !self.energies.is_empty()
+    }
 }
 
 /// The overview first, then a tab for every sensor and for topics of other kinds. Without anything to overview, the first of those
@@ -51,12 +65,13 @@ fn layout(scene: Scene, log: Option<View>, page: View, mut panels: Vec<Panel>) -
     let mut tabs: Vec<Node> = Vec::new();
     if scene.space.is_some() {
         tabs.extend(around(scene, words));
-    } else if !scene.plots.is_empty() || !scene.small.is_empty() {
+    } else if scene.has_any() {
         // What was measured stands before what was estimated from it.
         let measured = panels.first().filter(|panel| panel.is_sensor);
         let mut plots: Vec<View> = measured.map_or(Vec::new(), |panel| panel.plots.clone());
-        plots.extend(scene.plots);
-        tabs.push(side_by_side(plots, scene.small, words));
+        plots.extend(scene.plots.into_iter().chain(scene.energies));
+        let small = scene.circle.into_iter().chain(scene.spectra).collect();
+        tabs.push(side_by_side(plots, small, words));
     } else if panels.is_empty() {
         return words;
     } else {
@@ -73,30 +88,20 @@ fn layout(scene: Scene, log: Option<View>, page: View, mut panels: Vec<Panel>) -
 /// themselves: of more plots in a column the axes could not be read.
 fn around(scene: Scene, words: Node) -> Vec<Node> {
     let mut small: Vec<(f32, Node)> = Vec::new();
-    for view in scene.small {
-        // A spectrum is wider than the circle.
-        let share = if view.title().starts_with("Phases") {
-            1.0
-        } else {
-            1.45
-        };
-        small.push((share, view.into()));
-    }
+    small.extend(scene.circle.map(|view| (1.0, view.into())));
+    // A spectrum is wider than the circle.
+    small.extend(scene.spectra.map(|view| (1.45, view.into())));
     small.push((1.3, words));
     let mut left: Vec<(f32, Node)> = Vec::new();
     left.extend(scene.space.map(|view| (3.0, view.into())));
     left.push((2.0, Node::Row(small)));
-    let (energies, plots): (Vec<View>, Vec<View>) = scene
-        .plots
-        .into_iter()
-        .partition(|view| view.title().contains("nergy"));
     let mut columns = vec![(5.0, Node::Column(left))];
-    if !plots.is_empty() {
-        columns.push((4.0, Node::Column(even(plots))));
+    if !scene.plots.is_empty() {
+        columns.push((4.0, Node::Column(even(scene.plots))));
     }
     let mut tabs = vec![named("Overview", Node::Row(columns))];
-    if !energies.is_empty() {
-        tabs.push(named("Energy", Node::Column(even(energies))));
+    if !scene.energies.is_empty() {
+        tabs.push(named("Energy", Node::Column(even(scene.energies))));
     }
     tabs
 }

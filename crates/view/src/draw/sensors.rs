@@ -167,8 +167,10 @@ fn gait_line(spectra: &[Spectrum]) -> Option<f64> {
 
 fn topic(store: &mut Store<'_>, topic: &take::Topic, growing: bool) -> anyhow::Result<Panel> {
     let mut plots = Vec::new();
-    for (unit, curves) in &topic.plots {
+    for (k, (unit, curves)) in topic.plots.iter().enumerate() {
         let path = match unit.as_str() {
+            // Of several without a unit, each has a place of its own.
+            "" if k > 0 => format!("{}/{}", place(&topic.name), k + 1),
             "" => place(&topic.name),
             unit => format!(
                 "{}/{}",

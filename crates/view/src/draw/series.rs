@@ -1,4 +1,4 @@
-//! Curves over time: height, roll and tilt, forces, order parameter, energy. One function for each plot, all in [`PLOTS`].
+//! Curves over time: height, roll and tilt, forces, order parameter, energy. One function for each plot, all in [`MOTION`] and [`ENERGIES`].
 
 use analyze::phase;
 use re_sdk_types::archetypes::{Scalars, SeriesLines};
@@ -43,6 +43,12 @@ impl<'a> Line<'a> {
             times_ns: times_ns.into(),
             values,
         })
+    }
+
+    /// Wide enough to be seen below so many equal curves.
+    fn wider(mut self, above: usize) -> Self {
+        self.width *= 1.0 + above as f32;
+        self
     }
 
     /// Nothing is drawn through a hole in the times: a value that is none breaks the curve in each.
@@ -104,7 +110,8 @@ pub fn lines(store: &mut Store<'_>, origin: &str, lines: Vec<Line<'_>>) -> anyho
     Ok(())
 }
 
-/// Sends the curves of a plot and gives its view. `range` is that of the values to begin with, where the viewer shall not choose.
+/// Sends the curves of a plot and gives its view. `range` is that of the values to begin with, where the viewer shall not choose; the
+/// title says what lies beyond it.
 pub fn plot(
     store: &mut Store<'_>,
     title: String,
@@ -112,12 +119,67 @@ pub fn plot(
     curves: Vec<Line<'_>>,
     range: Option<(f64, f64)>,
 ) -> anyhow::Result<View> {
+    let ends = ends(&curves);
     lines(store, origin, curves)?;
-    let view = View::plot(title, origin);
-    Ok(match range {
-        Some((low, high)) => view.range(low, high),
-        None => view,
-    })
+    let Some((low, high)) = range else {
+        return Ok(View::plot(title, origin));
+    };
+    let off = ends.map_or(String::new(), |(least, greatest)| {
+        let mut off = String::new();
+        if least < low {
+            off += &format!("; down to {}", short(least));
+        }
+        if greatest > high {
+            off += &format!("; up to {}", short(greatest));
+        }
+        off
+    });
+    Ok(View::plot(title + &off, origin).range(low, high))
+}
+
+/// A number in three digits.
+fn short(x: f64) -> String {
+    let digits = (2.0 - x.abs().log10().floor()).clamp(0.0, 6.0);
+    format!("{x:.*}", digits as usize)
+}
+
+/// The least and the greatest value.
+fn ends(curves: &[Line<'_>]) -> Option<(f64, f64)> {
+    let values = curves.iter().flat_map(|line| line.values.iter());
+    let (low, high) = values
+        .filter(|x| x.is_finite())
+        .fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), x| {
+            (l.min(*x), h.max(*x))
+        });
+    (low <= high).then_some((low, high))
+}
+
+/// So many of the values at either end, as a share, may be off the axis.
+const FEW: f64 = 0.005;
+/// That they are only where they would stretch the axis so many times.
+const STRETCHED: f64 = 2.0;
+/// Fewer values have no few.
+const MANY: usize = 400;
+
+/// The ends of the values without the few that would leave the others a sliver of the axis; half as much room again is left about these.
+fn bulk(curves: &[Line<'_>], (low, high): (f64, f64)) -> (f64, f64) {
+    let values = curves.iter().flat_map(|line| line.values.iter().copied());
+    let mut values: Vec<f64> = values.filter(|x| x.is_finite()).collect();
+    if values.len() < MANY {
+        return (low, high);
+    }
+    let few = (FEW * values.len() as f64) as usize;
+    let last = values.len() - 1 - few;
+    let from = *values.select_nth_unstable_by(few, f64::total_cmp).1;
+    let to = *values.select_nth_unstable_by(last, f64::total_cmp).1;
+    let room = 0.25 * (to - from);
+    let kept = (low.max(from - room), high.min(to + room));
+    // What is level but for a few pulses is about these.
+    let level = to - from <= 1e-6 * from.abs().max(to.abs());
+    if level || high - low < STRETCHED * (kept.1 - kept.0) {
+        return (low, high);
+    }
+    kept
 }
 
 /// Room above and below the values, as a share of their range; less where numbers need it.
@@ -127,22 +189,15 @@ const MOST_NUMBERS: f64 = 7.5;
 /// A number that is written whole stands so far from the end of the axis, as a share of it.
 const WHOLE: f64 = 0.045;
 
-/// All values with a little room, and two numbers on the axis. `None` where there is nothing to choose, or where more values may come.
+/// All values but a few far ones, with a little room, and two numbers on the axis. `None` where there is nothing to choose, or where more values may come.
 pub fn spread(curves: &[Line<'_>], growing: bool) -> Option<(f64, f64)> {
     spread_over(curves, growing, 0.0)
 }
 
 /// The same over no less than `least`: what differs by less is level.
 fn spread_over(curves: &[Line<'_>], growing: bool, least: f64) -> Option<(f64, f64)> {
-    let values = curves.iter().flat_map(|line| line.values.iter());
-    let (low, high) = values
-        .filter(|x| x.is_finite())
-        .fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), x| {
-            (l.min(*x), h.max(*x))
-        });
-    if growing || !(low < high) {
-        return None;
-    }
+    let all = ends(curves).filter(|(low, high)| !growing && low < high)?;
+    let (low, high) = bulk(curves, all);
     // The viewer's numbers have few digits: less than a millionth of the value would be none of them.
     let least = least.max(1e-6 * low.abs().max(high.abs()));
     let more = 0.5 * (least - (high - low)).max(0.0);
@@ -186,7 +241,7 @@ fn numbers(low: f64, high: f64) -> (f64, f64, f64) {
 }
 
 /// A plot: where its curves are, and what makes them and the title.
-struct Plot {
+pub struct Plot {
     origin: &'static str,
     make: for<'a> fn(&'a Take) -> Option<(String, Vec<Line<'a>>)>,
     range: Option<(f64, f64)>,
@@ -204,8 +259,8 @@ const NEAR_S: f64 = 5.0;
 /// Values of any size.
 const EVERYWHERE: (f64, f64) = (f64::NEG_INFINITY, f64::INFINITY);
 
-/// The plots, from top to bottom.
-const PLOTS: &[Plot] = &[
+/// Plots of the motion, from top to bottom.
+pub const MOTION: &[Plot] = &[
     Plot {
         origin: "/plots/height",
         make: height,
@@ -238,6 +293,10 @@ const PLOTS: &[Plot] = &[
         ends: EVERYWHERE,
         near_s: None,
     },
+];
+
+/// Plots of the energies, from top to bottom.
+pub const ENERGIES: &[Plot] = &[
     Plot {
         origin: "/plots/energy",
         make: stored,
@@ -256,10 +315,10 @@ const PLOTS: &[Plot] = &[
     },
 ];
 
-/// Draws every plot that has a curve.
-pub fn draw(store: &mut Store<'_>, take: &Take) -> anyhow::Result<Vec<View>> {
+/// Draws every one of `plots` that has a curve.
+pub fn draw(store: &mut Store<'_>, take: &Take, plots: &[Plot]) -> anyhow::Result<Vec<View>> {
     let mut views = Vec::new();
-    for plot in PLOTS {
+    for plot in plots {
         let Some((title, curves)) = (plot.make)(take) else {
             continue;
         };
@@ -354,6 +413,9 @@ fn broken(line: Line<'_>) -> Line<'_> {
     }
 }
 
+/// So many handles' colours are named in the title.
+const FEW_HANDLES: usize = 3;
+
 fn forces(take: &Take) -> Option<(String, Vec<Line<'_>>)> {
     if take.inputs.normal_n.is_empty() {
         return support(take);
@@ -375,19 +437,21 @@ fn forces(take: &Take) -> Option<(String, Vec<Line<'_>>)> {
         .map(Line::parted),
     );
     let handles = take.inputs.normal_n.len();
+    if handles > palette::CARRIERS {
+        return Some(crowd(take, scale_n, unit, lines));
+    }
     for (i, normal_n) in take.inputs.normal_n.iter().enumerate() {
         let (color, _) = palette::carrier(i);
+        let entity = format!("handle_{}", i + 1);
         let name = format!("N_{}/{unit}", i + 1);
-        lines.extend(
-            Line::new(
-                format!("handle_{}", i + 1),
-                name,
-                color,
-                times,
-                share(normal_n),
-            )
-            .map(Line::parted),
-        );
+        let line = Line::new(entity, name, color, times, share(normal_n));
+        // Of few, those that lie below are wider: equal forces would hide each other.
+        let above = if handles <= FEW_HANDLES {
+            handles - 1 - i
+        } else {
+            0
+        };
+        lines.extend(line.map(|line| line.wider(above).parted()));
     }
     let floating = analyze::metrics::FLOAT_SHARE;
     let limit = Line::level(
@@ -400,7 +464,7 @@ fn forces(take: &Take) -> Option<(String, Vec<Line<'_>>)> {
     lines.extend(limit);
     let colours = match handles {
         1 => palette::carrier(0).1.to_owned(),
-        2..=3 => (0..handles)
+        2..=FEW_HANDLES => (0..handles)
             .map(|i| palette::carrier(i).1)
             .collect::<Vec<_>>()
             .join(", "),
@@ -410,6 +474,47 @@ fn forces(take: &Take) -> Option<(String, Vec<Line<'_>>)> {
         "Support/{unit}, now ± {NEAR_S} s: N_tot (white), N_i ({colours}), {floating} (vermilion)"
     );
     Some((title, lines))
+}
+
+/// More handles than there are colours: the least, the median and the greatest force at every moment, as multiples of a fair share.
+fn crowd<'a>(
+    take: &'a Take,
+    scale_n: f64,
+    unit: &str,
+    mut lines: Vec<Line<'a>>,
+) -> (String, Vec<Line<'a>>) {
+    let handles = take.inputs.normal_n.len();
+    let fair_n = scale_n / handles as f64;
+    let rows = take.force_ns.len();
+    let mut found = [(); 3].map(|()| Vec::with_capacity(rows));
+    let mut shares: Vec<f64> = Vec::with_capacity(handles);
+    for k in 0..rows {
+        shares.clear();
+        let now = take.inputs.normal_n.iter().filter_map(|n| n.get(k));
+        shares.extend(now.filter(|n| n.is_finite()).map(|n| n / fair_n));
+        shares.sort_unstable_by(f64::total_cmp);
+        let at = |share: f64| {
+            let last = shares.len().checked_sub(1)?;
+            shares.get((share * last as f64).round() as usize).copied()
+        };
+        for (values, share) in found.iter_mut().zip([0.0, 0.5, 1.0]) {
+            values.push(at(share).unwrap_or(f64::NAN));
+        }
+    }
+    let kinds = [
+        ("least", palette::ORANGE),
+        ("median", palette::BLUE),
+        ("greatest", palette::ORANGE),
+    ];
+    for ((entity, color), values) in kinds.into_iter().zip(found) {
+        let name = format!("{entity} N_i·{handles}/{unit}");
+        let line = Line::new(entity, name, color, &take.force_ns, values);
+        lines.extend(line.map(Line::parted));
+    }
+    let title = format!(
+        "N_tot/{unit} (white), now ± {NEAR_S} s; N_i·{handles}/{unit}: median (blue), least and greatest (orange)"
+    );
+    (title, lines)
 }
 
 /// The support where it is measured as such.
@@ -573,6 +678,61 @@ mod tests {
         }
         let flat = Line::new("x", "x", 0, &[0, 1], vec![1.0, 1.0]).unwrap();
         assert_eq!(spread(&[flat], false), None);
+    }
+
+    #[test]
+    fn a_few_far_values_do_not_stretch_an_axis_and_are_named() {
+        let times: Vec<i64> = (0..2000).collect();
+        let wave = |k: i64| (0.3 * k as f64).sin();
+        let drawn = |far: &dyn Fn(i64) -> Option<f64>| {
+            let values: Vec<f64> = (times.iter())
+                .map(|k| far(*k).unwrap_or_else(|| wave(*k)))
+                .collect();
+            let line = Line::new("x", "x", 0, &times, values).unwrap();
+            let range = spread(std::slice::from_ref(&line), false).unwrap();
+            let mut title = String::new();
+            crate::draw::sent::by(|store| {
+                let view = plot(store, "x".into(), "/x", vec![line], Some(range)).unwrap();
+                title = view.title().to_owned();
+            });
+            (range, title)
+        };
+        let ((low, high), title) = drawn(&|k| (k < 5).then_some(40.0));
+        assert!(low < -1.0 && high > 1.0 && high - low < 4.0, "{low} {high}");
+        assert_eq!(title, "x; up to 40.0");
+        // A twentieth of all is not few, and twice as far is not far.
+        for far in [
+            &(|k: i64| (k < 100).then_some(40.0)) as &dyn Fn(i64) -> Option<f64>,
+            &|k| (k < 5).then_some(3.0),
+        ] {
+            let ((_, high), title) = drawn(far);
+            assert!(high > 3.0, "{high}");
+            assert_eq!(title, "x");
+        }
+    }
+
+    #[test]
+    fn of_a_crowd_the_least_the_median_and_the_greatest_are_drawn() {
+        let mut take = Take {
+            force_ns: vec![0, 1],
+            ..Take::default()
+        };
+        take.inputs.mass_kg = Some(9.0);
+        take.inputs.gravity_m_per_s2 = 1.0;
+        take.inputs.normal_n = (0..9).map(|i| vec![f64::from(i); 2]).collect();
+        let (title, lines) = forces(&take).unwrap();
+        assert!(title.contains("N_i·9/Mg"), "{title}");
+        let value = |entity: &str| lines.iter().find(|l| l.entity == entity).unwrap().values[0];
+        assert_eq!(["least", "median", "greatest"].map(value), [0.0, 4.0, 8.0]);
+        take.inputs.normal_n.pop();
+        let width = |take: &Take, entity: &str| {
+            let (_, lines) = forces(take).unwrap();
+            lines.iter().find(|l| l.entity == entity).unwrap().width
+        };
+        assert_eq!(width(&take, "handle_1"), width(&take, "handle_8"));
+        // Equal forces of two: the one below shows on both sides.
+        take.inputs.normal_n.truncate(2);
+        assert!(width(&take, "handle_1") > width(&take, "handle_2"));
     }
 
     #[test]

@@ -3,23 +3,27 @@
 //! The view's origin is an entity that walks along, so that the camera does and the ground passes by.
 
 use re_sdk_types::archetypes::{
-    Arrows3D, Boxes3D, Capsules3D, Ellipsoids3D, LineStrips3D, Points3D, Transform3D,
-    ViewCoordinates,
+    Arrows3D, Boxes3D, LineStrips3D, Points3D, Transform3D, ViewCoordinates,
 };
 use re_sdk_types::components::FillMode;
 use re_sdk_types::datatypes::Quaternion;
 use recording::load::Load;
 
 use super::course;
+use super::people::{self, APART_M, about_z, f32s};
 use crate::blueprint::View;
 use crate::palette;
 use crate::store::Store;
-use crate::take::{Carriers, Pose, Take};
+use crate::take::{Pose, Take, every};
 
 /// How long the trail of the centre of mass is, s.
 const TRAIL_S: f64 = 5.0;
-/// Length of the arrow of a handle that carries its fair share M·g/N, m.
+/// Length of the arrow of a handle that carries its fair share M·g/N, m, seen from [`NEAR_M`].
 const FAIR_SHARE_M: f64 = 0.5;
+/// More fair shares than these would leave the picture: the arrow ends there, white.
+const MOST_SHARES: f64 = 5.0;
+/// From much farther away arrows are twice as long, m.
+const NEAR_M: f64 = 5.0;
 /// Reach of the ground beyond the path, m.
 const MARGIN_M: f32 = 7.0;
 /// Half the width of the ground, m.
@@ -39,26 +43,27 @@ pub fn draw(store: &mut Store<'_>, take: &Take) -> anyhow::Result<Option<View>> 
     trail(store, pose)?;
     let headings = course::headings(pose);
     if let Some(carriers) = &take.carriers {
-        people(store, take, pose, &course::ways(pose, &headings), carriers)?;
+        people::draw(store, take, pose, &course::ways(pose, &headings), carriers)?;
     }
-    let forces = forces(store, take, pose, bent.as_deref())?;
     let look_m = follow(store, pose, &headings)?;
-
-    // Far enough to see the longest pole whole, a little from above and ahead.
-    let reach_m = take
-        .shape
-        .handles_m
-        .iter()
-        .map(|h| h[0].abs().max(1.4 * h[1].abs()))
-        .fold(1.2, f64::max) as f32;
+    let mut eye = eye(&take.shape.handles_m, f64::from(look_m));
     // What falls turns as it likes: its pole has to fit in upright too.
-    let back = course::level_m(pose).map_or(1.6, |_| 1.0);
-    let eye = [0.5 * reach_m, -1.2 * reach_m - 0.6, 0.22 * reach_m + 0.4].map(|x| back * x);
+    if course::level_m(pose).is_none() {
+        eye = eye.map(|x| 1.6 * x);
+    }
+    let far = eye.iter().map(|x| x * x).sum::<f64>().sqrt() / NEAR_M;
+    let share_m = FAIR_SHARE_M * far.sqrt().round().clamp(1.0, 2.0);
+    let forces = forces(store, take, pose, bent.as_deref(), share_m)?;
     let target = [0.0, 0.0, look_m];
+    let eye = [0, 1, 2].map(|i| eye[i] as f32 + target[i]);
     let title = match forces {
-        Some(unit) => format!(
-            "Scene: {FAIR_SHARE_M} m of arrow = {unit}/{}; blue loaded, yellow nearly unloaded, vermilion slack",
-            take.inputs.normal_n.len()
+        Some((unit, any_beyond)) => format!(
+            "Scene: {share_m} m of arrow = {unit}/{}; blue loaded, yellow nearly unloaded, vermilion slack{}",
+            take.inputs.normal_n.len(),
+            match any_beyond {
+                true => format!(", white > {} m", MOST_SHARES * share_m),
+                false => String::new(),
+            }
         ),
         None => "Scene".to_owned(),
     };
@@ -68,8 +73,41 @@ pub fn draw(store: &mut Store<'_>, take: &Take) -> anyhow::Result<Option<View>> 
     Ok(Some(view))
 }
 
-fn f32s(v: &[f64; 3]) -> [f32; 3] {
-    v.map(|x| x as f32)
+/// Tangents of half the angles that the camera sees, sideways and upwards: the viewer's 55 degrees of height, in a view about twice as
+/// wide as high, less a margin.
+const SEEN: [f64; 2] = [0.87, 0.45];
+/// What stands above a handle has to be seen so far, m: a head, an arrow.
+const ABOVE_M: f64 = 0.6;
+/// And so far below it, m: feet.
+const BELOW_M: f64 = 1.0;
+
+/// From where all handles and those under them are seen, a little from above and ahead, relative to the place looked at, `look_m` above
+/// the frame's origin.
+fn eye(handles_m: &[[f64; 3]], look_m: f64) -> [f64; 3] {
+    let reach_m = handles_m
+        .iter()
+        .map(|h| h[0].abs().max(1.4 * h[1].abs()))
+        .fold(1.2, f64::max);
+    // Of many, those in front would hide the others.
+    let up = 0.22 * reach_m + 0.4 + 0.4 * (reach_m - 4.0).max(0.0);
+    let eye = [0.5 * reach_m, -1.2 * reach_m - 0.6, up];
+    let length = eye.iter().map(|x| x * x).sum::<f64>().sqrt();
+    let back = eye.map(|x| x / length);
+    let level = back[0].hypot(back[1]);
+    let right = [-back[1] / level, back[0] / level, 0.0];
+    let upward = [-back[2] * right[1], back[2] * right[0], level];
+    let dot = |a: &[f64; 3], b: &[f64; 3]| (0..3).map(|i| a[i] * b[i]).sum::<f64>();
+    let ends = handles_m.iter().flat_map(|&[x, y, z]| {
+        let x = x + 0.3f64.copysign(x);
+        [z + ABOVE_M, z - BELOW_M].map(|z| [x, y, z - look_m])
+    });
+    let far_m = ends
+        .map(|p| {
+            let across = [&right, &upward].map(|axis| dot(&p, axis).abs());
+            dot(&p, &back) + (across[0] / SEEN[0]).max(across[1] / SEEN[1])
+        })
+        .fold(length, f64::max);
+    back.map(|x| far_m * x)
 }
 
 /// The frame that walks along and turns as the path does, at the mean height or, where the body climbs or falls, at its own; gives
@@ -85,14 +123,9 @@ fn follow(store: &mut Store<'_>, pose: &Pose, headings: &[f64]) -> anyhow::Resul
         .with_many_quaternion(headings.iter().map(about_z))
         .columns_of_unit_batches()?;
     store.rows("/world/follow", &pose.times_ns, columns)?;
-    // Figures that stand on the ground are seen best from about their hips.
-    Ok(course::level_m(pose).map_or(0.0, |level_m| 0.78 - level_m as f32))
-}
-
-/// A turn about the vertical.
-fn about_z(angle_rad: &f64) -> Quaternion {
-    let (sin, cos) = (0.5 * angle_rad).sin_cos();
-    Quaternion::from_xyzw([0.0, 0.0, sin as f32, cos as f32])
+    // Figures that stand on the ground are seen best from about their hips; where none can carry, the body is looked at.
+    let level_m = course::level_m(pose).filter(|level_m| level_m.abs() < APART_M);
+    Ok(level_m.map_or(0.0, |level_m| 0.78 - level_m as f32))
 }
 
 /// A strip of ground under the whole path, with a line at every metre.
@@ -185,10 +218,10 @@ fn body(
     if let Some(bent) = bent {
         let count = poles.len();
         let strips = bent.iter().zip(&take.force_ns).flat_map(|(places, t)| {
-            let at = moment(pose, *t);
+            let at = pose.moment(*t);
             let middles = poles.iter().map(move |ends| {
                 let [x, y, z] = [0, 1, 2].map(|i| f64::from(0.5 * (ends[0][i] + ends[1][i])));
-                handles_at(&[[x, y, z]], pose, at)[0]
+                pose.places_in_world(at, &[[x, y, z]])[0]
             });
             let handles = &take.shape.handles_m;
             middles
@@ -202,11 +235,6 @@ fn body(
     }
     let strips = poles.into_iter().map(|ends| ends.to_vec());
     store.fixed("/world/rath/poles", &style.with_strips(strips))
-}
-
-/// The pose in force at a time: the last one not after it.
-fn moment(pose: &Pose, t_ns: i64) -> usize {
-    pose.times_ns.partition_point(|p| *p <= t_ns).max(1) - 1
 }
 
 /// A pole that bends by less is drawn straight, m.
@@ -226,7 +254,7 @@ fn bent(take: &Take, pose: &Pose) -> Option<Vec<Vec<[f64; 3]>>> {
     }
     let mut most_m = 0.0f64;
     let places = (0..rows).map(|k| {
-        let mut places = handles_at(handles, pose, moment(pose, take.force_ns[k]));
+        let mut places = pose.places_in_world(pose.moment(take.force_ns[k]), handles);
         for (i, place) in places.iter_mut().enumerate() {
             let z = carriers.points_m[i][k][2] - take.compression_m[i][k];
             if z.is_finite() {
@@ -312,168 +340,14 @@ fn trail(store: &mut Store<'_>, pose: &Pose) -> anyhow::Result<()> {
     store.fixed("/world/trail", &style)
 }
 
-/// Lift of a foot in its swing, m, and half the stride, m: for the eye alone.
-const FOOT_LIFT_M: f64 = 0.10;
-const HALF_STRIDE_M: f64 = 0.27;
-/// The pole lies on one shoulder: the figure stands so far beside it, m.
-const BESIDE_M: f64 = 0.17;
-/// So far from every handle a shoulder carries nothing, m: no figures are drawn then.
-const APART_M: f64 = 2.0;
-/// Shoulder to hip, m.
-const TORSO_M: f64 = 0.52;
-
-/// Figures whose shoulders move as the carriers' points do and whose feet step once per gait cycle.
-fn people(
-    store: &mut Store<'_>,
-    take: &Take,
-    pose: &Pose,
-    ways: &[f64],
-    carriers: &Carriers,
-) -> anyhow::Result<()> {
-    let (rows, count) = (carriers.times_ns.len(), carriers.points_m.len());
-    if rows == 0 || count == 0 || carriers.points_m.iter().any(|p| p.len() != rows) {
-        return Ok(());
-    }
-    // Where a log gives another point of the carriers than the shoulder, the figures are moved by a constant up or down so that their
-    // shoulders are at the handles on average.
-    let mean = |x: &mut dyn Iterator<Item = f64>| {
-        let (sum, n) = x
-            .filter(|x| x.is_finite())
-            .fold((0.0, 0usize), |(s, n), x| (s + x, n + 1));
-        sum / n.max(1) as f64
-    };
-    let handle_m = mean(&mut pose.position_m.iter().map(|p| p[2]))
-        + mean(&mut take.shape.handles_m.iter().map(|h| h[2]));
-    let shoulder_m = mean(&mut carriers.points_m.iter().flatten().map(|p| p[2]));
-    let shift_m = match handle_m - shoulder_m {
-        apart_m if (0.25..APART_M).contains(&apart_m.abs()) => apart_m,
-        _ => 0.0,
-    };
-    let hip_m = (handle_m - TORSO_M).max(0.3);
-
-    let phase_at: Vec<Vec<f64>> = (0..count)
-        .map(|i| match take.inputs.phase_rad.get(i) {
-            Some(phase) if take.phase_ns == carriers.times_ns => analyze::phase::unwrap(phase),
-            Some(phase) if !take.phase_ns.is_empty() && phase.len() == take.phase_ns.len() => {
-                let s = |t: &[i64]| recording::signal::seconds_since(t, take.start_ns);
-                let unwrapped = analyze::phase::unwrap(phase);
-                analyze::inputs::interpolate(&s(&take.phase_ns), &unwrapped, &s(&carriers.times_ns))
-            }
-            _ => vec![0.0; rows],
-        })
-        .collect();
-    let moments: Vec<usize> = carriers.times_ns.iter().map(|t| moment(pose, *t)).collect();
-    let ways: Vec<f64> = moments.iter().map(|at| ways[*at]).collect();
-    let shoulder = |points: &[[f64; 3]], k: usize| {
-        let [x, y, z] = points[k];
-        [x, y, z + shift_m]
-    };
-    let shown: Vec<bool> = (0..rows)
-        .map(|k| {
-            let handles = handles_at(&take.shape.handles_m, pose, moments[k]);
-            let mut shoulders = carriers.points_m.iter().map(|points| shoulder(points, k));
-            handles.is_empty() || shoulders.all(|point| !is_apart(&point, &handles))
-        })
-        .collect();
-    let mut legs: Vec<Vec<[f32; 3]>> = Vec::with_capacity(rows * count);
-    for k in (0..rows).filter(|k| shown[*k]) {
-        for (points, phase) in carriers.points_m.iter().zip(&phase_at) {
-            legs.push(legs_at(shoulder(points, k), ways[k], phase[k]));
-        }
-    }
-    let colors = || (0..count).map(|i| palette::carrier(i).0);
-    let lengths = shown.iter().map(|shown| if *shown { count } else { 0 });
-    let columns = LineStrips3D::new(legs).columns(lengths)?;
-    store.rows("/world/legs", &carriers.times_ns, columns)?;
-    let style = LineStrips3D::update_fields()
-        .with_radii([0.055f32])
-        .with_colors(colors());
-    store.fixed("/world/legs", &style)?;
-    // Torsos and heads stay as they are: they are said again only where they come or go.
-    let turns: Vec<usize> = (0..rows)
-        .filter(|k| *k == 0 || shown[*k] != shown[k - 1])
-        .collect();
-    let times: Vec<i64> = turns.iter().map(|k| carriers.times_ns[*k]).collect();
-    let lengths = || turns.iter().map(|k| usize::from(shown[*k]));
-    let each: usize = lengths().sum();
-    for (i, points) in carriers.points_m.iter().enumerate() {
-        let path = format!("/world/carrier_{}", i + 1);
-        let places = (0..rows).map(|k| f32s(&shoulder(points, k)));
-        let columns = Transform3D::update_fields()
-            .with_many_translation(places)
-            .with_many_quaternion(ways.iter().map(about_z))
-            .columns_of_unit_batches()?;
-        store.rows(&path, &carriers.times_ns, columns)?;
-        let color = palette::carrier(i).0;
-        let length = (handle_m - hip_m - 0.12).max(0.1) as f32;
-        let torso = Capsules3D::from_lengths_and_radii(vec![length; each], vec![0.13f32; each])
-            .with_translations(vec![[0.0f32, BESIDE_M as f32, 0.02 - TORSO_M as f32]; each]);
-        let style = Capsules3D::update_fields()
-            .with_colors([color])
-            .with_fill_mode(FillMode::Solid);
-        let path_of = |part: &str| format!("{path}/{part}");
-        store.rows(&path_of("torso"), &times, torso.columns(lengths())?)?;
-        store.fixed(&path_of("torso"), &style)?;
-        let head = Ellipsoids3D::from_centers_and_half_sizes(
-            vec![[0.0f32, BESIDE_M as f32, 0.2]; each],
-            vec![[0.1f32, 0.09, 0.13]; each],
-        );
-        let style = Ellipsoids3D::update_fields()
-            .with_colors([color])
-            .with_fill_mode(FillMode::Solid);
-        store.rows(&path_of("head"), &times, head.columns(lengths())?)?;
-        store.fixed(&path_of("head"), &style)?;
-    }
-    Ok(())
-}
-
-/// Where the handles are in the world at one moment of the pose.
-fn handles_at(handles_m: &[[f64; 3]], pose: &Pose, at: usize) -> Vec<[f64; 3]> {
-    let place = pose.position_m[at];
-    let turned = handles_m.iter().map(|handle| pose.in_world(at, handle));
-    turned
-        .map(|[x, y, z]| [place[0] + x, place[1] + y, place[2] + z])
-        .collect()
-}
-
-/// Whether a shoulder is far from all handles.
-fn is_apart(shoulder: &[f64; 3], handles: &[[f64; 3]]) -> bool {
-    handles.iter().all(|handle| {
-        let squares = (0..3).map(|i| (shoulder[i] - handle[i]).powi(2));
-        squares.sum::<f64>() > APART_M * APART_M
-    })
-}
-
-/// Foot, hip and foot of a figure that walks towards `heading_rad` beside its shoulder's point.
-fn legs_at(shoulder: [f64; 3], heading_rad: f64, phase_rad: f64) -> Vec<[f32; 3]> {
-    let (sin, cos) = heading_rad.sin_cos();
-    let at = |ahead: f64, left: f64, z: f64| {
-        f32s(&[
-            shoulder[0] + ahead * cos - left * sin,
-            shoulder[1] + ahead * sin + left * cos,
-            z,
-        ])
-    };
-    // A gait cycle of the model is one step; the same foot swings every other.
-    let (stride, swing) = (0.5 * phase_rad).sin_cos();
-    let foot = |side: f64| {
-        at(
-            side * HALF_STRIDE_M * stride,
-            BESIDE_M + side * 0.1,
-            0.04 + FOOT_LIFT_M * (side * swing).max(0.0),
-        )
-    };
-    let hip = at(0.0, BESIDE_M, (shoulder[2] - TORSO_M).max(0.2));
-    vec![foot(1.0), hip, foot(-1.0)]
-}
-
-/// Arrows and handle marks; gives the name of what they are scaled by.
+/// Arrows and handle marks; gives the name of what they are scaled by, and whether any ends before its force does.
 fn forces(
     store: &mut Store<'_>,
     take: &Take,
     pose: &Pose,
     bent: Option<&[Vec<[f64; 3]>]>,
-) -> anyhow::Result<Option<&'static str>> {
+    share_m: f64,
+) -> anyhow::Result<Option<(&'static str, bool)>> {
     let handles = take.shape.handles_m.len();
     let normal_n = &take.inputs.normal_n;
     let Some((scale_n, unit)) = take.force_scale() else {
@@ -482,29 +356,41 @@ fn forces(
     if handles == 0 || normal_n.len() != handles || take.force_ns.is_empty() {
         return Ok(None);
     }
-    let rows = take.force_ns.len();
+    let all = take.force_ns.len();
+    let told: Vec<usize> = (0..all).step_by(every(all, handles)).collect();
+    let (rows, times) = (told.len(), told.iter().map(|k| take.force_ns[*k]));
+    let times: Vec<i64> = times.collect();
     let lengths = || std::iter::repeat_n(handles, rows);
-    let metres_per_newton = FAIR_SHARE_M * handles as f64 / scale_n;
+    let shares_per_newton = handles as f64 / scale_n;
+    let mut any_beyond = false;
+    let thick = (share_m / FAIR_SHARE_M) as f32;
     let mut colors = Vec::with_capacity(rows * handles);
     let mut radii = Vec::with_capacity(rows * handles);
     let mut vectors = Vec::with_capacity(rows * handles);
     let mut origins = Vec::with_capacity(rows * handles);
-    for k in 0..rows {
-        let straight = || handles_at(&take.shape.handles_m, pose, moment(pose, take.force_ns[k]));
+    for k in told {
+        let straight =
+            || pose.places_in_world(pose.moment(take.force_ns[k]), &take.shape.handles_m);
         let places = bent.map_or_else(straight, |bent| bent[k].clone());
         for (place, force) in places.iter().zip(normal_n) {
             let load = Load::of(force[k], scale_n, handles);
-            colors.push(palette::load(load));
-            radii.push(match load {
+            let radius = match load {
                 Load::Loaded => 0.06f32,
                 Load::NearlyUnloaded => 0.085,
                 Load::Slack => 0.12,
-            });
-            let length = if force[k].is_finite() {
-                force[k].max(0.0) * metres_per_newton
-            } else {
-                0.0
             };
+            radii.push(thick * radius);
+            let shares = match force[k].is_finite() {
+                true => force[k].max(0.0) * shares_per_newton,
+                false => 0.0,
+            };
+            let beyond = shares > MOST_SHARES;
+            any_beyond |= beyond;
+            colors.push(match beyond {
+                true => palette::WHITE,
+                false => palette::load(load),
+            });
+            let length = share_m * shares.min(MOST_SHARES);
             vectors.push([0.0f32, 0.0, length as f32]);
             origins.push(f32s(place));
         }
@@ -513,40 +399,150 @@ fn forces(
         .with_colors(colors.iter().copied())
         .with_radii(radii)
         .columns(lengths())?;
-    store.rows("/world/handles", &take.force_ns, marks)?;
+    store.rows("/world/handles", &times, marks)?;
     let arrows = Arrows3D::from_vectors(vectors)
         .with_origins(origins)
         .with_colors(colors)
         .columns(lengths())?;
-    store.rows("/world/forces", &take.force_ns, arrows)?;
+    store.rows("/world/forces", &times, arrows)?;
     store.fixed(
         "/world/forces",
-        &Arrows3D::update_fields().with_radii([0.03f32]),
+        &Arrows3D::update_fields().with_radii([0.03 * thick]),
     )?;
-    Ok(Some(unit))
+    Ok(Some((unit, any_beyond)))
 }
 
 #[cfg(test)]
 mod tests {
-    use std::f64::consts::PI;
-
     use super::*;
     use crate::draw::sent;
+    use crate::take::Carriers;
 
     #[test]
-    fn legs_step_where_the_figure_walks() {
-        // The middle of a step: the feet are far apart, one ahead and one behind.
-        let [left, hip, right] = legs_at([3.0, 5.0, 1.3], 0.5 * PI, PI)[..] else {
-            panic!("two feet and a hip");
+    fn an_arrow_ends_within_the_picture_and_the_title_says_so() {
+        let title = |normal_n: f64| {
+            let mut take = Take {
+                force_ns: vec![0],
+                ..Take::default()
+            };
+            take.pose = Some(Pose {
+                times_ns: vec![0],
+                position_m: vec![[0.0, 0.0, 0.8]],
+                orientation: vec![[0.0, 0.0, 0.0, 1.0]],
+            });
+            take.shape.handles_m = vec![[2.45, 0.0, 0.1], [-2.45, 0.0, 0.1]];
+            take.inputs.mass_kg = Some(2.0);
+            take.inputs.gravity_m_per_s2 = 10.0;
+            take.inputs.normal_n = vec![vec![normal_n], vec![1.0]];
+            let mut title = String::new();
+            sent::by(|store| {
+                title = draw(store, &take).unwrap().unwrap().title().to_owned();
+            });
+            title
         };
-        let close = |got: [f32; 3], x: f64, y: f64| {
-            assert!((f64::from(got[0]) - x).abs() < 1e-6, "{got:?}");
-            assert!((f64::from(got[1]) - y).abs() < 1e-6, "{got:?}");
+        assert!(title(51.0).ends_with("vermilion slack, white > 2.5 m"));
+        assert!(title(49.0).ends_with("vermilion slack"));
+    }
+
+    #[test]
+    fn a_body_far_below_the_ground_is_looked_at() {
+        let looked_at = |height_m: f64| {
+            let pose = Pose {
+                times_ns: vec![0],
+                position_m: vec![[0.0, 0.0, height_m]],
+                orientation: vec![[0.0, 0.0, 0.0, 1.0]],
+            };
+            let mut look_m = f32::NAN;
+            sent::by(|store| look_m = follow(store, &pose, &[0.0]).unwrap());
+            look_m
         };
-        // Towards y: left is towards −x.
-        close(hip, 3.0 - BESIDE_M, 5.0);
-        close(left, 3.0 - BESIDE_M - 0.1, 5.0 + HALF_STRIDE_M);
-        close(right, 3.0 - BESIDE_M + 0.1, 5.0 - HALF_STRIDE_M);
+        assert_eq!(looked_at(-1634.0), 0.0);
+        assert!((looked_at(0.8) + 0.02).abs() < 1e-6);
+    }
+
+    /// Handles at equal distances along parallel poles 0.9 m apart.
+    fn along(poles: usize, each: usize, length_m: f64) -> Vec<[f64; 3]> {
+        let at = |k: usize, n: usize| k as f64 / (n - 1) as f64 - 0.5;
+        let pole = |i: usize| {
+            let y = 0.9 * (i as f64 - 0.5 * (poles - 1) as f64);
+            (0..each).map(move |k| [length_m * at(k, each), y, 0.1])
+        };
+        (0..poles).flat_map(pole).collect()
+    }
+
+    #[test]
+    fn every_handle_is_in_the_picture() {
+        for (poles, each, length_m) in [(1, 2, 4.9), (2, 4, 4.9), (4, 16, 10.5), (10, 100, 69.3)] {
+            let handles = along(poles, each, length_m);
+            let from = eye(&handles, 0.0);
+            let unit = |v: [f64; 3]| {
+                let length = v.iter().map(|x| x * x).sum::<f64>().sqrt();
+                v.map(|x| x / length)
+            };
+            let dot = |a: &[f64; 3], b: &[f64; 3]| (0..3).map(|i| a[i] * b[i]).sum::<f64>();
+            let ahead = unit(from.map(|x| -x));
+            let right = unit([ahead[1], -ahead[0], 0.0]);
+            let up = [
+                right[1] * ahead[2],
+                -right[0] * ahead[2],
+                right[0] * ahead[1] - right[1] * ahead[0],
+            ];
+            // The ends of the poles, the heads, and some room.
+            for h in handles
+                .iter()
+                .flat_map(|&[x, y, z]| [-0.3, 0.3].map(|end| [x + end, y, z + 0.4]))
+            {
+                let to = [0, 1, 2].map(|i| h[i] - from[i]);
+                let [right, up, deep] = [right, up, ahead].map(|axis| dot(&to, &axis));
+                assert!(deep > 0.0, "{poles} {each}: {h:?}");
+                // The viewer's 55 degrees, twice as wide as high.
+                let half = 27.5f64.to_radians().tan();
+                assert!(
+                    right.abs() < 0.95 * 1.9 * half * deep,
+                    "{poles} {each}: {h:?}"
+                );
+                assert!(up.abs() < 0.95 * half * deep, "{poles} {each}: {h:?}");
+            }
+        }
+    }
+
+    #[test]
+    fn a_crowd_is_drawn_with_all_its_heads() {
+        let count = 1000;
+        let handles = along(10, 100, 69.3);
+        let rows = 900;
+        let mut take = Take {
+            pose: Some(Pose {
+                times_ns: (0..rows).collect(),
+                position_m: vec![[0.0, 0.0, 0.9]; rows as usize],
+                orientation: vec![[0.0, 0.0, 0.0, 1.0]; rows as usize],
+            }),
+            carriers: Some(Carriers {
+                times_ns: (0..rows).collect(),
+                points_m: handles
+                    .iter()
+                    .map(|[x, y, _]| vec![[*x, *y, 1.0]; rows as usize])
+                    .collect(),
+            }),
+            ..Take::default()
+        };
+        take.shape.handles_m = handles;
+        let sent = sent::by(|store| {
+            draw(store, &take).unwrap();
+        });
+        for (entity, component) in [
+            ("/world/legs", "LineStrips3D:strips"),
+            ("/world/torsos", "LineStrips3D:strips"),
+            ("/world/heads", "Points3D:positions"),
+        ] {
+            // Every other moment, all of them.
+            let lengths = sent.lengths(entity, component);
+            assert_eq!(lengths, vec![count; 450], "{entity}");
+        }
+        assert!(
+            sent.lengths("/world/carrier_1/head", "Ellipsoids3D:half_sizes")
+                .is_empty()
+        );
     }
 
     #[test]

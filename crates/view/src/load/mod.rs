@@ -11,14 +11,25 @@ mod stream;
 use std::collections::BTreeMap;
 
 use analyze::examine::{Request, examine};
-use recording::read::{Info, ReadError, Recording};
+use recording::read::{Info, ReadError, ReadOptions, Recording};
 use recording::signal::{Signal, field_of};
 use recording::{Finding, Kind, topics};
 
-use crate::take::Take;
+use crate::take::{Take, every};
 
 /// More messages than this are streamed only: metrics need whole columns in memory.
-const MAX_EXAMINED: u64 = 3_000_000;
+const MAX_EXAMINED: u64 = 10_000_000;
+
+/// Transforms that a message of `/tf` may have: the body's, and one for each of as many people as the project's own lists may hold.
+const MOST_TRANSFORMS: usize = 1 + 4096;
+
+/// How recordings are opened.
+pub fn options() -> ReadOptions {
+    ReadOptions {
+        max_items: MOST_TRANSFORMS,
+        ..ReadOptions::default()
+    }
+}
 
 /// Whether curves may be made coarser.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -66,6 +77,13 @@ pub fn load(
         take.energy = scene::energy(&signals);
         take.compression_m = scene::compressions(&signals, &take);
         take.shape = scene::shape(recording, &take);
+        let people = take.shape.handles_m.len();
+        let told = every(take.force_ns.len(), people);
+        if told > 1 && detail == Detail::Thinned {
+            take.notes.push(format!(
+                "{people} carriers: figures, arrows and phases are drawn at one of {told} moments."
+            ));
+        }
     }
     take.notes.append(&mut dates.notes);
     stream::others(

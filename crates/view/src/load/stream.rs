@@ -153,7 +153,7 @@ pub fn others(
         .sort_by_key(|sensor| Some(&sensor.topic) != take.main_imu.as_ref());
     take.topics = plain
         .into_iter()
-        .map(|(name, curves)| topic(name, curves))
+        .map(|(name, curves)| topic(name, curves, detail))
         .filter(|t| !t.plots.is_empty())
         .collect();
     if !left_out.is_empty() {
@@ -178,18 +178,63 @@ pub fn others(
     Ok(())
 }
 
-/// A plain topic: curves of one unit share a plot.
-fn topic(name: String, curves: Vec<(String, String, Thin)>) -> Topic {
+/// Plots of one topic without a unit; more could not be read.
+const MAX_PLOTS: usize = 4;
+
+/// A plain topic: curves of one unit share a plot; of those without one, those that are alike large. While more may come nobody knows how
+/// large they are.
+fn topic(name: String, curves: Vec<(String, String, Thin)>, detail: Detail) -> Topic {
     let mut plots: Vec<(String, Vec<Curve>)> = Vec::new();
     for (_, unit, thin) in curves {
         let curve = thin.finish();
         if !curve.has_two() {
             continue;
         }
-        match plots.iter_mut().find(|(u, _)| *u == unit) {
-            Some((_, curves)) => curves.push(curve),
+        let any = !unit.is_empty() || detail == Detail::Whole;
+        let fits = |curves: &[Curve]| any || curves.iter().all(|c| are_alike_large(c, &curve));
+        let without = plots.iter().filter(|(u, _)| *u == unit).count();
+        let same = plots.iter_mut().filter(|(u, _)| *u == unit);
+        let mut same: Vec<&mut Vec<Curve>> = same.map(|(_, curves)| curves).collect();
+        let place = same.iter().position(|curves| fits(curves));
+        match place.or((without == MAX_PLOTS).then_some(MAX_PLOTS - 1)) {
+            Some(k) => same[k].push(curve),
             None => plots.push((unit, vec![curve])),
         }
     }
     Topic { name, plots }
+}
+
+/// Whether one axis shows both: the larger's greatest size is at most ten times the smaller's, or one is nothing but zeros.
+fn are_alike_large(a: &Curve, b: &Curve) -> bool {
+    let [a, b] = [a, b].map(|curve| {
+        let finite = curve.values.iter().filter(|x| x.is_finite());
+        finite.fold(0.0, |most: f64, x| most.max(x.abs()))
+    });
+    a.min(b) == 0.0 || a.max(b) <= 10.0 * a.min(b)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn curves_without_a_unit_share_a_plot_where_they_are_alike_large() {
+        let curves = |unit: &str| {
+            let of = |(name, size): (&str, f64)| {
+                let mut thin = Thin::new(name, 0, 1, 2, 10);
+                thin.push(&[0, 1], &[0.0, size]);
+                (name.to_owned(), unit.to_owned(), thin)
+            };
+            let sizes = [("o", 0.0), ("a", 3.0), ("b", 600.0), ("c", -4.0)];
+            sizes.into_iter().map(of).collect::<Vec<_>>()
+        };
+        let drawn = |unit, detail| {
+            let plots = topic("/t".into(), curves(unit), detail).plots;
+            let names = |curves: &Vec<Curve>| curves.iter().map(|c| c.name.as_str()).collect();
+            plots.iter().map(|(_, c)| names(c)).collect::<Vec<String>>()
+        };
+        assert_eq!(drawn("", Detail::Thinned), ["oac", "b"]);
+        assert_eq!(drawn("", Detail::Whole), ["oabc"]);
+        assert_eq!(drawn("m", Detail::Thinned), ["oabc"]);
+    }
 }

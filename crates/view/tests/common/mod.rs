@@ -8,11 +8,11 @@ use std::process::Command;
 use re_chunk::Chunk;
 use re_log_types::LogMsg;
 use recording::cdr::{Header, Imu, Quaternion, TfMessage, Time, Transform, TransformStamped};
-use recording::read::{ReadOptions, Recording};
+use recording::read::Recording;
 use recording::schema::rath;
 use recording::topics::{self, MessageKind};
 use recording::write::{RecordingWriter, WriterOptions};
-use view::load::{Detail, load};
+use view::load::{Detail, load, options};
 use view::store::Sink;
 
 /// Samples of a made run: 20 s at 30 Hz.
@@ -258,7 +258,7 @@ impl Taken {
 
 /// Sends the file as `view` does; gives the titles of the views too.
 pub fn taken(path: &Path) -> (Taken, Vec<String>) {
-    let recording = Recording::open(path, &ReadOptions::default()).unwrap();
+    let recording = Recording::open(path, &options()).unwrap();
     let (take, _) = load("file", &recording, Detail::Thinned).unwrap();
     let mut sink = Taken::default();
     let sent = view::send_part(&mut sink, "id", &take, None).unwrap();
