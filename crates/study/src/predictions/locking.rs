@@ -1,7 +1,7 @@
 //! Prediction 1: the gait locks to the beat within Adler's range, and then the rath jumps higher and floats longer.
 
 use super::{Finding, Lab, Verdict, columns, mean, measure, number, row, scene, template};
-use crate::draw::{Figure, Layer, WHITE};
+use crate::draw::{Figure, Layer, WHITE, even_edges};
 use crate::sweep::summary::Spread;
 use sim::run::Sample;
 use sim::scene::Template;
@@ -228,8 +228,8 @@ pub fn run(lab: &Lab) -> Result<Finding, String> {
                         Layer::Map {
                             label: "locking".into(),
                             values: map.chunks(nx).map(<[f64]>::to_vec).collect(),
-                            x: x_range,
-                            y: y_range,
+                            x: even_edges(x_range, nx),
+                            y: even_edges(y_range, map.len() / nx),
                         },
                         Layer::line("", vec![(-4.0, 4.0), (0.0, 0.0), (4.0, 4.0)], WHITE),
                         Layer::points("", points, 1),

@@ -2,7 +2,7 @@
 
 use super::floquet::Hanging;
 use super::{Finding, Lab, columns, number, row, scene, slope, template};
-use crate::draw::{Figure, Layer, WHITE};
+use crate::draw::{Figure, Layer, WHITE, even_edges};
 use crate::ensemble::observe;
 use sim::run::Sample;
 use sim::scene::Template;
@@ -177,9 +177,9 @@ pub fn run(lab: &Lab) -> Result<Finding, String> {
         layers: vec![
             Layer::Map {
                 label: "growth in 1/s, shown within ±1".into(),
+                x: even_edges(x_range, values[0].len()),
+                y: even_edges(y_range, values.len()),
                 values,
-                x: x_range,
-                y: y_range,
             },
             Layer::dashed("", vec![(x_range.0, 1.0), (x_range.1, 1.0)], WHITE),
             Layer::line("", edge, WHITE),
