@@ -161,14 +161,8 @@ pub fn run(lab: &Lab) -> Result<Finding, String> {
         }
     }
     let paper = scene(&template("music", &[])?, &[], 1)?;
-    let beat = paper.effects.music.as_ref().map_or(f64::NAN, |m| m.beat_hz);
-    let lift = paper.effects.lift.as_ref().map_or(1.0, |l| l.gain);
-    let gait = paper
-        .effects
-        .gait
-        .as_ref()
-        .map_or(f64::NAN, |g| g.amplitude_m.get(0));
-    let here = (beat / roll, theory.depth(beat, lift * gait));
+    let (depth, beat) = theory.depth_of(&paper);
+    let here = (beat / roll, depth);
     let least = edge.iter().map(|e| e.1).fold(f64::INFINITY, f64::min);
     let figure = Figure {
         title: "Growth of roll under carriers in step".into(),
