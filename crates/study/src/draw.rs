@@ -27,6 +27,8 @@ pub struct Figure {
     pub x_range: Option<(f64, f64)>,
     /// Whether equal factors of the abscissa are equally far apart.
     pub x_log: bool,
+    /// The same of the ordinate.
+    pub y_log: bool,
     /// Range of the ordinate, where not that of the data.
     pub y_range: Option<(f64, f64)>,
 }
@@ -34,16 +36,16 @@ pub struct Figure {
 /// Something in a figure. Colours are indices into [`COLOURS`].
 #[derive(Clone, Debug)]
 pub enum Layer {
-    /// A map: `values[row][column]`, rows from the bottom, cells between the ends of the ranges.
+    /// A map: `values[row][column]`, rows from the bottom.
     Map {
         /// What the colour means, with its unit.
         label: String,
         /// The cells.
         values: Vec<Vec<f64>>,
-        /// Ends of the abscissa.
-        x: (f64, f64),
-        /// Ends of the ordinate.
-        y: (f64, f64),
+        /// Edges of the columns, rising: one more than there are columns.
+        x: Vec<f64>,
+        /// Edges of the rows.
+        y: Vec<f64>,
     },
     /// A curve.
     Line {
@@ -116,7 +118,10 @@ impl Layer {
 
     fn corners(&self) -> Vec<(f64, f64)> {
         match self {
-            Self::Map { x, y, .. } => vec![(x.0, y.0), (x.1, y.1)],
+            Self::Map { x, y, .. } => {
+                let ((x0, x1), (y0, y1)) = (ends(x), ends(y));
+                vec![(x0, y0), (x1, y1)]
+            }
             Self::Line { points, .. } | Self::Points { points, .. } => points.clone(),
             Self::Band { points, .. } => points
                 .iter()
@@ -166,7 +171,7 @@ impl Figure {
         let mut title = self.title.clone();
         for layer in &self.layers {
             if let Layer::Map { label, values, .. } = layer {
-                if *label != self.title {
+                if !self.title.starts_with(label.as_str()) {
                     title += &format!("; colour: {label}");
                 }
                 if values.iter().flatten().any(|v| v.is_nan()) {
@@ -200,6 +205,7 @@ impl Figure {
             .with_y_axis_min(y.0)
             .with_y_axis_max(y.1);
         layout.log_x = self.x_log;
+        layout.log_y = self.y_log;
         layout.show_legend = named > 0 && !is_map;
         if layout.show_legend {
             layout = layout.with_legend_position(LegendPosition::OutsideRightTop);
@@ -272,15 +278,59 @@ fn map_colours() -> ColorMap {
     }))
 }
 
-fn marks(layer: &Layer, x: (f64, f64), y: (f64, f64)) -> Vec<Plot> {
-    let mark = match layer {
-        Layer::Map { values, x, y, .. } => Heatmap::new()
-            .with_data(values.clone())
+/// The edges of `count` cells of one width.
+pub fn even_edges((from, to): (f64, f64), count: usize) -> Vec<f64> {
+    let edge = |k: usize| from + (to - from) * k as f64 / count as f64;
+    (0..=count).map(edge).collect()
+}
+
+fn ends(edges: &[f64]) -> (f64, f64) {
+    (edges[0], edges[edges.len() - 1])
+}
+
+fn is_even(edges: &[f64]) -> bool {
+    let even = even_edges(ends(edges), edges.len() - 1);
+    let room = 1e-9 * (edges[edges.len() - 1] - edges[0]);
+    edges.iter().zip(even).all(|(a, b)| (a - b).abs() <= room)
+}
+
+/// A map's cells. The library draws even ones only: each of others is a map of its own, under one of no size that gives the bar of colours.
+fn cells(values: &[Vec<f64>], x: &[f64], y: &[f64]) -> Vec<Plot> {
+    let map = |values: Vec<Vec<f64>>, x: (f64, f64), y: (f64, f64)| {
+        Heatmap::new()
+            .with_data(values)
             .with_color_map(map_colours())
             .with_x_range(x.0, x.1)
             .with_y_range(y.0, y.1)
             .with_cell_size(1.0)
-            .into(),
+    };
+    let whole = map(values.to_vec(), ends(x), ends(y));
+    if is_even(x) && is_even(y) {
+        return vec![whole.into()];
+    }
+    let all = || values.iter().flatten().copied();
+    let least = all().fold(f64::INFINITY, f64::min);
+    let most = all().fold(f64::NEG_INFINITY, f64::max);
+    // `with_cell_size` gives no less than a half.
+    let bar = Heatmap {
+        cell_size: 0.0,
+        ..whole
+    };
+    let mut plots = vec![bar.into()];
+    for (row, y) in values.iter().zip(y.windows(2)) {
+        for (value, x) in row.iter().zip(x.windows(2)) {
+            let fill = map_colours().map((value - least) / (most - least + f64::EPSILON));
+            let own = ColorMap::Custom(Arc::new(move |_| fill.clone()));
+            let cell = map(vec![vec![*value]], (x[0], x[1]), (y[0], y[1]));
+            plots.push(cell.with_color_map(own).into());
+        }
+    }
+    plots
+}
+
+fn marks(layer: &Layer, x: (f64, f64), y: (f64, f64)) -> Vec<Plot> {
+    let mark = match layer {
+        Layer::Map { values, x, y, .. } => return cells(values, x, y),
         Layer::Line {
             name,
             points,
@@ -359,5 +409,30 @@ mod tests {
         };
         assert_eq!(map(f64::NAN), "#FFFFFF");
         assert!((0..=100).all(|k| map(f64::from(k) / 100.0) != "#FFFFFF"));
+    }
+
+    #[test]
+    fn uneven_cells_lie_where_their_edges_are() {
+        let heat = |plot: &Plot| match plot {
+            Plot::Heatmap(map) => map.clone(),
+            _ => panic!("a map"),
+        };
+        let values = [vec![0.0, 1.0, f64::NAN], vec![0.25, 0.5, 0.75]];
+        let even = cells(&values, &even_edges((0.0, 3.0), 3), &[0.0, 1.0, 2.0]);
+        assert_eq!(even.len(), 1);
+        let plots = cells(&values, &[0.5, 1.5, 3.0, 5.0], &[-1.0, 0.0, 4.0]);
+        assert_eq!(plots.len(), 1 + 6);
+        let (all, cell) = (heat(&plots[0]), heat(&plots[5]));
+        assert_eq!(
+            (all.x_range, all.y_range),
+            (Some((0.5, 5.0)), Some((-1.0, 4.0)))
+        );
+        assert_eq!(
+            (cell.x_range, cell.y_range),
+            (Some((1.5, 3.0)), Some((0.0, 4.0)))
+        );
+        // As the bar has it, whatever a map of one cell would be.
+        assert_eq!(cell.color_map.map(0.0), ColorMap::Cividis.map(0.5));
+        assert_eq!(heat(&plots[3]).color_map.map(0.0), "#FFFFFF");
     }
 }

@@ -298,7 +298,11 @@ fn an_error_of_the_compression_is_in_the_interval() {
 /// the derivatives, a bias that every seed has, is in them whole made them eight times too wide.
 #[test]
 fn intervals_of_the_contact_are_as_wide_as_its_errors() {
-    for (scene, sure) in [("music", 0.2), ("baseline", 0.06), ("strict-contact", 0.03)] {
+    for (scene, sure) in [
+        ("music", 0.06),
+        ("baseline", 0.06),
+        ("strict-contact", 0.03),
+    ] {
         for (name, truth) in [("stiffness", 3000.0), ("damping", 400.0)] {
             let errors = (5001..5041).map(|seed| {
                 let found = found_in(&format!("{scene} seed={seed}"), false);
@@ -326,6 +330,44 @@ fn intervals_of_the_contact_are_as_wide_as_its_errors() {
                 halves[20]
             );
         }
+    }
+}
+
+/// Nothing random: what is left is the rules' own error, of the sixth order unless one spans an instant at which a handle opens or closes. Those that
+/// did, where the other handle's was, missed by 0.1 N/m and 0.05 N·s/m, otherwise in every run.
+#[test]
+fn no_rule_spans_an_opening_of_any_handle() {
+    for seed in 1..6 {
+        let scene = format!("music effects.noise=false solver.tolerance=1e-9 seed={seed}");
+        let found = found_in(&scene, false);
+        // Measured 0.0065 and 0.0020.
+        for (name, truth, off) in [("stiffness", 3000.0, 0.015), ("damping", 400.0, 0.005)] {
+            let e = find(&found, name);
+            println!("{name} {}", e.value - truth);
+            assert!((e.value - truth).abs() < off, "{seed}: {e:?}");
+        }
+    }
+}
+
+/// A handle that says what another says already makes nothing surer.
+#[test]
+fn what_handles_miss_at_one_time_is_one_miss() {
+    let mut field = field_of(&scene_of("music"));
+    let window = analyze::Window::from(15.0);
+    let twice = |x: &mut Vec<Vec<f64>>| x[1] = x[0].clone();
+    twice(&mut field.inputs.normal_n);
+    twice(&mut field.compression_m);
+    let both = fit(&field, window);
+    field.inputs.normal_n.pop();
+    field.compression_m.pop();
+    let one = fit(&field, window);
+    for name in ["stiffness", "damping"] {
+        let width = |found| {
+            let [low, high] = find(found, name).interval;
+            high - low
+        };
+        let ratio = width(&both) / width(&one);
+        assert!((ratio - 1.0).abs() < 1e-6, "{name}: {ratio}");
     }
 }
 

@@ -36,3 +36,20 @@ fn val_the_simulated_floquet_boundary() {
         assert!(kept, "{ratio}: contact is lost");
     }
 }
+
+/// How fast roll grows well inside the first tongue.
+#[test]
+fn val_the_simulated_growth_is_floquets() {
+    let drive = stability::drive().unwrap();
+    let theory = Hanging::of(&drive.with([]).unwrap()).unwrap();
+    let [_, roll_hz] = theory.natural_hz();
+    for depth in [0.4, 0.6] {
+        let known = theory.growth_per_s(2.0 * roll_hz, depth);
+        let (found, _) = stability::simulated(&drive, &theory, 2.0 * roll_hz, depth).unwrap();
+        println!("{depth}: {found}, Floquet {known}");
+        assert!(
+            (found - known).abs() < 0.005,
+            "{depth}: {found}, Floquet {known}"
+        );
+    }
+}

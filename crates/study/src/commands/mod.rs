@@ -154,13 +154,18 @@ fn unknown(word: &str) -> Option<String> {
     ))
 }
 
-/// A flag that ctrl-C sets; a second ctrl-C ends the program at once.
-fn watch_interrupts() -> Result<&'static AtomicBool> {
+/// A flag that ctrl-C sets; a second ctrl-C says `at_once` and ends the program.
+fn watch_interrupts(at_once: impl Into<String>) -> Result<&'static AtomicBool> {
     static INTERRUPTED: AtomicBool = AtomicBool::new(false);
-    ctrlc::set_handler(|| {
+    let at_once = at_once.into();
+    ctrlc::set_handler(move || {
         if INTERRUPTED.swap(true, Ordering::Relaxed) {
+            recording::note!("study: {at_once}");
             std::process::exit(1);
         }
+        recording::note!(
+            "study: stops when the runs under way have ended; ctrl-C again stops at once"
+        );
     })
     .context("ctrl-C cannot be watched")?;
     Ok(&INTERRUPTED)

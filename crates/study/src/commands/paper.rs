@@ -45,7 +45,7 @@ pub fn run(args: &Args) -> Result<()> {
             )?);
         }
     }
-    let stop = super::watch_interrupts()?;
+    let stop = super::watch_interrupts("interrupted; nothing was written")?;
     let bar = super::progress(scenes.len() as u64)?;
     let results = run_all(&scenes, args.jobs, stop, || bar.inc(1));
     bar.finish_and_clear();

@@ -46,7 +46,7 @@ pub fn run(args: &Args) -> Result<()> {
             );
         }
     }
-    let stop = watch_interrupts()?;
+    let stop = watch_interrupts("interrupted; nothing was written")?;
     let began = Instant::now();
     let mut findings: Vec<(&str, Finding)> = Vec::new();
     for e in EXPERIMENTS {

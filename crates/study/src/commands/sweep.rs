@@ -71,11 +71,20 @@ pub fn plan(file: &Path) -> Result<Plan> {
 
 /// Computes what is missing, and merges when all is there.
 pub fn run(args: &Args) -> Result<()> {
+    let out = folder(&args.file, args.out.as_ref());
+    let goes_on = format!(
+        "`study {} --resume --out {}` goes on",
+        args.file.display(),
+        out.display()
+    );
+    let stop = watch_interrupts(format!(
+        "interrupted: parts that are whole are kept in {}; {goes_on}",
+        out.display()
+    ))?;
     let mut plan = plan(&args.file)?;
     if let Some(seeds) = args.seeds {
         plan = plan.with_seeds(seeds).map_err(anyhow::Error::msg)?;
     }
-    let out = folder(&args.file, args.out.as_ref());
     let store = Store::new(&plan, &out);
     let sentence = |e: String| anyhow!(e);
 
@@ -108,7 +117,6 @@ pub fn run(args: &Args) -> Result<()> {
             .sum()
     };
     let left = size(&there.missing);
-    let stop = watch_interrupts()?;
     let bar = progress(left)?;
     let (mut finished, mut said) = (0u64, Instant::now());
     let written = store
@@ -128,14 +136,14 @@ pub fn run(args: &Args) -> Result<()> {
         .map_err(sentence)?;
     bar.finish_and_clear();
     if stop.load(Ordering::Relaxed) && written.runs < left {
-        bail!(
-            "interrupted: {} of {} runs are kept in {}; `study {} --resume --out {}` goes on",
-            there.runs + written.runs,
-            there.runs + left,
-            out.display(),
-            args.file.display(),
-            out.display()
-        );
+        let (kept, all) = (there.runs + written.runs, there.runs + left);
+        match kept {
+            0 => bail!("interrupted: none of {all} runs was finished and kept; {goes_on}"),
+            _ => bail!(
+                "interrupted: {kept} of {all} runs are kept in {}; {goes_on}",
+                out.display()
+            ),
+        }
     }
     let wall_s = began.elapsed().as_secs_f64();
     recording::note!(

@@ -32,7 +32,7 @@ const EXAMPLES: &str = "Examples:
 /// Simulates the twins and prints how far their sensors are off.
 pub fn run(args: &Args) -> Result<()> {
     let began = Instant::now();
-    let stop = watch_interrupts()?;
+    let stop = watch_interrupts("interrupted; nothing was written")?;
     let bar = progress(args.seeds * study::twin::CONDITIONS.len() as u64)?;
     let found = twins(args.first_seed, args.seeds, args.jobs, stop, || bar.inc(1))
         .map_err(anyhow::Error::msg)?;

@@ -4,7 +4,7 @@
 //! beat, pull     φ̇_i = ω_i + K m(t) sin(Ωt + ψ₀ − φ_i) + noise,   m(t) = 1 − e^{−(t − t₀)/τ} from t₀ on
 //! coupling       … + (K_c/N) Σ_j sin(φ_j − φ_i)                     where it shows
 //! amplitude      z_i = A_i sin φ_i + B_i cos φ_i                      √(A² + B²), lift and all
-//! contact        N_i = k δ_i + c δ̇_i                               while contact is kept
+//! contact        N_i = k δ_i + c δ̇_i                               in contact, away from where any opens or closes
 //! … from sensors N_tot = k Σδ_i + c Σδ̇_i + e                       while all handles carry
 //! pendulum       θ̈ = −a N_tot sin θ − b θ̇                          a = h/(I_xx + M h²) where the handles are held
 //! ```
@@ -21,8 +21,8 @@
 //! nothing is told. On a graph, the scene's, the coupling is K_c/(d_i + 1) times the sum over the d_i neighbours.
 //! Nothing reaches across a hole of the record: no increment, no spline, no straight line through a beat.
 //! k, c where compression was recorded, a, b: linear least squares on means over three samples and Lele's slope or second derivative that goes with them, errors
-//! of (ωΔt)⁶/2100 and (ωΔt)⁶/3300. Their intervals are a jackknife's over blocks of two roll periods, because neighbours are alike, with Student's t, because
-//! contact may be kept for a few of them only; three sixty-thirds are added of what leaving out every other sample changes, three times the error of such a rule
+//! of (ωΔt)⁶/2100 and (ωΔt)⁶/3300. Their intervals are a jackknife's over blocks of two roll periods, all handles together, because neighbours are alike, with Student's t, because
+//! contact may be kept in a few of them only; three sixty-thirds are added of what leaving out every other sample changes, three times the error of such a rule
 //! (Roache 1994). θ̇ is the not-a-knot spline's, as δ̇ is from sensors, whose k, c have intervals from a moving-block bootstrap (500 draws, the same blocks).
 //! Where steps tell the phases, pull and gait are those of Adler's test
 //! ([`analyze::beat::adler`]), which knows that a step detector smooths them and finds τ by itself. Contact from sensors adds what it changes by when every other
@@ -81,8 +81,6 @@ pub type Outcome = Result<Estimate, (String, String)>;
 const DRAWS: u64 = 500;
 /// Length of a block of the bootstrap, s: two periods of the roll.
 const BLOCK_S: f64 = 2.0;
-/// Contact has to be kept at least so long, s.
-const KEPT_S: f64 = 1.0;
 /// A handle carries where its share of the load is above this part of the mean share.
 const CARRIES: f64 = 1.0 / 7.0;
 /// Samples left out at each end of a stretch, where the spline's derivative is poor.

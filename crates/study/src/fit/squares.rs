@@ -80,9 +80,11 @@ pub(super) fn whoever_errs<const N: usize>(blocks: &[Block<N>]) -> Option<Vec<SV
     Some([p].into_iter().chain(erring).collect())
 }
 
-/// Half of the parameters' 95 % intervals, from what they are without each block, by Student's t. A redrawing of a few blocks is too sure. The degrees of
-/// freedom are Satterthwaite's, were all rows equally noisy: (Σg_b)²/Σg_b² − 1 for the share g_b that block b has in a parameter's variance. Infinite where
-/// that leaves none, `None` where a block holds a parameter alone. Source: Efron & Stein, Ann. Stat. 9 (1981) 586; Bell & McCaffrey, Surv. Methodol. 28 (2002) 169.
+/// Half of the parameters' 95 % intervals, from what they are without each block, by Student's t. A redrawing of a few blocks is too sure. `None` where a
+/// block holds a parameter alone. The degrees of freedom are Satterthwaite's for that sum of squares Σs_b², were all rows equally noisy: (tr M)²/tr M² of
+/// its covariance M. With the share g_b that block b has in a parameter's information s_b = d_b (p − p_b), d_b = g_b/(1 − g_b), which makes M_bb = d_b and
+/// M_bc = −d_b d_c: n − 1 for n equal blocks, and never less than one. Source: Efron & Stein, Ann. Stat. 9 (1981) 586; Bell & McCaffrey, Surv.
+/// Methodol. 28 (2002) 169.
 pub(super) fn jackknifed<const N: usize>(blocks: &[Block<N>]) -> Option<[f64; N]> {
     let count = blocks.len() as f64;
     let p = solve(blocks, |k| k)?;
@@ -90,20 +92,26 @@ pub(super) fn jackknifed<const N: usize>(blocks: &[Block<N>]) -> Option<[f64; N]
     let right: SVector<f64, N> = blocks.iter().map(|b| b.right).sum();
     let inverse = gram.try_inverse()?;
     let mut squares = SVector::<f64, N>::zeros();
-    let (mut shares, mut shares_squared) = (squares, squares);
+    // Sums of d, d² and d⁴.
+    let mut sums = [squares; 3];
     for block in blocks {
         let mut rest = Block::<N>::empty();
         rest.gram = gram - block.gram;
         rest.right = right - block.right;
         let off = rest.solved()? - p;
         squares += off.component_mul(&off);
-        let share = (inverse * block.gram * inverse).diagonal();
-        shares += share;
-        shares_squared += share.component_mul(&share);
+        let share = (inverse * block.gram * inverse)
+            .diagonal()
+            .component_div(&inverse.diagonal());
+        let d = share.map(|g| g / (1.0 - g));
+        for (sum, power) in sums.iter_mut().zip([1, 2, 4]) {
+            *sum += d.map(|d| d.powi(power));
+        }
     }
+    let [d, d2, d4] = sums;
     Some(std::array::from_fn(|j| {
-        let freedoms = shares[j] * shares[j] / shares_squared[j] - 1.0;
-        // OK because it is between 0 and the number of blocks, but for rounding.
+        let freedoms = d[j] * d[j] / (d2[j] + d2[j] * d2[j] - d4[j]);
+        // OK because it is between 1 and the number of blocks, but for rounding.
         student_975((freedoms + 1e-9) as usize) * (squares[j] * (count - 1.0) / count).sqrt()
     }))
 }
@@ -150,6 +158,16 @@ mod tests {
         let sd = (38.0_f64 / 3.0).sqrt();
         assert!((half - 3.1824 * sd / 2.0).abs() < 1e-12, "{half}");
         assert!(jackknifed(&[of(1.0)]).is_none());
+    }
+
+    /// Two blocks have one degree of freedom, however unlike they are: 0 once and 4 three times, whose mean is 3, 4 without the one and 0 without the other.
+    #[test]
+    fn a_block_that_tells_nearly_all_leaves_one_degree_of_freedom() {
+        let mut blocks = [Block::<1>::empty(), Block::empty()];
+        blocks[0].add([1.0], 0.0);
+        (0..3).for_each(|_| blocks[1].add([1.0], 4.0));
+        let [half] = jackknifed(&blocks).unwrap();
+        assert!((half - 12.7062 * 5.0_f64.sqrt()).abs() < 1e-12, "{half}");
     }
 
     /// scipy.stats.bootstrap((v,), numpy.mean, method="percentile", n_resamples=200000, rng=1).confidence_interval of SciPy 1.17.1, within what 500 draws

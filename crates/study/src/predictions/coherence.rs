@@ -29,18 +29,11 @@ pub fn run(lab: &Lab) -> Result<Finding, String> {
     let paper = scene(&template("music", &[])?, &[], 1)?;
     let theory = Hanging::of(&paper)?;
     let [_, roll_hz] = theory.natural_hz();
-    let beat = paper.effects.music.as_ref().map_or(f64::NAN, |m| m.beat_hz);
+    let (strong, beat) = theory.depth_of(&paper);
     let tuned = 2.0 * roll_hz;
     let amplitude = theory.amplitude_m(beat, 1.0);
 
     // Equal coherence, with and without the chance to lose contact: the pull of the music makes the coherence.
-    let gait = paper
-        .effects
-        .gait
-        .as_ref()
-        .map_or(f64::NAN, |g| g.amplitude_m.get(0));
-    let lift = paper.effects.lift.as_ref().map_or(1.0, |l| l.gain);
-    let strong = lift * gait / amplitude;
     let pulls = [0.0, 0.15, 0.3, 0.45, 0.6, 0.8, 1.1, 1.6, 2.7];
     // Gait and beat have one frequency here: coherence alone is to change.
     let gait_hz = format!("carriers.frequency_hz={beat:?}");
@@ -192,4 +185,31 @@ pub fn run(lab: &Lab) -> Result<Finding, String> {
             ),
         ],
     })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use std::sync::atomic::AtomicBool;
+
+    /// Floquet's threshold decides, and contact is lost from a depth of one on: a threshold below is reached in contact, one above is not.
+    #[test]
+    fn rocking_with_contact_kept_is_where_the_threshold_is_below_one() {
+        let lab = Lab {
+            jobs: 0,
+            seeds: 1,
+            stop: &AtomicBool::new(false),
+            done: &|| {},
+        };
+        let found = run(&lab).unwrap();
+        let of = |name: &str| found.number(name).unwrap();
+        assert!(of("threshold_tuned") < 0.5 && of("threshold_paper") > 1.0);
+        assert!(of("kept_tuned") > ROCKS_DEG && of("kept_paper") < 1.0);
+        assert!(of("rocks_tuned") > of("threshold_tuned") && of("rocks_tuned") < 1.0);
+        // Steps of a tenth; growth just above the threshold takes longer than the run.
+        let late = of("rocks_paper_tied") - of("threshold_paper");
+        assert!((0.0..0.2).contains(&late), "{late}");
+        assert_eq!(of("loss_tuned"), 0.0);
+        assert!(of("loss_paper") > KEPT);
+    }
 }

@@ -84,6 +84,15 @@ impl Hanging {
         amplitude_m / self.amplitude_m(hz, 1.0)
     }
 
+    /// The depth that a scene's gait gives in step, lifted as its music has it, and the beat (Hz) at which it does.
+    pub fn depth_of(&self, scene: &Scene) -> (f64, f64) {
+        let e = &scene.effects;
+        let beat = e.music.as_ref().map_or(f64::NAN, |m| m.beat_hz);
+        let lift = e.lift.as_ref().map_or(1.0, |l| l.gain);
+        let gait = e.gait.as_ref().map_or(f64::NAN, |g| g.amplitude_m.get(0));
+        (self.depth(beat, lift * gait), beat)
+    }
+
     fn rate(&self, load_n: f64, x: &Vector4<f64>) -> Vector4<f64> {
         let (u, u_rate) = (x[0] - self.above_m * x[1], x[2] - self.above_m * x[3]);
         let side = -load_n.max(0.0) / self.length_m * (u + self.damping_s * u_rate);
@@ -162,6 +171,46 @@ mod tests {
 
     fn music() -> Hanging {
         Hanging::of(&sim::scene::load("music", &[]).unwrap()).unwrap()
+    }
+
+    /// In music the shoulders go up and down by 64.2 mm, lifted to 5/4, at 2.1507 Hz, under 60 kg on two handles of 3000 N/m and 400 N·s/m each: m = A|H|Ω²/g
+    /// with |H|² = (K² + C²Ω²)/((K − MΩ²)² + C²Ω²), worked out by hand. Where Ω² = K/M, |H|² is 1 + K²/(CΩ)².
+    #[test]
+    fn the_depth_of_a_lift_is_that_of_a_spring_and_a_damper() {
+        let model = music();
+        let (depth, beat) = model.depth_of(&sim::scene::load("music", &[]).unwrap());
+        let (k, c, m, g) = (6000.0_f64, 800.0, 60.0, 9.81);
+        let w = TAU * 2.1507;
+        let gain = (k * k + (c * w).powi(2)) / ((k - m * w * w).powi(2) + (c * w).powi(2));
+        let expected = 0.0642 * 1.25 * gain.sqrt() * w * w / g;
+        assert_eq!(beat, 2.1507);
+        assert!((depth / expected - 1.0).abs() < 1e-12, "{depth} {expected}");
+        let w = (k / m).sqrt();
+        let gain = (1.0 + (k / (c * w)).powi(2)).sqrt();
+        let found = model.amplitude_m(w / TAU, 0.5) * gain * w * w / g;
+        assert!((found - 0.5).abs() < 1e-12, "{found}");
+    }
+
+    /// A sling that is long beside the handles' height leaves a pendulum under the pole, and a swing of the whole.
+    #[test]
+    fn natural_frequencies_are_those_of_two_pendulums() {
+        let model = Hanging {
+            length_m: 1e6,
+            ..music()
+        };
+        let g = model.gravity_m_per_s2;
+        let swing = (g / model.length_m).sqrt() / TAU;
+        let roll = (model.mass_kg * g * model.above_m / model.inertia_kg_m2).sqrt() / TAU;
+        for (found, known) in model.natural_hz().into_iter().zip([swing, roll]) {
+            assert!((found / known - 1.0).abs() < 1e-5, "{found} {known}");
+        }
+        // Of two coupled ones the squares' product is det(M⁻¹K) = (g/L)(Mgh/I), and their sum its trace, g/L + (Mgh/I)(1 + h/L).
+        let model = music();
+        let [low, high] = model.natural_hz().map(|hz| (TAU * hz).powi(2));
+        let (h, l) = (model.above_m, model.length_m);
+        let (swing, roll) = (g / l, model.mass_kg * g * h / model.inertia_kg_m2);
+        assert!((low * high / (swing * roll) - 1.0).abs() < 1e-12);
+        assert!(((low + high) / (swing + roll * (1.0 + h / l)) - 1.0).abs() < 1e-12);
     }
 
     /// Without modulation the growth is that of the damped modes, whose characteristic polynomial is solved here.

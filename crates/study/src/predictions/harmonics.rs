@@ -212,3 +212,58 @@ pub fn run(lab: &Lab) -> Result<Finding, String> {
         )],
     })
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::predictions::measure;
+
+    /// 3 sin 2π2t + 0.5 cos 2π4t about 7, for a minute: whole turns, which a Hann taper keeps apart.
+    #[test]
+    fn lines_are_as_high_as_the_sines_they_are_of() {
+        let t_s: Vec<f64> = (0..1800).map(|k| f64::from(k) / 30.0).collect();
+        let wave = |t: &f64| 7.0 + 3.0 * (TAU * 2.0 * t).sin() + 0.5 * (TAU * 4.0 * t).cos();
+        let x: Vec<f64> = t_s.iter().map(wave).collect();
+        for (hz, height) in [(2.0, 3.0), (4.0, 0.5), (1.0, 0.0), (3.0, 0.0)] {
+            let found = line(&t_s, &x, hz);
+            assert!((found - height).abs() < 1e-10, "{hz} Hz: {found}");
+        }
+        assert!(line(&t_s, &vec![7.0; 1800], 2.008) < 1e-12);
+        // A line that is no whole number of turns leaks by the sidelobes of Hann's taper, not by 1/n: Harris, Proc. IEEE 66 (1978) 51.
+        let x: Vec<f64> = t_s.iter().map(|t| (TAU * 2.008 * t).sin()).collect();
+        assert!(line(&t_s, &x, 1.0) < 1e-5, "{}", line(&t_s, &x, 1.0));
+    }
+
+    /// What is driven by a sine and linear answers with that sine alone; a load that lifts off does not. Roll that is swung by its load goes at half of
+    /// the load's frequency: Nayfeh & Mook, Nonlinear Oscillations (1979), ch. 5. Contact loss is that of the metric.
+    #[test]
+    fn a_signature_is_read_off_the_right_lines() {
+        let settings = [
+            "effects.music.onset_s=0.0",
+            "effects.music.build_up_s=0.0",
+            "effects.noise=false",
+            "carriers.frequency_hz=2.1507",
+            "effects.frequency_spread=false",
+            "analysis_start_s=30.0",
+        ];
+        let template = template("music", &settings).unwrap();
+        let key = "effects.gait.amplitude_m";
+        let gentle = scene(&template, &[(key, 0.01)], 1).unwrap();
+        let [slack, force, height, ..] = signature(&gentle, 2.1507).unwrap();
+        assert!(
+            slack == 0.0 && force < 1e-3 && height < 1e-3,
+            "{slack} {force} {height}"
+        );
+        let thrown = scene(&template, &[], 1).unwrap();
+        let [slack, force, _, _, half, three_halves] = signature(&thrown, 2.1507).unwrap();
+        let [loss] = measure(&thrown, ["contact_loss_mean"]).unwrap();
+        assert!(
+            slack > 0.1 && (slack - loss).abs() < 1e-12,
+            "{slack} {loss}"
+        );
+        assert!(
+            force > 0.05 && half > 10.0 && three_halves < 0.3,
+            "{force} {half} {three_halves}"
+        );
+    }
+}

@@ -233,3 +233,69 @@ pub fn run(lab: &Lab) -> Result<Finding, String> {
         )],
     })
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::predictions::{Verdict, measure};
+    use std::sync::atomic::AtomicBool;
+
+    /// Two forces at the ends of a pole have a moment of half its length times their difference; about the pole they have what turns the body, by Euler's
+    /// equations of a body with I_yy = I_zz: M_x = I_xx ω̇_x, M_y = I_yy ω̇_y − (I_zz − I_xx) ω_z ω_x.
+    #[test]
+    fn moments_are_those_that_turn_the_body() {
+        let settings = [
+            "effects.pole_friction=false",
+            "log_rate_hz=600.0",
+            "duration_s=30.0",
+        ];
+        let template = template("music", &settings).unwrap();
+        let scene = scene(&template, &[], 3).unwrap();
+        let mut turns: Vec<UnitQuaternion<f64>> = Vec::new();
+        columns(&scene, &mut |s: &Sample| {
+            if s.t_s >= FROM_S {
+                let [x, y, z, w] = s.pose.orientation;
+                turns.push(UnitQuaternion::from_quaternion(Quaternion::new(w, x, y, z)));
+            }
+            true
+        })
+        .unwrap();
+        // The body's rate over each step, and its change from step to step.
+        let rates: Vec<Vector3<f64>> = turns
+            .windows(2)
+            .map(|w| 600.0 * (w[0].inverse() * w[1]).scaled_axis())
+            .collect();
+        let torques = rates.windows(2).map(|w| {
+            let (bend, rate) = (600.0 * (w[1] - w[0]), 0.5 * (w[0] + w[1]));
+            [2.6 * bend.x, 20.0 * bend.y - (20.0 - 2.6) * rate.z * rate.x]
+        });
+        let torques: Vec<[f64; 2]> = torques.collect();
+        let rms = |k: usize| mean(torques.iter().map(|m| m[k] * m[k])).sqrt();
+        let [apart, about_pole, across, roll] = moments(&scene).unwrap();
+        for (found, known) in [(about_pole, rms(0)), (across, rms(1))] {
+            assert!((found / known - 1.0).abs() < 0.005, "{found} {known}");
+        }
+        assert!(
+            (across / apart / 2.45 - 1.0).abs() < 0.03,
+            "{across} {apart}"
+        );
+        let [metric] = measure(&scene, ["rms_roll_deg"]).unwrap();
+        assert!((roll - metric).abs() < 1e-9, "{roll} {metric}");
+    }
+
+    #[test]
+    fn the_arm_grows_with_the_pole() {
+        let lab = Lab {
+            jobs: 0,
+            seeds: 1,
+            stop: &AtomicBool::new(false),
+            done: &|| {},
+        };
+        let found = run(&lab).unwrap();
+        for name in ["tilt_per_force", "roll_per_force_abreast"] {
+            let exponent = found.number(name).unwrap();
+            assert!((exponent - 1.0).abs() < 0.01, "{name}: {exponent}");
+        }
+        assert_ne!(found.verdict, Some(Verdict::NotSupported));
+    }
+}

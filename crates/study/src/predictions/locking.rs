@@ -1,7 +1,7 @@
 //! Prediction 1: the gait locks to the beat within Adler's range, and then the rath jumps higher and floats longer.
 
 use super::{Finding, Lab, Verdict, columns, mean, measure, number, row, scene, template};
-use crate::draw::{Figure, Layer, WHITE};
+use crate::draw::{Figure, Layer, WHITE, even_edges};
 use crate::sweep::summary::Spread;
 use sim::run::Sample;
 use sim::scene::Template;
@@ -56,6 +56,35 @@ pub fn edge(quiet: &Template, pull: f64, sign: f64) -> Result<f64, String> {
     Ok(0.5 * (low + high))
 }
 
+/// How far an edge lies from |Δω| = K_m, relative.
+fn miss(edge: f64, pull: f64) -> f64 {
+    (edge / pull - 1.0).abs()
+}
+
+/// Detunings nearer to the edge than this are on no side of it, rad/s: twice the spread of frequencies.
+const APART: f64 = 0.7;
+
+/// Whether a beat is slower or faster than the gait, and outside its range or inside.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Side {
+    SlowOut,
+    SlowIn,
+    FastIn,
+    FastOut,
+}
+
+impl Side {
+    fn of(detuning: f64, pull: f64) -> Option<Self> {
+        match detuning {
+            d if d < -pull - APART => Some(Self::SlowOut),
+            d if (-pull + APART..-0.5).contains(&d) => Some(Self::SlowIn),
+            d if (0.5..pull - APART).contains(&d) => Some(Self::FastIn),
+            d if d > pull + APART => Some(Self::FastOut),
+            _ => None,
+        }
+    }
+}
+
 /// Does it.
 pub fn run(lab: &Lab) -> Result<Finding, String> {
     let full = at_once(&[])?;
@@ -87,8 +116,8 @@ pub fn run(lab: &Lab) -> Result<Finding, String> {
     let worst = sides
         .iter()
         .zip(&edges)
-        .map(|((p, _), e)| (e / p - 1.0).abs())
-        .fold(0.0, f64::max);
+        .map(|((pull, _), edge)| miss(*edge, *pull));
+    let worst = worst.fold(0.0, f64::max);
 
     // Along one line, the paper's pull: what locking does to the height.
     let pull = 2.7;
@@ -106,32 +135,17 @@ pub fn run(lab: &Lab) -> Result<Finding, String> {
             .collect()
     };
     let (lock, height, float) = (of(0), of(1), of(2));
-    let apart = 0.7;
-    let group = |spreads: &[Spread], inside: &dyn Fn(f64) -> bool| {
-        mean(
-            detunings
-                .iter()
-                .zip(spreads)
-                .filter(|(d, _)| inside(**d))
-                .map(|(_, s)| s.mean),
-        )
+    let groups = |spreads: &[Spread]| {
+        [Side::SlowOut, Side::SlowIn, Side::FastIn, Side::FastOut].map(|side| {
+            let of = detunings.iter().zip(spreads);
+            mean(
+                of.filter(|(d, _)| Side::of(**d, pull) == Some(side))
+                    .map(|(_, s)| s.mean),
+            )
+        })
     };
-    let slow_out = |d: f64| d < -pull - apart;
-    let slow_in = |d: f64| (-pull + apart..-0.5).contains(&d);
-    let fast_in = |d: f64| (0.5..pull - apart).contains(&d);
-    let fast_out = |d: f64| d > pull + apart;
-    let (h_so, h_si, h_fi, h_fo) = (
-        group(&height, &slow_out),
-        group(&height, &slow_in),
-        group(&height, &fast_in),
-        group(&height, &fast_out),
-    );
-    let (f_so, f_si, f_fi, f_fo) = (
-        group(&float, &slow_out),
-        group(&float, &slow_in),
-        group(&float, &fast_in),
-        group(&float, &fast_out),
-    );
+    let [h_so, h_si, h_fi, h_fo] = groups(&height);
+    let [f_so, f_si, f_fi, f_fo] = groups(&float);
     // Without music, everything else the same.
     let silent = lab.map(&lab.with_seeds(&[0.0]), |(pull, seed)| {
         measure(
@@ -187,7 +201,7 @@ pub fn run(lab: &Lab) -> Result<Finding, String> {
         experiment: format!(
             "Detuning Δω = 2π(beat − {GAIT_HZ} Hz) against the pull K_m of the music in the paper's music scene, music from the start on. The map is the scene with its noise and \
              its spread of frequencies (0.35 rad/s), two seeds a cell; the edges are bisected without both, over 200 s. Then K_m = {pull} rad/s alone, {seeds} seeds at each detuning. \
-             'Locked' is |Δω| < K_m − {apart}, 'outside' |Δω| > K_m + {apart}, on each side by itself, because a slower beat lifts with less acceleration; 'no music' is K_m = 0."
+             'Locked' is |Δω| < K_m − {APART}, 'outside' |Δω| > K_m + {APART}, on each side by itself, because a slower beat lifts with less acceleration; 'no music' is K_m = 0."
         ),
         verdict: Some(verdict),
         because: format!(
@@ -228,8 +242,8 @@ pub fn run(lab: &Lab) -> Result<Finding, String> {
                         Layer::Map {
                             label: "locking".into(),
                             values: map.chunks(nx).map(<[f64]>::to_vec).collect(),
-                            x: x_range,
-                            y: y_range,
+                            x: even_edges(x_range, nx),
+                            y: even_edges(y_range, map.len() / nx),
                         },
                         Layer::line("", vec![(-4.0, 4.0), (0.0, 0.0), (4.0, 4.0)], WHITE),
                         Layer::points("", points, 1),
@@ -253,4 +267,21 @@ pub fn run(lab: &Lab) -> Result<Finding, String> {
             ),
         ],
     })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_detuning_is_on_a_side_of_the_edge_or_on_none() {
+        let sides = [-3.5, -3.0, -1.5, -0.25, 0.0, 1.5, 2.0, 2.5, 3.5].map(|d| Side::of(d, 2.7));
+        let (slow, fast) = (Some(Side::SlowIn), Some(Side::FastIn));
+        let [slow_out, fast_out] = [Some(Side::SlowOut), Some(Side::FastOut)];
+        assert_eq!(
+            sides,
+            [slow_out, None, slow, None, None, fast, None, None, fast_out]
+        );
+        assert!((miss(2.97, 2.7) - 0.1).abs() < 1e-12 && (miss(0.9, 1.0) - 0.1).abs() < 1e-12);
+    }
 }

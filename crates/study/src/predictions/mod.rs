@@ -383,5 +383,14 @@ mod tests {
         assert!((b - 1.182_795_698_924_731).abs() < 1e-14, "{b}");
         assert!((e - 0.298_697_729_749_111_2).abs() < 1e-14, "{e}");
         assert_eq!(row(1.0, 2.0, 3), [1.0, 1.5, 2.0]);
+        assert_eq!(mean([1.0, f64::NAN, 4.0]), 2.5);
+        let lab = Lab {
+            jobs: 1,
+            seeds: 2,
+            stop: &AtomicBool::new(false),
+            done: &|| {},
+        };
+        let pairs = [("a", 1001), ("a", 1002), ("b", 1001), ("b", 1002)];
+        assert_eq!(lab.with_seeds(&["a", "b"]), pairs);
     }
 }

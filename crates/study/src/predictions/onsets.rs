@@ -2,11 +2,29 @@
 
 use super::{Finding, Lab, Verdict, measure, number, row, scene, spearman, template};
 use crate::draw::{Figure, Layer};
-use crate::sweep::summary::Spread;
+use crate::sweep::summary::{Spread, quantile};
 
 /// How much more seeds than other ensembles: a spread needs them.
 const MORE: u64 = 4;
 const DURATION_S: f64 = 120.0;
+
+/// Between the quartiles of sorted times; NaN of three and fewer.
+fn width(times: &[f64]) -> f64 {
+    match times.len() {
+        0..=3 => f64::NAN,
+        _ => quantile(times, 0.75) - quantile(times, 0.25),
+    }
+}
+
+/// The amplitude at which half of the runs rock, of amplitudes with the shares that do: straight between neighbours.
+fn critical(shares: &[(f64, f64)]) -> f64 {
+    let mut pairs = shares.windows(2);
+    let crossed = pairs.find(|w| w[0].1 < 0.5 && w[1].1 >= 0.5);
+    crossed.map_or(f64::NAN, |w| {
+        let part = (0.5 - w[0].1) / (w[1].1 - w[0].1);
+        w[0].0 + part * (w[1].0 - w[0].0)
+    })
+}
 
 /// Does it.
 pub fn run(lab: &Lab) -> Result<Finding, String> {
@@ -62,27 +80,16 @@ pub fn run(lab: &Lab) -> Result<Finding, String> {
                 .filter(|t| t.is_finite())
                 .collect();
             times.sort_by(f64::total_cmp);
-            let quantile = |q| crate::sweep::summary::quantile(&times, q);
             Step {
                 amplitude_mm: 1e3 * a,
                 share: times.len() as f64 / seeds as f64,
-                iqr: if times.len() > 3 {
-                    quantile(0.75) - quantile(0.25)
-                } else {
-                    f64::NAN
-                },
+                iqr: width(&times),
                 spread: Spread::of(&times),
             }
         })
         .collect();
-    // Critical: half of the runs rock within the time; straight between the neighbours.
-    let critical = steps
-        .windows(2)
-        .find(|w| w[0].share < 0.5 && w[1].share >= 0.5)
-        .map_or(f64::NAN, |w| {
-            let part = (0.5 - w[0].share) / (w[1].share - w[0].share);
-            w[0].amplitude_mm + part * (w[1].amplitude_mm - w[0].amplitude_mm)
-        });
+    let shares: Vec<(f64, f64)> = steps.iter().map(|s| (s.amplitude_mm, s.share)).collect();
+    let critical = critical(&shares);
     // Only where nearly all have rocked is the spread that of onsets, not of the end of the run.
     let whole: Vec<&Step> = steps.iter().filter(|s| s.share > 0.95).collect();
     let (x, iqr): (Vec<f64>, Vec<f64>) = whole.iter().map(|s| (s.amplitude_mm, s.iqr)).unzip();
@@ -208,15 +215,27 @@ pub fn run(lab: &Lab) -> Result<Finding, String> {
                     title: "How many rock".into(),
                     x_label: "amplitude of the shoulders, mm".into(),
                     y_label: "share of runs".into(),
-                    layers: vec![Layer::line(
-                        "",
-                        steps.iter().map(|s| (s.amplitude_mm, s.share)).collect(),
-                        0,
-                    )],
+                    layers: vec![Layer::line("", shares, 0)],
                     y_range: Some((0.0, 1.02)),
                     ..Figure::default()
                 },
             ),
         ],
     })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn half_of_the_runs_and_half_of_the_onsets() {
+        let shares = [(56.0, 0.0), (58.0, 0.1), (60.0, 0.9), (62.0, 1.0)];
+        assert!((critical(&shares) - 59.0).abs() < 1e-12);
+        assert!((critical(&[(1.0, 0.2), (2.0, 0.6)]) - 1.75).abs() < 1e-12);
+        assert!(critical(&shares[2..]).is_nan());
+        // scipy.stats.iqr([1, 2, 4, 7, 11, 30]) of SciPy 1.17.1
+        assert_eq!(width(&[1.0, 2.0, 4.0, 7.0, 11.0, 30.0]), 7.5);
+        assert!(width(&[1.0, 2.0, 4.0]).is_nan());
+    }
 }

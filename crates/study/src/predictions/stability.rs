@@ -2,7 +2,7 @@
 
 use super::floquet::Hanging;
 use super::{Finding, Lab, columns, number, row, scene, slope, template};
-use crate::draw::{Figure, Layer, WHITE};
+use crate::draw::{Figure, Layer, WHITE, even_edges};
 use crate::ensemble::observe;
 use sim::run::Sample;
 use sim::scene::Template;
@@ -161,14 +161,8 @@ pub fn run(lab: &Lab) -> Result<Finding, String> {
         }
     }
     let paper = scene(&template("music", &[])?, &[], 1)?;
-    let beat = paper.effects.music.as_ref().map_or(f64::NAN, |m| m.beat_hz);
-    let lift = paper.effects.lift.as_ref().map_or(1.0, |l| l.gain);
-    let gait = paper
-        .effects
-        .gait
-        .as_ref()
-        .map_or(f64::NAN, |g| g.amplitude_m.get(0));
-    let here = (beat / roll, theory.depth(beat, lift * gait));
+    let (depth, beat) = theory.depth_of(&paper);
+    let here = (beat / roll, depth);
     let least = edge.iter().map(|e| e.1).fold(f64::INFINITY, f64::min);
     let figure = Figure {
         title: "Growth of roll under carriers in step".into(),
@@ -177,9 +171,9 @@ pub fn run(lab: &Lab) -> Result<Finding, String> {
         layers: vec![
             Layer::Map {
                 label: "growth in 1/s, shown within ±1".into(),
+                x: even_edges(x_range, values[0].len()),
+                y: even_edges(y_range, values.len()),
                 values,
-                x: x_range,
-                y: y_range,
             },
             Layer::dashed("", vec![(x_range.0, 1.0), (x_range.1, 1.0)], WHITE),
             Layer::line("", edge, WHITE),

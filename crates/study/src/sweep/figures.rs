@@ -2,7 +2,7 @@
 
 use super::Plan;
 use super::parts::Store;
-use super::spec::{Spacing, number};
+use super::spec::{Axis, Spacing, number};
 use super::summary::Spread;
 use super::table::{Cell, Kind, Reader};
 use crate::draw::{Figure, Layer};
@@ -14,10 +14,22 @@ use std::path::Path;
 enum Kinds {
     /// Mean and the band of 90 % over one axis of numbers.
     Band,
-    /// Mean over two evenly spaced axes.
+    /// Mean over two axes of numbers.
     Map,
     /// Share of runs up to each value.
     Distribution,
+}
+
+fn kind_of(axes: &[Axis]) -> Kinds {
+    let is_of_numbers = |a: &&Axis| {
+        let numbers = a.values.iter().all(|v| number(v).is_some());
+        !a.is_sampled() && a.len() > 1 && numbers
+    };
+    match axes.iter().filter(is_of_numbers).count() {
+        1 if axes.len() == 1 => Kinds::Band,
+        2 if axes.len() == 2 => Kinds::Map,
+        _ => Kinds::Distribution,
+    }
 }
 
 /// Draws every metric of a merged study into `folder`, as METRIC.png; gives how many.
@@ -28,17 +40,7 @@ pub fn draw(plan: &Plan, store: &Store, folder: &Path) -> Result<usize, String> 
     let io = |e: std::io::Error| format!("{}: cannot be made: {e}", folder.display());
     std::fs::create_dir_all(folder).map_err(io)?;
     let axes = &plan.spec.axes;
-    let kind = match &axes[..] {
-        [x] if !x.is_sampled() && x.len() > 1 && number(&x.value(0)).is_some() => Kinds::Band,
-        [x, y]
-            if [x, y]
-                .iter()
-                .all(|a| a.count.is_some_and(|n| n > 1) && a.spacing == Spacing::Linear) =>
-        {
-            Kinds::Map
-        }
-        _ => Kinds::Distribution,
-    };
+    let kind = kind_of(axes);
     let table = store.table();
     let say = |e: parquet::errors::ParquetError| format!("{}: {e}", table.display());
     let reader = Reader::open(&table).map_err(say)?;
@@ -160,37 +162,47 @@ fn map(
     if means.iter().all(|m| m.is_nan()) {
         return None;
     }
-    // Cells lie about their points: half a step beyond the ends.
-    let ends = |axis: &super::spec::Axis| {
-        let (a, b) = (axis.at(0.0), axis.at(1.0));
-        let half = 0.5 * (b - a) / (axis.len() - 1) as f64;
-        (f64::min(a - half, b + half), f64::max(a - half, b + half))
-    };
-    let falls = |axis: &super::spec::Axis| axis.at(1.0) < axis.at(0.0);
-    let mut values: Vec<Vec<f64>> = means
-        .chunks(x.len() as usize)
-        .map(<[f64]>::to_vec)
-        .collect();
-    if falls(y) {
-        values.reverse();
-    }
-    if falls(x) {
-        values.iter_mut().for_each(|row| row.reverse());
-    }
+    let (of_x, columns) = cells(x);
+    let (of_y, rows) = cells(y);
+    let count = x.len() as usize;
+    let row = |r: &usize| of_x.iter().map(|c| means[r * count + c]).collect();
+    let ends = |edges: &[f64]| Some((edges[0], edges[edges.len() - 1]));
     Some(Figure {
         title: format!("{label}{left_out}"),
         x_label: x.name.clone(),
         y_label: y.name.clone(),
+        x_range: ends(&columns),
+        y_range: ends(&rows),
+        x_log: x.spacing == Spacing::Log,
+        y_log: y.spacing == Spacing::Log,
         layers: vec![Layer::Map {
             label: label.into(),
-            values,
-            x: ends(x),
-            y: ends(y),
+            values: of_y.iter().map(row).collect(),
+            x: columns,
+            y: rows,
         }],
-        x_range: Some(ends(x)),
-        y_range: Some(ends(y)),
-        ..Figure::default()
     })
+}
+
+/// Which of an axis' values each cell is of, from the lowest up, and the cells' edges: half-way between neighbours, and as far beyond the ends.
+fn cells(axis: &Axis) -> (Vec<usize>, Vec<f64>) {
+    let apart = |x: f64| match axis.spacing {
+        Spacing::Linear => x,
+        Spacing::Log => x.ln(),
+    };
+    let value = |k: u64| apart(number(&axis.value(k)).unwrap_or(f64::NAN));
+    let mut at: Vec<(f64, usize)> = (0..axis.len()).map(value).zip(0..).collect();
+    at.sort_by(|a, b| a.0.total_cmp(&b.0));
+    let between = |w: &[(f64, usize)]| 0.5 * (w[0].0 + w[1].0);
+    let inner: Vec<f64> = at.windows(2).map(between).collect();
+    let first = 2.0 * at[0].0 - inner[0];
+    let last = 2.0 * at[at.len() - 1].0 - inner[inner.len() - 1];
+    let edges = [first].into_iter().chain(inner).chain([last]);
+    let edges = edges.map(|x| match axis.spacing {
+        Spacing::Linear => x,
+        Spacing::Log => x.exp(),
+    });
+    (at.iter().map(|a| a.1).collect(), edges.collect())
 }
 
 /// Share of all `runs` up to each value: it ends below one where some have none.
@@ -223,6 +235,45 @@ fn distribution(label: &str, mut values: Vec<f64>, runs: u64, turn: Option<f64>)
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    fn axes(text: &str) -> Vec<Axis> {
+        let text = format!("scene = \"music\"\naxes = [{text}]");
+        super::super::spec::parse("test", &text).unwrap().axes
+    }
+
+    #[test]
+    fn two_axes_of_numbers_are_a_map() {
+        let mass = "{ key = \"body.mass_kg\", values = [40, 80.0, 50] }";
+        let beat = "{ key = \"effects.music.beat_hz\", from = 1.0, to = 4.0, count = 3, spacing = \"log\" }";
+        let words = "{ key = \"effects.friction.law\", values = [\"regularised\", \"bristle\"] }";
+        let one = "{ key = \"effects.music.beat_hz\", values = [2.0] }";
+        let kind = |text: &[&str]| match kind_of(&axes(&text.join(", "))) {
+            Kinds::Band => "band",
+            Kinds::Map => "map",
+            Kinds::Distribution => "distribution",
+        };
+        assert_eq!(kind(&[mass]), "band");
+        assert_eq!(kind(&[mass, beat]), "map");
+        assert_eq!(kind(&[beat, mass]), "map");
+        assert_eq!(kind(&[mass, words]), "distribution");
+        assert_eq!(kind(&[one, mass]), "distribution");
+        assert_eq!(kind(&[words]), "distribution");
+
+        // Values are put in order, cells lie about them, and equal factors stay equal.
+        let found = axes(&[mass, beat].join(", "));
+        assert_eq!(
+            cells(&found[0]),
+            (vec![0, 2, 1], vec![35.0, 45.0, 65.0, 95.0])
+        );
+        let (order, edges) = cells(&found[1]);
+        assert_eq!(order, [0, 1, 2]);
+        for (edge, power) in edges.iter().zip([-0.5, 0.5, 1.5, 2.5]) {
+            assert!(
+                (edge / 2.0_f64.powf(power) - 1.0).abs() < 1e-14,
+                "{edges:?}"
+            );
+        }
+    }
 
     /// Three of four runs have it. The share jumps at each value and does not climb to it: between 2 and 4 it is one half.
     #[test]
