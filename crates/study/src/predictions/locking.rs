@@ -75,11 +75,14 @@ enum Side {
 
 impl Side {
     fn of(detuning: f64, pull: f64) -> Option<Self> {
-        match detuning {
-            d if d < -pull - APART => Some(Self::SlowOut),
-            d if (-pull + APART..-0.5).contains(&d) => Some(Self::SlowIn),
-            d if (0.5..pull - APART).contains(&d) => Some(Self::FastIn),
-            d if d > pull + APART => Some(Self::FastOut),
+        let off = detuning.abs();
+        match detuning < 0.0 {
+            slower if off > pull + APART => {
+                Some(if slower { Self::SlowOut } else { Self::FastOut })
+            }
+            slower if (0.5..pull - APART).contains(&off) => {
+                Some(if slower { Self::SlowIn } else { Self::FastIn })
+            }
             _ => None,
         }
     }
@@ -201,7 +204,7 @@ pub fn run(lab: &Lab) -> Result<Finding, String> {
         experiment: format!(
             "Detuning Δω = 2π(beat − {GAIT_HZ} Hz) against the pull K_m of the music in the paper's music scene, music from the start on. The map is the scene with its noise and \
              its spread of frequencies (0.35 rad/s), two seeds a cell; the edges are bisected without both, over 200 s. Then K_m = {pull} rad/s alone, {seeds} seeds at each detuning. \
-             'Locked' is |Δω| < K_m − {APART}, 'outside' |Δω| > K_m + {APART}, on each side by itself, because a slower beat lifts with less acceleration; 'no music' is K_m = 0."
+             'Locked' is 0.5 ≤ |Δω| < K_m − {APART}, 'outside' |Δω| > K_m + {APART}, on each side by itself, because a slower beat lifts with less acceleration; 'no music' is K_m = 0."
         ),
         verdict: Some(verdict),
         because: format!(
@@ -275,13 +278,24 @@ mod tests {
 
     #[test]
     fn a_detuning_is_on_a_side_of_the_edge_or_on_none() {
-        let sides = [-3.5, -3.0, -1.5, -0.25, 0.0, 1.5, 2.0, 2.5, 3.5].map(|d| Side::of(d, 2.7));
+        let of = |detunings: [f64; 9]| detunings.map(|d| Side::of(d, 2.7));
+        let sides = of([-3.5, -3.0, -1.5, -0.25, 0.0, 1.5, 2.0, 2.5, 3.5]);
         let (slow, fast) = (Some(Side::SlowIn), Some(Side::FastIn));
         let [slow_out, fast_out] = [Some(Side::SlowOut), Some(Side::FastOut)];
         assert_eq!(
             sides,
             [slow_out, None, slow, None, None, fast, None, None, fast_out]
         );
+        // Both sides hold the same detunings.
+        let row = of([0.5, 1.0, 1.5, 2.0, 2.5, 3.0, 3.5, 4.0, 4.5]);
+        let mirrored = of([-0.5, -1.0, -1.5, -2.0, -2.5, -3.0, -3.5, -4.0, -4.5]);
+        for (fast, slow) in row.into_iter().zip(mirrored) {
+            let turned = fast.map(|side| match side {
+                Side::FastIn => Side::SlowIn,
+                _ => Side::SlowOut,
+            });
+            assert_eq!(slow, turned);
+        }
         assert!((miss(2.97, 2.7) - 0.1).abs() < 1e-12 && (miss(0.9, 1.0) - 0.1).abs() < 1e-12);
     }
 }
