@@ -316,30 +316,24 @@ impl<'m> Recorder<'m> {
         TfMessage { transforms }
     }
 
-    /// Force arrows (one metre is the body's weight) and contact marks.
+    /// Force arrows (half a metre is a fair share of the body's weight) and contact marks.
     fn arrows(&self, s: &Sample, t_ns: i64) -> foxglove::SceneUpdate {
         let handles = s.normal_n.len();
+        let metres_per_newton = match self.weight_n > 0.0 {
+            true => 0.5 * handles as f64 / self.weight_n,
+            false => 0.0,
+        };
         let mut arrows = Vec::with_capacity(handles);
         let mut spheres = Vec::with_capacity(handles);
         for ((&normal_n, tangential_n), handle_m) in
             s.normal_n.iter().zip(&s.tangential_n).zip(&s.handle_m)
         {
-            let share = if self.weight_n > 0.0 {
-                normal_n / self.weight_n
-            } else {
-                0.0
-            };
             let color = Some(contact_color(Load::of(normal_n, self.weight_n, handles)));
-            let [tx, ty] = tangential_n.map(|t| {
-                if self.weight_n > 0.0 {
-                    t / self.weight_n
-                } else {
-                    0.0
-                }
-            });
-            let length = (tx * tx + ty * ty + share * share).sqrt();
+            let force_n = [tangential_n[0], tangential_n[1], normal_n];
+            let [x, y, z] = force_n.map(|n| metres_per_newton * n);
+            let length = (x * x + y * y + z * z).sqrt();
             if length > 1e-6 {
-                let orientation = Some(turn_from_x([tx / length, ty / length, share / length]));
+                let orientation = Some(turn_from_x([x / length, y / length, z / length]));
                 arrows.push(foxglove::ArrowPrimitive {
                     pose: Some(foxglove::Pose {
                         position: Some(point(*handle_m)),
