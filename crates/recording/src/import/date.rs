@@ -1,14 +1,43 @@
-//! Times that a log writes as a date and a clock, or as a clock alone.
+//! Times as logs write them: numbers, a date and a clock, or a clock alone.
 
 use std::str::FromStr as _;
 
 use prost_types::Timestamp;
 
+use super::{ImportError, imu, table::Table};
+
 const DAY_NS: i64 = 86_400_000_000_000;
 
-/// Reads the times of a column, row by row.
+/// The times of all rows, ns from 1970 or from the device's start: numbers of so many nanoseconds, dates or clocks.
+pub(super) fn times_ns(
+    table: &Table,
+    column: usize,
+    unit_ns: i64,
+) -> Result<Vec<i64>, ImportError> {
+    let mut dates = Dates::default();
+    let read = |row| {
+        let cell = table.text(row, column);
+        let t_ns = if cell.contains(':') {
+            dates.read(cell)
+        } else if let Ok(whole) = cell.parse::<i64>() {
+            // Whole numbers keep all their digits.
+            whole.checked_mul(unit_ns)
+        } else {
+            imu::nanoseconds(table.number(row, column)? * (unit_ns as f64 / 1e9))
+        };
+        t_ns.filter(|t_ns| *t_ns >= 0).ok_or_else(|| {
+            table.problem(format!(
+                "has the time {cell:?} in row {}; expected a time from 0 on, or a date and a clock",
+                row + 1
+            ))
+        })
+    };
+    (0..table.len()).map(read).collect()
+}
+
+/// Reads the dates and clocks of a column, row by row.
 #[derive(Debug, Default)]
-pub(super) struct Dates {
+struct Dates {
     /// Midnights passed by a clock that tells no date.
     days: i64,
     last_ns: i64,
@@ -17,7 +46,7 @@ pub(super) struct Dates {
 impl Dates {
     /// Nanoseconds since 1970 (UTC where no zone is given) of `2018-10-03 17:23:55.464`, RFC 3339 or the same with slashes; of a clock alone,
     /// `17:23:55.464` or `17:23:55:464`, since its first midnight. `None` for anything else, and for times before 1970.
-    pub fn read(&mut self, cell: &str) -> Option<i64> {
+    fn read(&mut self, cell: &str) -> Option<i64> {
         let cell = cell.replace('/', "-").replace(',', ".");
         if cell.find(':')? > 2 {
             return nanoseconds(&cell);

@@ -6,7 +6,7 @@ use serde::Deserialize;
 
 use super::{
     Files, HEADER_LINES, ImportError,
-    date::Dates,
+    date::times_ns,
     imu::{self, Log, STANDARD_GRAVITY, Track},
     table::Table,
 };
@@ -188,7 +188,16 @@ pub(super) fn read(layout: &Layout, name: &str, text: &str) -> Result<Log, Impor
             table.problem("the layout names neither acceleration nor angular_velocity".to_owned())
         );
     }
-    let times_ns = times_ns(&table, time, &layout.time)?;
+    let start_ns = imu::nanoseconds(layout.time.start_s)
+        .ok_or_else(|| table.problem("the layout's start_s is no time since 1970".to_owned()))?;
+    let since = |t_ns: i64| t_ns.checked_add(start_ns);
+    let times_ns: Option<Vec<i64>> = times_ns(&table, time, layout.time.unit.ns())?
+        .into_iter()
+        .map(since)
+        .collect();
+    let times_ns = times_ns.ok_or_else(|| {
+        table.problem("a time after the layout's start_s is beyond 2262".to_owned())
+    })?;
     let mut track = |columns: Option<([usize; 3], f64)>, what: &str| {
         let mut track = Track::new();
         let Some((columns, factor)) = columns else {
@@ -219,33 +228,6 @@ pub(super) fn read(layout: &Layout, name: &str, text: &str) -> Result<Log, Impor
     );
     let device = layout.device.as_deref().unwrap_or(name);
     Ok(Log::join(imu::device_name(device), force, rate, notes))
-}
-
-/// The time of every row, ns: a number in the layout's unit, or a date and a clock.
-fn times_ns(table: &Table, column: usize, time: &Time) -> Result<Vec<i64>, ImportError> {
-    let start = imu::nanoseconds(time.start_s)
-        .ok_or_else(|| table.problem("the layout's start_s is no time since 1970".to_owned()))?;
-    let mut dates = Dates::default();
-    let read = |row| {
-        let cell = table.text(row, column);
-        let t_ns = if cell.contains(':') {
-            dates.read(cell)
-        } else if let Ok(whole) = cell.parse::<i64>() {
-            // Whole numbers keep all their digits.
-            whole.checked_mul(time.unit.ns())
-        } else {
-            imu::nanoseconds(table.number(row, column)? * (time.unit.ns() as f64 / 1e9))
-        };
-        t_ns.and_then(|t_ns| t_ns.checked_add(start))
-            .filter(|t_ns| *t_ns >= 0)
-            .ok_or_else(|| {
-                table.problem(format!(
-                    "has the time {cell:?} in row {}; expected a time from 0 on, or a date and a clock",
-                    row + 1
-                ))
-            })
-    };
-    (0..table.len()).map(read).collect()
 }
 
 #[cfg(test)]

@@ -3,6 +3,7 @@
 
 use super::{
     Files, ImportError,
+    date::times_ns,
     imu::{self, Log, STANDARD_GRAVITY, Track},
     table::Table,
 };
@@ -46,15 +47,7 @@ pub(super) fn read(files: &Files) -> Result<Log, ImportError> {
         let names = ["x", "y", "z"].map(|axis| format!("{axis}-axis ({unit})"));
         let axes = table.find_all(names.each_ref().map(String::as_str))?;
         let mut track = Track::new();
-        for row in 0..table.len() {
-            let t_ms = table.number(row, time)?;
-            let Some(t_ns) = imu::nanoseconds(t_ms * 1e-3) else {
-                return Err(table.problem(format!(
-                    "has the time {:?} in row {}; expected milliseconds since 1970",
-                    table.text(row, time),
-                    row + 1
-                )));
-            };
+        for (row, t_ns) in times_ns(&table, time, 1_000_000)?.into_iter().enumerate() {
             track.push((t_ns, table.vector(row, axes)?.map(|x| x * factor)));
         }
         Ok(track)

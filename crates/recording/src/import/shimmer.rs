@@ -6,7 +6,7 @@
 
 use super::{
     Files, ImportError,
-    date::Dates,
+    date::times_ns,
     imu::{self, Log, STANDARD_GRAVITY, Track},
     table::Table,
 };
@@ -57,7 +57,7 @@ pub(super) fn read(files: &Files) -> Result<Log, ImportError> {
         let columns = there.then(|| table.find_all(names.each_ref().map(String::as_str)));
         columns.transpose()
     };
-    let times_ns = times_ns(&table, time)?;
+    let times_ns = times_ns(&table, time, 1_000_000)?;
     let track = |columns: Option<[usize; 3]>, factor: f64| {
         let mut track = Track::new();
         if let Some(columns) = columns {
@@ -104,24 +104,4 @@ pub(super) fn read(files: &Files) -> Result<Log, ImportError> {
         )));
     }
     Ok(Log::join(imu::device_name(&files.name), force, rate, notes))
-}
-
-/// The time of every row, ns.
-fn times_ns(table: &Table, column: usize) -> Result<Vec<i64>, ImportError> {
-    let mut dates = Dates::default();
-    let read = |row| {
-        let cell = table.text(row, column);
-        let t_ns = if cell.contains(':') {
-            dates.read(cell)
-        } else {
-            imu::nanoseconds(table.number(row, column)? * 1e-3)
-        };
-        t_ns.ok_or_else(|| {
-            table.problem(format!(
-                "has the time {cell:?} in row {}; expected milliseconds since 1970 or a date",
-                row + 1
-            ))
-        })
-    };
-    (0..table.len()).map(read).collect()
 }
