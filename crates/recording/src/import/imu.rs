@@ -84,21 +84,13 @@ impl Log {
 /// that hardly moves, values last now short, now long.
 pub(super) fn without_repeats(track: &Track) -> Option<Track> {
     let bits = |row: &(i64, [f64; 3])| row.1.map(f64::to_bits);
-    let mut lasts: Vec<usize> = track
-        .chunk_by(|a, b| bits(a) == bits(b))
-        .map(<[_]>::len)
-        .collect();
-    let new = lasts.len();
+    let held: Vec<_> = track.chunk_by(|a, b| bits(a) == bits(b)).collect();
+    let mut lasts: Vec<usize> = held.iter().map(|same| same.len()).collect();
     lasts.sort_unstable();
+    let new = held.len();
     let evenly = *lasts.get(new * 19 / 20)? <= lasts[new / 2] * 3 / 2 + 1;
-    let held = new >= 8 && new * 4 <= track.len() * 3 && evenly;
-    let first = |same: &[(i64, [f64; 3])]| same[0];
-    held.then(|| {
-        track
-            .chunk_by(|a, b| bits(a) == bits(b))
-            .map(first)
-            .collect()
-    })
+    let is_held = new >= 8 && new * 4 <= track.len() * 3 && evenly;
+    is_held.then(|| held.iter().map(|same| same[0]).collect())
 }
 
 /// The median interval of a track, ns.

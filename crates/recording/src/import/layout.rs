@@ -199,17 +199,12 @@ pub(super) fn read(layout: &Layout, name: &str, text: &str) -> Result<Log, Impor
         table.problem("a time after the layout's start_s is beyond 2262".to_owned())
     })?;
     let mut track = |columns: Option<([usize; 3], f64)>, what: &str| {
-        let mut track = Track::new();
         let Some((columns, factor)) = columns else {
-            return Ok::<_, ImportError>(track);
+            return Ok::<_, ImportError>(Track::new());
         };
-        for (row, t_ns) in times_ns.iter().enumerate() {
-            let values = table.vector(row, columns)?;
-            // Others may have a row of their own.
-            if !values.iter().all(|x| x.is_nan()) {
-                track.push((*t_ns, values.map(|x| x * factor)));
-            }
-        }
+        let mut track = table.track(&times_ns, columns, factor)?;
+        // Others may have a row of their own.
+        track.retain(|(_, values)| !values.iter().all(|x| x.is_nan()));
         // The sensors of one table may come late, not before each other.
         track.sort_by_key(|row| row.0);
         if let Some(new) = imu::without_repeats(&track) {

@@ -46,11 +46,7 @@ pub(super) fn read(files: &Files) -> Result<Log, ImportError> {
         let time = table.find_all([epoch])?[0];
         let names = ["x", "y", "z"].map(|axis| format!("{axis}-axis ({unit})"));
         let axes = table.find_all(names.each_ref().map(String::as_str))?;
-        let mut track = Track::new();
-        for (row, t_ns) in times_ns(&table, time, 1_000_000)?.into_iter().enumerate() {
-            track.push((t_ns, table.vector(row, axes)?.map(|x| x * factor)));
-        }
-        Ok(track)
+        table.track(&times_ns(&table, time, 1_000_000)?, axes, factor)
     };
     let force = track(FORCE, "g", STANDARD_GRAVITY)?;
     let rate = track(RATE, "deg/s", 1f64.to_radians())?;

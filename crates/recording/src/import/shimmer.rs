@@ -59,13 +59,9 @@ pub(super) fn read(files: &Files) -> Result<Log, ImportError> {
     };
     let times_ns = times_ns(&table, time, 1_000_000)?;
     let track = |columns: Option<[usize; 3]>, factor: f64| {
-        let mut track = Track::new();
-        if let Some(columns) = columns {
-            for (row, t_ns) in times_ns.iter().enumerate() {
-                track.push((*t_ns, table.vector(row, columns)?.map(|x| x * factor)));
-            }
-        }
-        Ok::<_, ImportError>(track)
+        columns.map_or(Ok(Track::new()), |columns| {
+            table.track(&times_ns, columns, factor)
+        })
     };
     let (low_noise, wide) = (
         track(axes("Accel_LN")?, 1.0)?,

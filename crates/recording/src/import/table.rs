@@ -1,6 +1,8 @@
 //! Delimited text as a table: separator and decimal sign found out, columns by name, a sentence for every number that is none.
 
-use super::ImportError;
+use std::borrow::Cow;
+
+use super::{ImportError, imu::Track};
 
 /// How programs write a value that is missing.
 const NOTHING: [&str; 7] = ["null", "none", "na", "n/a", "∞", "+∞", "-∞"];
@@ -122,10 +124,7 @@ impl Table {
         let a_number = |cell: &str| cell.replace(',', ".").parse::<f64>().is_ok();
         let told = first.iter().any(|cell| !cell.is_empty()) && !first.iter().any(a_number);
         // A row of missing values is none of units.
-        let missing = |cell: &str| {
-            cell.is_empty() || NOTHING.iter().any(|word| cell.eq_ignore_ascii_case(word))
-        };
-        (told && !first.iter().all(missing)).then(|| self.rows.remove(0))
+        (told && !first.iter().all(is_missing)).then(|| self.rows.remove(0))
     }
 
     /// The number of rows.
@@ -196,8 +195,11 @@ impl Table {
     /// A cell's number; one that is empty, or says that there is none, is NaN.
     pub fn number(&self, row: usize, column: usize) -> Result<f64, ImportError> {
         // Some programs write the minus of typography.
-        let cell = &self.text(row, column).replace('\u{2212}', "-");
-        if cell.is_empty() || NOTHING.iter().any(|word| cell.eq_ignore_ascii_case(word)) {
+        let mut cell = Cow::from(self.text(row, column));
+        if cell.contains('\u{2212}') {
+            cell = cell.replace('\u{2212}', "-").into();
+        }
+        if is_missing(&cell) {
             return Ok(f64::NAN);
         }
         let parsed = if self.decimal_comma {
@@ -213,6 +215,19 @@ impl Table {
                 self.columns.get(column).map_or("", String::as_str)
             ))
         })
+    }
+
+    /// Three numbers of every row, times `factor`, at its time.
+    pub fn track(
+        &self,
+        times_ns: &[i64],
+        columns: [usize; 3],
+        factor: f64,
+    ) -> Result<Track, ImportError> {
+        let times = times_ns.iter().enumerate();
+        let each =
+            times.map(|(row, t_ns)| Ok((*t_ns, self.vector(row, columns)?.map(|x| x * factor))));
+        each.collect()
     }
 
     /// Three numbers of a row.
@@ -240,6 +255,11 @@ fn separator(header: &str) -> u8 {
         .copied()
         .max_by_key(|&(_, count)| count)
         .map_or(b',', |(sign, _)| sign)
+}
+
+/// Whether a cell has no value, or says so.
+fn is_missing(cell: &str) -> bool {
+    cell.is_empty() || NOTHING.iter().any(|word| cell.eq_ignore_ascii_case(word))
 }
 
 fn plain(name: &str) -> String {
