@@ -190,18 +190,11 @@ pub fn run(lab: &Lab) -> Result<Finding, String> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use std::sync::atomic::AtomicBool;
 
     /// Floquet's threshold decides, and contact is lost from a depth of one on: a threshold below is reached in contact, one above is not.
     #[test]
     fn rocking_with_contact_kept_is_where_the_threshold_is_below_one() {
-        let lab = Lab {
-            jobs: 0,
-            seeds: 1,
-            stop: &AtomicBool::new(false),
-            done: &|| {},
-        };
-        let found = run(&lab).unwrap();
+        let found = run(&Lab::quiet(1)).unwrap();
         let of = |name: &str| found.number(name).unwrap();
         assert!(of("threshold_tuned") < 0.5 && of("threshold_paper") > 1.0);
         assert!(of("kept_tuned") > ROCKS_DEG && of("kept_paper") < 1.0);

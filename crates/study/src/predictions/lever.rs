@@ -238,7 +238,6 @@ pub fn run(lab: &Lab) -> Result<Finding, String> {
 mod tests {
     use super::*;
     use crate::predictions::{Verdict, measure};
-    use std::sync::atomic::AtomicBool;
 
     /// Two forces at the ends of a pole have a moment of half its length times their difference; about the pole they have what turns the body, by Euler's
     /// equations of a body with I_yy = I_zz: M_x = I_xx ω̇_x, M_y = I_yy ω̇_y − (I_zz − I_xx) ω_z ω_x.
@@ -285,13 +284,7 @@ mod tests {
 
     #[test]
     fn the_arm_grows_with_the_pole() {
-        let lab = Lab {
-            jobs: 0,
-            seeds: 1,
-            stop: &AtomicBool::new(false),
-            done: &|| {},
-        };
-        let found = run(&lab).unwrap();
+        let found = run(&Lab::quiet(1)).unwrap();
         for name in ["tilt_per_force", "roll_per_force_abreast"] {
             let exponent = found.number(name).unwrap();
             assert!((exponent - 1.0).abs() < 0.01, "{name}: {exponent}");

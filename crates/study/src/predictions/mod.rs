@@ -135,6 +135,20 @@ pub struct Lab<'a> {
     pub done: &'a dyn Fn(),
 }
 
+#[cfg(test)]
+impl Lab<'static> {
+    /// Of so many seeds, that nobody stops and that tells nobody.
+    fn quiet(seeds: u64) -> Self {
+        static NEVER: AtomicBool = AtomicBool::new(false);
+        Lab {
+            jobs: 0,
+            seeds,
+            stop: &NEVER,
+            done: &|| {},
+        }
+    }
+}
+
 impl Lab<'_> {
     /// `work` on every item, results in their order.
     ///
@@ -384,12 +398,7 @@ mod tests {
         assert!((e - 0.298_697_729_749_111_2).abs() < 1e-14, "{e}");
         assert_eq!(row(1.0, 2.0, 3), [1.0, 1.5, 2.0]);
         assert_eq!(mean([1.0, f64::NAN, 4.0]), 2.5);
-        let lab = Lab {
-            jobs: 1,
-            seeds: 2,
-            stop: &AtomicBool::new(false),
-            done: &|| {},
-        };
+        let lab = Lab::quiet(2);
         let pairs = [("a", 1001), ("a", 1002), ("b", 1001), ("b", 1002)];
         assert_eq!(lab.with_seeds(&["a", "b"]), pairs);
     }
