@@ -137,6 +137,11 @@ pub trait FreedomsOnEight {
     /// The processor has AVX2 and FMA.
     #[cfg(target_arch = "x86_64")]
     #[allow(unsafe_code)]
+    unsafe fn gaps_of_fused(&self, y: &[f64], w: &mut Workspace, block: Block);
+    /// # Safety
+    /// The processor has AVX2 and FMA.
+    #[cfg(target_arch = "x86_64")]
+    #[allow(unsafe_code)]
     unsafe fn accelerate_fused(&self, y: &[f64], w: &Workspace, dy: &mut [f64]);
     fn gaps_slopes(&self, y: &[Slope], w: &mut Workspace<Slopes>);
     fn orient_slopes(&self, y: &[Slope], w: &mut Workspace<Slopes>);
@@ -171,6 +176,12 @@ impl<T: Coordinates> FreedomsOnEight for T {
     #[allow(unsafe_code)]
     unsafe fn gaps_fused(&self, y: &[f64], w: &mut Workspace) {
         self.gaps_at(FusedEach::all(y), w.fused(), All);
+    }
+    #[cfg(target_arch = "x86_64")]
+    #[target_feature(enable = "avx2,fma")]
+    #[allow(unsafe_code)]
+    unsafe fn gaps_of_fused(&self, y: &[f64], w: &mut Workspace, block: Block) {
+        self.gaps_at(FusedEach::all(y), w.fused(), block);
     }
     #[cfg(target_arch = "x86_64")]
     #[target_feature(enable = "avx2,fma")]

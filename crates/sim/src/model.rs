@@ -128,7 +128,7 @@ pub struct Model {
     turns_softly: Option<f64>,
     /// Whether there are so many carriers that they are treated block by block.
     in_blocks: bool,
-    /// Whether the processor has AVX2 and FMA, and the carriers are not in blocks.
+    /// Whether the processor has AVX2 and FMA.
     fused: bool,
     sensor_clocks: Vec<Clock>,
     imus: Vec<Imu>,
@@ -232,9 +232,7 @@ impl Model {
                 .all(|term| term.on_block().is_some());
         #[cfg(target_arch = "x86_64")]
         {
-            model.fused = !model.in_blocks
-                && is_x86_feature_detected!("avx2")
-                && is_x86_feature_detected!("fma");
+            model.fused = is_x86_feature_detected!("avx2") && is_x86_feature_detected!("fma");
         }
         model
     }

@@ -2,7 +2,7 @@
 
 use super::Model;
 use super::term::{Account, Power, Stage, Term};
-use super::workspace::{Pair, Workspace, blocks};
+use super::workspace::{Block, Pair, Workspace, blocks};
 use crate::lanes::{self, f64x2};
 #[cfg(target_arch = "x86_64")]
 use crate::lanes::{FusedPair, Number};
@@ -109,20 +109,20 @@ impl Model {
         }
         let out = dy[self.layout.ledger_range()].chunks_exact_mut(2);
         for ((_, account), out) in self.accounts.iter().zip(out) {
-            let power = self.power(&**account, w);
+            let power = self.power(&**account, w, &w.pair, 0);
             out.copy_from_slice(&[power.work_w, power.dissipated_w]);
         }
     }
 
     #[inline(always)]
-    fn power(&self, account: &dyn Account, w: &Workspace) -> Power {
+    fn power(&self, account: &dyn Account, w: &Workspace, pairs: &[Pair], first: usize) -> Power {
         #[cfg(target_arch = "x86_64")]
         if self.fused {
             // SAFETY: the processor was asked.
             #[allow(unsafe_code)]
-            return unsafe { account.power_fused(w) };
+            return unsafe { account.power_fused(w, pairs, first) };
         }
-        account.power(w, &w.pair, 0)
+        account.power(w, pairs, first)
     }
 
     #[cold]
@@ -132,7 +132,7 @@ impl Model {
         for block in blocks(w.pair.len()) {
             let pairs = &w.pair[block.clone()];
             for ((_, account), out) in self.accounts.iter().zip(ledger.chunks_exact_mut(2)) {
-                let power = account.power(w, pairs, block.start);
+                let power = self.power(&**account, w, pairs, block.start);
                 out[0] += power.work_w;
                 out[1] += power.dissipated_w;
             }
@@ -168,7 +168,7 @@ impl Model {
         }
         w.body_torque = [0.0; 3];
         if self.in_blocks {
-            self.handles_in_blocks(t_s, y, w);
+            self.handles_in_blocks::<FUSED>(t_s, y, w);
         } else {
             self.handles::<FUSED>(t_s, y, w);
         }
@@ -220,20 +220,50 @@ impl Model {
 
     /// The same, with everything about a block done before it leaves the first cache.
     #[cold]
-    fn handles_in_blocks(&self, t_s: f64, y: &[f64], w: &mut Workspace) {
-        let local = |stage: Stage| {
-            let terms = self.terms.of(stage).iter();
-            terms.filter_map(|term| term.on_block())
-        };
+    fn handles_in_blocks<const FUSED: bool>(&self, t_s: f64, y: &[f64], w: &mut Workspace) {
         for block in blocks(w.pair.len()) {
             if self.has_phases {
                 w.pair[block.clone()].iter_mut().for_each(Pair::stand);
-                local(Stage::Shoulders).for_each(|term| term.apply_to(t_s, w, block.clone()));
+                self.apply_to::<FUSED>(Stage::Shoulders, t_s, w, &block);
             }
-            self.freedoms.gaps_of(y, w, block.clone());
-            local(Stage::Handles).for_each(|term| term.apply_to(t_s, w, block.clone()));
+            self.place_block::<FUSED>(y, w, &block);
+            self.apply_to::<FUSED>(Stage::Handles, t_s, w, &block);
         }
-        Self::apply::<false>(self.terms.of(Stage::Body), t_s, w);
+        Self::apply::<FUSED>(self.terms.of(Stage::Body), t_s, w);
+    }
+
+    #[inline(always)]
+    fn apply_to<const FUSED: bool>(
+        &self,
+        stage: Stage,
+        t_s: f64,
+        w: &mut Workspace,
+        block: &Block,
+    ) {
+        let terms = self.terms.of(stage).iter();
+        for term in terms.filter_map(|term| term.on_block()) {
+            #[cfg(target_arch = "x86_64")]
+            if FUSED {
+                // SAFETY: where this is true the processor was asked.
+                #[allow(unsafe_code)]
+                unsafe {
+                    term.apply_to_fused(t_s, w, block.clone());
+                }
+                continue;
+            }
+            term.apply_to(t_s, w, block.clone());
+        }
+    }
+
+    #[inline(always)]
+    fn place_block<const FUSED: bool>(&self, y: &[f64], w: &mut Workspace, block: &Block) {
+        #[cfg(target_arch = "x86_64")]
+        if FUSED {
+            // SAFETY: where this is true the processor was asked.
+            #[allow(unsafe_code)]
+            return unsafe { self.freedoms.gaps_of_fused(y, w, block.clone()) };
+        }
+        self.freedoms.gaps_of(y, w, block.clone());
     }
 
     #[inline(always)]
@@ -252,8 +282,8 @@ impl Model {
         }
         if self.in_blocks {
             // The shoulders are moved block by block.
-            Self::apply::<false>(self.terms.of(Stage::Clock), t_s, w);
-            Self::apply::<false>(self.terms.of(Stage::Phases), t_s, w);
+            Self::apply::<FUSED>(self.terms.of(Stage::Clock), t_s, w);
+            Self::apply::<FUSED>(self.terms.of(Stage::Phases), t_s, w);
         } else {
             Self::apply::<FUSED>(self.terms.with(Stage::Shoulders), t_s, w);
         }
@@ -378,17 +408,24 @@ mod tests {
                     model.rhs(31.0, &y, &mut dy, &mut w);
                     dy
                 };
-                let blocks = rates(&model);
-                model.in_blocks = false;
+                // By fused arithmetic, where the processor has it, and without.
+                let kinds = [model.fused, false];
                 let ledger = model.layout().ledger_range();
-                for (k, (a, b)) in blocks.iter().zip(rates(&model)).enumerate() {
-                    // Only sums of the ledger come in another order.
-                    let same = if ledger.contains(&k) {
-                        (a - b).abs() <= 1e-12 * (1e3 + b.abs())
-                    } else {
-                        a.to_bits() == b.to_bits()
-                    };
-                    assert!(same, "{freedom} {forces} {k}: {a} {b}");
+                for fused in kinds {
+                    model.fused = fused;
+                    let [blocks, at_once] = [true, false].map(|in_blocks| {
+                        model.in_blocks = in_blocks;
+                        rates(&model)
+                    });
+                    for (k, (a, b)) in blocks.iter().zip(at_once).enumerate() {
+                        // Only sums of the ledger come in another order.
+                        let same = if ledger.contains(&k) {
+                            (a - b).abs() <= 1e-12 * (1e3 + b.abs())
+                        } else {
+                            a.to_bits() == b.to_bits()
+                        };
+                        assert!(same, "{freedom} {forces} {fused} {k}: {a} {b}");
+                    }
                 }
             }
         }

@@ -1,5 +1,7 @@
 //! What an effect adds to the right-hand side: terms, moments at which it may jump, pages in the energy ledger.
 
+#[cfg(target_arch = "x86_64")]
+use super::workspace::fused;
 use super::workspace::{All, Block, Pair, Part, Workspace};
 #[cfg(target_arch = "x86_64")]
 use crate::lanes::{Avx2, Avx512, Fused, FusedEach};
@@ -45,11 +47,24 @@ pub struct AsWhole<T>(pub T);
 pub trait OnBlock {
     /// Adds its part to a block.
     fn apply_to(&self, t_s: f64, w: &mut Workspace, block: Block);
+    /// The same by fused arithmetic.
+    ///
+    /// # Safety
+    /// The processor has AVX2 and FMA.
+    #[cfg(target_arch = "x86_64")]
+    #[allow(unsafe_code)]
+    unsafe fn apply_to_fused(&self, t_s: f64, w: &mut Workspace, block: Block);
 }
 
 impl<T: Local> OnBlock for T {
     fn apply_to(&self, t_s: f64, w: &mut Workspace, block: Block) {
         self.act(t_s, w, block);
+    }
+    #[cfg(target_arch = "x86_64")]
+    #[target_feature(enable = "avx2,fma")]
+    #[allow(unsafe_code)]
+    unsafe fn apply_to_fused(&self, t_s: f64, w: &mut Workspace, block: Block) {
+        self.act(FusedEach(t_s), w.fused(), block);
     }
 }
 
@@ -252,13 +267,13 @@ pub struct Power<T = f64> {
 pub trait Account: Send + Sync {
     /// Power at the evaluated state, of `pairs` alone: those from the pair numbered `first` on.
     fn power(&self, w: &Workspace, pairs: &[Pair], first: usize) -> Power;
-    /// The same of all pairs by fused arithmetic.
+    /// The same by fused arithmetic.
     ///
     /// # Safety
     /// The processor has AVX2 and FMA.
     #[cfg(target_arch = "x86_64")]
     #[allow(unsafe_code)]
-    unsafe fn power_fused(&self, w: &Workspace) -> Power;
+    unsafe fn power_fused(&self, w: &Workspace, pairs: &[Pair], first: usize) -> Power;
     /// Energy stored in the effect's springs, J.
     fn stored_j(&self, w: &Workspace) -> f64;
     /// The power at eight moments side by side.
@@ -287,9 +302,8 @@ impl<T: Book> Account for T {
     #[cfg(target_arch = "x86_64")]
     #[target_feature(enable = "avx2,fma")]
     #[allow(unsafe_code)]
-    unsafe fn power_fused(&self, w: &Workspace) -> Power {
-        let w = w.as_fused();
-        let power = Book::power::<Fused>(self, w, &w.pair, 0);
+    unsafe fn power_fused(&self, w: &Workspace, pairs: &[Pair], first: usize) -> Power {
+        let power = Book::power::<Fused>(self, w.as_fused(), fused(pairs), first);
         Power {
             work_w: power.work_w.0,
             dissipated_w: power.dissipated_w.0,

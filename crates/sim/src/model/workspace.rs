@@ -119,6 +119,15 @@ impl<N: Moments> Workspace<N> {
     }
 }
 
+/// The same pairs, to be computed with by [`Fused`].
+#[cfg(target_arch = "x86_64")]
+#[inline(always)]
+#[allow(unsafe_code)]
+pub(super) fn fused(pairs: &[Pair]) -> &[Pair<Fused>] {
+    // SAFETY: both are `repr(C)`, their fields in turn the same numbers in the same places.
+    unsafe { &*(std::ptr::from_ref(pairs) as *const [Pair<Fused>]) }
+}
+
 impl Workspace {
     /// The same numbers, to be computed with by [`Fused`].
     #[cfg(target_arch = "x86_64")]
