@@ -6,8 +6,8 @@ mod common;
 use common::{samples, scene};
 use sim::model::Model;
 use sim::run::{Listener, Sample, run_model};
-use sim::scene::Scene;
-use sim::solve::{Event, EventKind, METHODS, Method, Settings};
+use sim::scene::{Scene, builtin, parse};
+use sim::solve::{Event, EventKind, METHODS, Method, Settings, method};
 
 struct Heard(Vec<Event>, Vec<f64>);
 
@@ -130,14 +130,14 @@ fn a_touch_from_above_is_no_event() {
 /// it was told to open and close 78,000 times there. The motion has some 600 events.
 #[test]
 fn a_handle_that_comes_back_to_its_edge_is_held_there_longer() {
-    let text = sim::scene::builtin("music").unwrap();
+    let text = builtin("music").unwrap();
     let stiff = [
         "effects.contact.stiffness_n_per_m=3e6",
         "effects.contact.damping_n_s_per_m=12650",
     ];
-    let scene = sim::scene::parse("music", text, &stiff.map(str::to_owned)).unwrap();
+    let scene = parse("music", text, &stiff.map(str::to_owned)).unwrap();
     for tolerance in [0.1, 0.05] {
-        let radau15 = sim::solve::method("radau15").unwrap();
+        let radau15 = method("radau15").unwrap();
         let events = heard_at(tolerance, &scene, radau15).0.len();
         assert!((500..1500).contains(&events), "{tolerance}: {events}");
     }
@@ -163,5 +163,33 @@ fn moments_a_rounding_apart_stop_nobody() {
             let all = samples(&s);
             assert_eq!(all.last().unwrap().t_s, 1.0, "{method} {text}");
         }
+    }
+}
+
+/// From 8,192 s on two doubles are further apart than what counts as one moment before: noise, samples and events still meet.
+#[test]
+fn hours_of_music_end() {
+    let set = ["duration_s=8200", "solver.energy=false"].map(String::from);
+    let scene = parse("music", builtin("music").unwrap(), &set).unwrap();
+    let settings = Settings {
+        tolerance: 1e-6,
+        step_s: f64::NAN,
+        most_evaluations: 40_000_000,
+    };
+    for name in ["radau15", "dop853"] {
+        let mut times = Vec::new();
+        let (_, outcome) = run_model(
+            &Model::new(&scene),
+            method(name).unwrap(),
+            &settings,
+            &mut |s: &Sample| {
+                times.push(s.t_s);
+                true
+            },
+        );
+        outcome.unwrap_or_else(|e| panic!("{name}: {e}"));
+        let tick = |(k, t): (usize, &f64)| *t == k as f64 / 30.0;
+        assert_eq!(times.len(), 246_001, "{name}");
+        assert!(times.iter().enumerate().all(tick), "{name}");
     }
 }

@@ -146,6 +146,35 @@ fn edge(strength: f64) -> String {
 const JUST_INSIDE: f64 = PI * (1.0 + 1e-9);
 const JUST_OUTSIDE: f64 = PI * (1.0 - 1e-9);
 
+/// Two carriers whom a beat draws into step, so that the load lifts off and rolls: all of it `slow` times as slow. What has seconds in its
+/// unit is scaled, lengths, masses and angles are not, so the motion is the same.
+fn slowed(slow: f64) -> String {
+    format!(
+        "duration_s = {duration:?}\nlog_rate_hz = {log:?}\n\
+         [body]\ngravity_m_per_s2 = [0.0, 0.0, {gravity:?}]\n\
+         [carriers]\nfrequency_hz = {gait:?}\ninitial_phase_rad = [0.0, 2.0]\n\
+         [start]\nroll_pitch_yaw_deg = [2.0, 0.0, 0.0]\n\
+         [effects.contact]\nstiffness_n_per_m = {spring:?}\ndamping_n_s_per_m = {damper:?}\n\
+         [effects.hold]\nstiffness_n_per_m = {spring:?}\ndamping_n_s_per_m = {damper:?}\n\
+         [effects.gait]\namplitude_m = 0.08\nsway_m = 0.02\n\
+         [effects.noise]\nphase_rad_per_sqrt_s = {noise:?}\ngrid_hz = {grid:?}\n\
+         [effects.music]\nbeat_hz = {beat:?}\nstrength_rad_per_s = {pull:?}\nonset_s = {onset:?}\nbuild_up_s = {onset:?}\n\
+         [solver]\nstep_s = {step:?}\ntolerance = 1e-9\n",
+        duration = 12.0 * slow,
+        log = 30.0 / slow,
+        gravity = -9.81 / (slow * slow),
+        gait = 2.0 / slow,
+        spring = 3000.0 / (slow * slow),
+        damper = 400.0 / slow,
+        noise = 0.125 / slow.sqrt(),
+        grid = 25.0 / slow,
+        beat = 2.125 / slow,
+        pull = 2.5 / slow,
+        onset = 2.0 * slow,
+        step = slow / 1024.0,
+    )
+}
+
 /// Gravity leans by 30° along the poles.
 const SLOPE: &str = "[body]\ngravity_m_per_s2 = [4.905, 0.0, -8.495709211125343]\n";
 
@@ -518,6 +547,22 @@ pub const CASES: &[Case] = &[
                 Ok(dense) => {
                     let dense: Vec<Sample> = dense.samples.into_iter().step_by(300).collect();
                     c.same(&r.samples, &dense, 1e-6, MASS_KG * G);
+                }
+                Err(cause) => c.fail(cause),
+            }
+        }),
+    case!("slow-motion", located, "a thousand times as slow, to 12,288 s, where a double cannot tell 1e-12 s apart",
+        "the motion of the same in 12 s; the ledger closes",
+        slowed(1024.0),
+        |r, c| {
+            c.ledger(r, 1e-8);
+            match r.other(&format!("name = \"fast\"\n{}", slowed(1.0))) {
+                Ok(fast) => {
+                    let mut slow = r.samples.clone();
+                    for s in &mut slow {
+                        s.normal_n.iter_mut().for_each(|n| *n *= 1024.0 * 1024.0);
+                    }
+                    c.same(&slow, &fast.samples, 1e-6, MASS_KG * G);
                 }
                 Err(cause) => c.fail(cause),
             }

@@ -11,7 +11,7 @@
 mod group;
 mod lane;
 
-use super::course::{Course, SAME_MOMENT_S};
+use super::course::{Course, same_moment_s, smallest_step_s};
 use super::dop853::Dop853;
 use super::events::Ahead;
 use super::first_steps::FirstSteps;
@@ -45,9 +45,6 @@ const LEAST_ERROR: f64 = 1e-10;
 const FINEST: f64 = 3e-15;
 /// The units are found anew when a number of the attitude has changed by so much.
 const TURNED: f64 = 0.1;
-const SMALLEST_STEP_S: f64 = 1e-13;
-/// So exactly an event is located, s.
-const RESOLUTION_S: f64 = 0.5 * SAME_MOMENT_S;
 /// An event so near to the end of a step, in s and as a part of the step, is met by going along the slope there: half the square of that
 /// part is below any rounding.
 const NEXT_TO_S: f64 = 2e-9;
@@ -362,7 +359,7 @@ impl<E: Together> Abreast<E> {
                 SHRINK
             };
             lane.h_next_s = lane.h_s * factor;
-            return if lane.h_next_s < SMALLEST_STEP_S {
+            return if lane.h_next_s < smallest_step_s(lane.course.t_s) {
                 Ended::Given
             } else {
                 Ended::Under
@@ -447,7 +444,7 @@ impl<E: Together> Abreast<E> {
             group.read(l, &mut lane.course.y);
         }
         let course = &mut lane.course;
-        let switched = t_s >= course.stop_s() - SAME_MOMENT_S;
+        let switched = t_s >= course.stop_s() - same_moment_s(t_s);
         if course.sample_due(t_s).is_some() {
             // The last stage was here.
             group.w.pick(l, &mut course.w);

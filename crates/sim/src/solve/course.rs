@@ -4,8 +4,16 @@ use super::{Observer, Settings, Stats, Stopped};
 use crate::lanes::{LANES, f64x2, pairs};
 use crate::model::{Model, Workspace};
 
-/// Times closer than this are the same moment, s.
-pub const SAME_MOMENT_S: f64 = 1e-12;
+/// Times closer than this to `t_s` are the same moment, s: 1e-12, and from 19 minutes on what rounding leaves of times so large.
+#[inline(always)]
+pub fn same_moment_s(t_s: f64) -> f64 {
+    (4.0 * f64::EPSILON * t_s).max(1e-12)
+}
+
+/// No step is shorter, s, but for what is left before a moment that none may cross.
+pub fn smallest_step_s(t_s: f64) -> f64 {
+    0.1 * same_moment_s(t_s)
+}
 
 /// Something that happened at a moment, between two states.
 #[derive(Clone, Debug, PartialEq)]
@@ -112,9 +120,12 @@ pub struct Course<'m> {
 /// So many changes of one handle at the same moment, and it is treated as sitting on the edge.
 const CHATTER: u32 = 6;
 /// Changes of one handle that are no further apart than this are of the same moment, s.
-const CHATTER_S: f64 = 1e-9;
-/// So long it is then clamped; twice as long as the last time, up to the longest, if it has been off the edge for less than so many times as long.
-const CLAMPED_S: f64 = 2.0 * CHATTER_S;
+fn chatter_s(t_s: f64) -> f64 {
+    1e3 * same_moment_s(t_s)
+}
+/// So many times that it is then clamped; twice as long as the last time, up to the longest, if it has been off the edge for less than so many
+/// times as long.
+const CLAMPED: f64 = 2.0;
 const LONGEST_CLAMPED_S: f64 = 1e-5;
 /// The same where nothing moves the handle off its edge: then the moment at which something does is known to this.
 const LONGEST_AT_REST_S: f64 = 1e-3;
@@ -161,7 +172,7 @@ impl<'m> Course<'m> {
                     event_s: f64::NEG_INFINITY,
                     count: 0,
                     clamped_s: f64::NEG_INFINITY,
-                    clamped_for_s: CLAMPED_S,
+                    clamped_for_s: CLAMPED * chatter_s(0.0),
                 };
                 n
             ],
@@ -200,13 +211,13 @@ impl<'m> Course<'m> {
     #[inline]
     pub fn sample_due(&self, t_s: f64) -> Option<f64> {
         let (_, due) = self.next_tick();
-        (due <= t_s + SAME_MOMENT_S).then_some(due)
+        (due <= t_s + same_moment_s(t_s)).then_some(due)
     }
 
     /// The same of the log alone. A step may be cut short for it, as it may not for a sensor, which must leave no trace in the motion.
     pub fn log_due(&self, t_s: f64) -> Option<f64> {
         let due = self.tickers[0].due_s;
-        (due <= t_s + SAME_MOMENT_S).then_some(due)
+        (due <= t_s + same_moment_s(t_s)).then_some(due)
     }
 
     /// Hands the state that [`Self::sample_due`] asked for to the observer. `evaluated`: the workspace holds the forces there already. Returns
@@ -383,7 +394,7 @@ impl<'m> Course<'m> {
             self.settle();
             self.note_standing(observer);
         }
-        if self.t_s >= self.switch_s - SAME_MOMENT_S {
+        if self.t_s >= self.switch_s - same_moment_s(self.t_s) {
             self.t_s = self.t_s.max(self.switch_s.min(self.end_s));
             self.begin_segment();
             self.note_standing(observer);
@@ -405,10 +416,11 @@ impl<'m> Course<'m> {
         self.stats.evaluations += 1;
         // The located zero is one to rounding: its handle may be a hair short of it.
         let edge = self.margin_n().max(0.0);
+        let chatter_s = chatter_s(self.t_s);
         for i in 0..self.contacts.len() {
             let free = self.w.of(i, |p| p.unclamped);
             let height_m = self.w.of(i, |p| p.base[2].abs() + p.gap[2].abs());
-            let near = if self.t_s - self.recent[i].event_s < CHATTER_S {
+            let near = if self.t_s - self.recent[i].event_s < chatter_s {
                 edge
             } else {
                 edge + self.model.contact_rounding_n(i, height_m)
@@ -420,7 +432,7 @@ impl<'m> Course<'m> {
             };
             let t_s = self.t_s;
             let recent = &mut self.recent[i];
-            recent.count = if t_s - recent.event_s < CHATTER_S {
+            recent.count = if t_s - recent.event_s < chatter_s {
                 recent.count + 1
             } else {
                 0
@@ -431,7 +443,7 @@ impl<'m> Course<'m> {
                 recent.clamped_for_s = if back_s < BACK_AT_ONCE * recent.clamped_for_s {
                     (2.0 * recent.clamped_for_s).min(LONGEST_CLAMPED_S)
                 } else {
-                    CLAMPED_S
+                    CLAMPED * chatter_s
                 };
                 recent.clamped_s = t_s;
                 Contact::Clamped

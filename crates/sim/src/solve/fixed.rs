@@ -3,7 +3,7 @@
 //! Steps are of `step_s`, shortened evenly where a moment (noise grid, onset, end) must be met. Samples between steps come
 //! from the cubic through both ends and their slopes, which is of fourth order.
 
-use super::course::{Course, SAME_MOMENT_S};
+use super::course::{Course, same_moment_s};
 use super::{Observer, Settings, Stats, Stopped};
 use crate::model::Model;
 
@@ -63,9 +63,10 @@ fn integrate<S: Step>(
             } else {
                 begin + (i + 1) as f64 * h
             };
-            if course.sample_due(t1 - 2.0 * SAME_MOMENT_S).is_some() {
+            let inner = t1 - 2.0 * same_moment_s(t1);
+            if course.sample_due(inner).is_some() {
                 course.rhs(t1, &y1, &mut f1);
-                while let Some(t) = course.sample_due(t1 - 2.0 * SAME_MOMENT_S) {
+                while let Some(t) = course.sample_due(inner) {
                     hermite((t - t0) / h, h, &course.y, &f0, &y1, &f1, &mut at);
                     course.model.freedoms().project(&mut at);
                     course.check(t, &at, BLOWN_UP)?;

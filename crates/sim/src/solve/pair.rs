@@ -12,7 +12,7 @@
 //! allocation, no index check and no loop over coefficients is left inside a step.
 #![allow(clippy::int_plus_one)] // an unrolled stage may read `7 >= n + 1`
 
-use super::course::{Course, SAME_MOMENT_S};
+use super::course::{Course, same_moment_s, smallest_step_s};
 use super::events::{self, Looks};
 use super::first_steps::FirstSteps;
 use super::{Observer, SLOWEST_PER_S, Settings, Stats, Stopped};
@@ -145,7 +145,6 @@ const SHRINK: f64 = 0.2;
 /// An error below this says no more of the next step than this one.
 const LEAST_ERROR: f64 = 1e-4;
 const GROW: f64 = 6.0;
-const SMALLEST_STEP_S: f64 = 1e-13;
 /// Below this a step's error estimate is rounding.
 const FINEST: f64 = 3e-15;
 /// Where a step may end at an event: the last term of the dense polynomial may be so many times what a step may err; its error is well
@@ -343,7 +342,7 @@ impl<'m, P: Pair, const EVENTS: bool> Run<'m, P, EVENTS> {
                 h_next
             };
             let error = loop {
-                if h < SMALLEST_STEP_S && h < left {
+                if h < smallest_step_s(t0) && h < left {
                     let (t_s, step_s) = (t0, h);
                     return Err(Stopped::StepTooSmall {
                         method: P::NAME,
@@ -563,7 +562,7 @@ impl<'m, P: Pair, const EVENTS: bool> Run<'m, P, EVENTS> {
         t1: f64,
         observer: &mut dyn Observer,
     ) -> Result<Moved, Stopped> {
-        let inner = t1 - 2.0 * SAME_MOMENT_S;
+        let inner = t1 - 2.0 * same_moment_s(t1);
         let suspicious = EVENTS && self.looks.suspicious();
         if suspicious || self.course.sample_due(inner).is_some() {
             return self.close_with_care::<F>(h, t1, suspicious, observer);
@@ -624,7 +623,7 @@ impl<'m, P: Pair, const EVENTS: bool> Run<'m, P, EVENTS> {
         let mut event = None;
         if suspicious {
             let (course, dense, at) = (&mut self.course, &self.dense, &mut self.at);
-            let resolution = (0.25 * SAME_MOMENT_S / h).max(2.0 * f64::EPSILON);
+            let resolution = (0.25 * same_moment_s(t0) / h).max(2.0 * f64::EPSILON);
             event = events::first(&self.looks, resolution, |theta| {
                 // Plain: a closure does not inherit the processor features of its caller.
                 interpolate::<P, Plain>(theta, &course.y, dense, at);
@@ -634,7 +633,7 @@ impl<'m, P: Pair, const EVENTS: bool> Run<'m, P, EVENTS> {
         if let Some(theta) = event.filter(|&theta| last * P::last_term(theta) > TRUST) {
             return Ok(Moved::Nowhere(theta));
         }
-        let end = event.map_or(t1 - 2.0 * SAME_MOMENT_S, |theta| t0 + theta * h);
+        let end = event.map_or(t1 - 2.0 * same_moment_s(t1), |theta| t0 + theta * h);
         while let Some(t) = self.course.sample_due(end) {
             self.between::<F>(((t - t0) / h).clamp(0.0, 1.0), h, last);
             self.course.model.freedoms().project(&mut self.at);

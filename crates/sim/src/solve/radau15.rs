@@ -28,7 +28,7 @@ mod stages;
 mod tableau;
 mod turn;
 
-use super::course::{Course, SAME_MOMENT_S};
+use super::course::{Course, same_moment_s, smallest_step_s};
 use super::events::{self, Looks};
 use super::{Observer, SLOWEST_PER_S, Settings, Stats, Stopped, dop853, pair};
 use crate::freedoms::rotation;
@@ -62,7 +62,6 @@ const ORDER: i32 = 12;
 const SAFETY: f64 = 0.93;
 const SHRINK: f64 = 0.2;
 const GROW: f64 = 4.0;
-const SMALLEST_STEP_S: f64 = 1e-13;
 /// Where a step may end at an event, its polynomial may err by so much of what a step may err: this estimate is hardly more than the error.
 const TRUST: f64 = 0.5;
 /// So exactly an event is located, as a part of the step, where a shorter step will locate it again.
@@ -466,7 +465,7 @@ impl<'m, E: Solve> Run<'m, E> {
                 self.limited += FAILED;
             }
             rejected = true;
-            if shorter < SMALLEST_STEP_S && shorter < left {
+            if shorter < smallest_step_s(t0) && shorter < left {
                 return Err(self.too_small(shorter));
             }
             let part = solved.converged.then_some(shorter / h);
@@ -492,18 +491,21 @@ impl<'m, E: Solve> Run<'m, E> {
         } else {
             proposal
         };
+        // What is due at the end of the step is not due before it.
+        let before_s = 2.0 * same_moment_s(t0);
         let event = loop {
             // Where the polynomial does not hold an event, its place only tells how long the step should be.
             let roughly = solved.between > TRUST;
             let event = self.event(t0, h, roughly);
             let until = event.map_or(h, |theta| theta * h);
-            let due = self.course.log_due(t0 + until - 2.0 * SAME_MOMENT_S);
+            let due = self.course.log_due(t0 + until - before_s);
             let cut = match (due, event) {
                 (Some(t), _) if solved.between > self.trust => t - t0,
                 (_, Some(theta)) if roughly && theta < 0.99 => 1.001 * theta * h + ROUGHLY * h,
                 (_, Some(_)) if roughly => break self.event(t0, h, false),
                 _ => break event,
             };
+            self.course.check_work()?;
             solved = self.solve(cut, Some(cut / h), 1.0);
             h = cut;
             // Shorter than what has just been solved, it hardly ever fails.
@@ -511,14 +513,14 @@ impl<'m, E: Solve> Run<'m, E> {
                 self.course.stats.rejected += 1;
                 self.course.check_work()?;
                 h *= 0.5;
-                if h < SMALLEST_STEP_S {
+                if h < smallest_step_s(t0) {
                     return Err(self.too_small(h));
                 }
                 solved = self.solve(h, None, 1.0);
             }
         };
         let end_s = event.map_or(h, |theta| theta * h);
-        while let Some(t) = self.course.sample_due(t0 + end_s - 2.0 * SAME_MOMENT_S) {
+        while let Some(t) = self.course.sample_due(t0 + end_s - before_s) {
             let theta = ((t - t0) / h).clamp(0.0, 1.0);
             if solved.between > self.trust {
                 self.aside(theta, h);
@@ -636,7 +638,7 @@ impl<'m, E: Solve> Run<'m, E> {
         if !self.looks.suspicious() {
             return None;
         }
-        let fine = (0.25 * SAME_MOMENT_S / h).max(2.0 * f64::EPSILON);
+        let fine = (0.25 * same_moment_s(t0) / h).max(2.0 * f64::EPSILON);
         let resolution = if roughly {
             fine.max(0.2 * ROUGHLY)
         } else {

@@ -11,7 +11,7 @@
 //! Source: Hairer & Wanner, Solving Ordinary Differential Equations II, 2nd ed. (1996), IV.8; constants and step-size control as in
 //! `scipy.integrate.Radau` (BSD-3-Clause).
 
-use super::course::{Course, SAME_MOMENT_S};
+use super::course::{Course, same_moment_s, smallest_step_s};
 use super::events::{self, Looks};
 use super::{Observer, Settings, Stats, Stopped};
 use crate::model::{Differentiator, Model};
@@ -95,7 +95,6 @@ const SHRINK: f64 = 0.2;
 const GROW: f64 = 8.0;
 /// A step that could grow by less keeps its size, and with it the factors of its matrices.
 const KEEP: f64 = 1.2;
-const SMALLEST_STEP_S: f64 = 1e-13;
 /// What a step may err, in units of the tolerance asked for; as [`super::pair::Pair::SHARE`].
 const SHARE: f64 = 3e-2;
 /// Below this a step's error estimate is rounding.
@@ -382,7 +381,7 @@ impl<'m> Radau<'m> {
         // What is left before the next moment may be as short as it likes.
         let wanted = h;
         loop {
-            if h < SMALLEST_STEP_S && h < wanted {
+            if h < smallest_step_s(course.t_s) && h < wanted {
                 return Err(Stopped::StepTooSmall {
                     method: NAME,
                     t_s: course.t_s,
@@ -452,6 +451,8 @@ impl<'m> Radau<'m> {
         let (tried, error, rounds) = self.solve(course, wanted)?;
         let mut h = tried;
         let proposal = tried * (safety(rounds) * self.predicted(tried, error)).clamp(SHRINK, GROW);
+        // What is due at the end of the step is not due before it.
+        let before_s = 2.0 * same_moment_s(t0);
         let event = loop {
             self.polynomial(h);
             let event = if EVENTS {
@@ -460,7 +461,7 @@ impl<'m> Radau<'m> {
                 None
             };
             let until = event.map_or(h, |theta| theta * h);
-            let due = course.log_due(t0 + until - 2.0 * SAME_MOMENT_S);
+            let due = course.log_due(t0 + until - before_s);
             // What is wanted first and not held by the polynomial is where the step has to end, or just before.
             let cut = match (due, event) {
                 (Some(t), _) if !self.holds(course, (t - t0) / h) => t - t0,
@@ -470,7 +471,7 @@ impl<'m> Radau<'m> {
             (h, ..) = self.solve(course, cut)?;
         };
         let end_s = event.map_or(h, |theta| theta * h);
-        while let Some(t) = course.sample_due(t0 + end_s - 2.0 * SAME_MOMENT_S) {
+        while let Some(t) = course.sample_due(t0 + end_s - before_s) {
             let theta = (t - t0) / h;
             if self.holds(course, theta) || !self.aside(course, theta * h)? {
                 self.between(course, theta);
@@ -560,7 +561,7 @@ impl<'m> Radau<'m> {
         if !self.looks.suspicious() {
             return None;
         }
-        let resolution = (0.25 * SAME_MOMENT_S / h).max(2.0 * f64::EPSILON);
+        let resolution = (0.25 * same_moment_s(t0) / h).max(2.0 * f64::EPSILON);
         let looks = std::mem::replace(&mut self.looks, Looks::new());
         events::first(&looks, resolution, |theta| {
             self.between(course, theta);

@@ -1,6 +1,7 @@
 //! Eight lanes in the registers, state by state: what all of them do at once.
 
-use super::{LEAST_ERROR, Lane, RESOLUTION_S, SHARE, SLOWEST_PER_S, STAGES, Together};
+use super::lane::resolution_s;
+use super::{LEAST_ERROR, Lane, SHARE, SLOWEST_PER_S, STAGES, Together};
 use crate::lanes::{Eight, LANES, Two};
 use crate::model::{Model, Octet, Registers, SideBySide, Workspace};
 use crate::solve::course::Course;
@@ -174,7 +175,7 @@ impl<E: Together> Group<E> {
         let (t0, h) = (lane.course.t_s, lane.h_s);
         let known = lane.beyond.map(|(t, margin)| ((t - t0) / h, margin));
         let known = known.filter(|(theta, _)| *theta > 1.0);
-        ahead(&seen, known, dips, RESOLUTION_S / h)
+        ahead(&seen, known, dips, resolution_s(t0) / h)
     }
 
     /// What depends on time alone, of all stages: these evaluations do not wait for each other.

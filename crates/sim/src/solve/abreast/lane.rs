@@ -1,12 +1,14 @@
 //! A run under way in a lane: where its steps end, and what has become of them.
 
 use super::group::Group;
-use super::{
-    FEW, MOST_SECANTS, MOST_TRIES, NEXT_TO, NEXT_TO_S, RESOLUTION_S, STAGES, STRETCH, TURNED,
-    Together,
-};
-use crate::solve::course::Course;
+use super::{FEW, MOST_SECANTS, MOST_TRIES, NEXT_TO, NEXT_TO_S, STAGES, STRETCH, TURNED, Together};
+use crate::solve::course::{Course, same_moment_s};
 use crate::solve::first_steps::FirstSteps;
+
+/// So exactly an event is located, s.
+pub(super) fn resolution_s(t_s: f64) -> f64 {
+    0.5 * same_moment_s(t_s)
+}
 
 /// One run under way in a lane.
 pub(super) struct Lane<'m> {
@@ -64,7 +66,7 @@ impl Lane<'_> {
         let h = self.h_next_s;
         (self.h_s, self.end_s, self.stops) = match self.aim_s {
             Some(aim_s) if aim_s < stop_s => {
-                let h = (aim_s - t0).max(0.5 * RESOLUTION_S);
+                let h = (aim_s - t0).max(0.5 * resolution_s(t0));
                 (h, t0 + h, false)
             }
             _ if left <= h * STRETCH => (left, stop_s, true),
@@ -121,7 +123,7 @@ impl Lane<'_> {
                 further_s * margin_n / (margin_n - here_n)
             };
             let straight = (further_s / self.h_s).powi(2) <= near.powi(3);
-            if (next_s - further_s).abs() <= RESOLUTION_S && (tried > 0 || straight) {
+            if (next_s - further_s).abs() <= resolution_s(self.end_s) && (tried > 0 || straight) {
                 self.course.y.copy_from_slice(at);
                 self.beyond_end_s = further_s;
                 return true;
