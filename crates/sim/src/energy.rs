@@ -12,6 +12,13 @@ use crate::model::{Model, Workspace};
 use crate::scene::Scene;
 use crate::solve::{Method, Settings};
 
+/// What held at the start: K + P + S, and what each account had lent ([`crate::model::Account::lent_j`]), J.
+#[derive(Debug)]
+pub(crate) struct Start {
+    held_j: f64,
+    lent_j: Vec<f64>,
+}
+
 /// The balance at one moment, J.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[allow(missing_docs)]
@@ -25,26 +32,34 @@ pub struct Energy {
 }
 
 impl Energy {
-    /// The balance at an evaluated state; `at_start_j` keeps K + P + S of the first call. `None` without a ledger.
+    /// The balance at an evaluated state, and in `shares_j` every account's work and dissipation; `at_start` keeps what held at the first
+    /// call. `None` without a ledger.
     pub(crate) fn of(
         model: &Model,
         y: &[f64],
         w: &Workspace,
-        at_start_j: &mut Option<f64>,
+        shares_j: &mut [[f64; 2]],
+        at_start: &mut Option<Start>,
     ) -> Option<Self> {
         if !model.scene.solver.energy {
             return None;
         }
         let [kinetic_j, potential_j] = model.freedoms().energy_j(y);
-        let elastic_j = model.stored_j(w);
+        let elastic_j = model.stored_j(w) - model.lent_j(w).sum::<f64>();
         let held_j = kinetic_j + potential_j + elastic_j;
-        let began_j = *at_start_j.get_or_insert(held_j);
+        let start = at_start.get_or_insert_with(|| Start {
+            held_j,
+            lent_j: model.lent_j(w).collect(),
+        });
         let (mut work_in_j, mut dissipated_j) = (0.0, 0.0);
-        for page in y[model.layout().ledger_range()].chunks_exact(2) {
-            work_in_j += page[0];
-            dissipated_j += page[1];
+        let pages = y[model.layout().ledger_range()].chunks_exact(2);
+        let lent = model.lent_j(w).zip(&start.lent_j);
+        for ((share, page), (lent_j, at_start_j)) in shares_j.iter_mut().zip(pages).zip(lent) {
+            *share = [page[0], page[1] + lent_j - at_start_j];
+            work_in_j += share[0];
+            dissipated_j += share[1];
         }
-        let unexplained_j = held_j - began_j - work_in_j + dissipated_j;
+        let unexplained_j = held_j - start.held_j - work_in_j + dissipated_j;
         Some(Self {
             kinetic_j,
             potential_j,

@@ -1,6 +1,6 @@
 //! Model + method → samples, in the units and frames of a recording.
 
-use crate::energy::{Belief, Doubt, Energy};
+use crate::energy::{Belief, Doubt, Energy, Start};
 use crate::freedoms::Pose;
 use crate::model::{Model, Workspace};
 use crate::scene::Scene;
@@ -176,7 +176,7 @@ struct Bridge<'a> {
     listener: &'a mut dyn Listener,
     sample: Sample,
     looks_at_forces: bool,
-    at_start_j: Option<f64>,
+    at_start: Option<Start>,
     belief: Belief,
     doubt: Option<Doubt>,
     sensors: Sensors<'a>,
@@ -195,7 +195,7 @@ impl<'a> Bridge<'a> {
             listener,
             sample: blank(model, looks_at_forces),
             looks_at_forces,
-            at_start_j: None,
+            at_start: None,
             belief: Belief::new(&model.scene, method, settings),
             doubt: None,
             sensors: Sensors::new(model),
@@ -258,11 +258,7 @@ impl Observer for Bridge<'_> {
                 s.handle_m[i][a] = s.pose.position_m[a] + w.of(i, |p| p.arm[a]) + walked[a];
             }
         }
-        s.energy = Energy::of(model, y, w, &mut self.at_start_j);
-        let pages = y[model.layout().ledger_range()].chunks_exact(2);
-        for (share, page) in s.shares_j.iter_mut().zip(pages) {
-            share.copy_from_slice(page);
-        }
+        s.energy = Energy::of(model, y, w, &mut s.shares_j, &mut self.at_start);
         if let Some(energy) = &s.energy {
             self.doubt = self.belief.doubt(energy, w);
         }

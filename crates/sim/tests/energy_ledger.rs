@@ -52,6 +52,40 @@ fn the_shares_of_the_effects_are_all_that_is_booked() {
     assert!(last.iter().all(|[_, lost]| *lost > 0.1), "{last:?}");
 }
 
+/// What a contact's damper has taken never comes back: not when a handle comes down fast and pushes before it touches, nor when it lifts
+/// off a spring that is still pressed.
+#[test]
+fn what_a_contact_dissipates_never_falls() {
+    let laws = ["spring-damper", "hunt-crossley"];
+    for (name, law) in BUILTIN
+        .iter()
+        .flat_map(|(name, _)| laws.map(|law| (name, law)))
+    {
+        let law = [format!("effects.contact.law=\"{law}\"")];
+        let scene = load(name, &[]).unwrap();
+        if scene.effects.contact.is_none_or(|c| c.bilateral) {
+            continue;
+        }
+        let mut scene = load(name, &law).unwrap();
+        scene.duration_s = scene.duration_s.min(60.0);
+        let model = sim::model::Model::new(&scene);
+        let contact = model.accounts().position(|a| a == "contact").unwrap();
+        let (mut most, mut fell) = (0.0f64, 0.0f64);
+        run(&scene, &mut |s: &Sample| {
+            let lost = s.shares_j[contact][1];
+            most = most.max(lost);
+            fell = fell.max(most - lost);
+            true
+        })
+        .unwrap();
+        println!("{name}, {law:?}: {most:.1e} J, fell by {fell:.1e} J");
+        assert!(
+            fell <= 1e-12 * (1.0 + most),
+            "{name}, {law:?}: fell by {fell:e} J of {most:e} J"
+        );
+    }
+}
+
 /// Straps that hardly damp are fed by a load that bounces, without bound: such a run ends with its cause; one that merely swings goes on.
 #[test]
 fn a_law_that_feeds_a_run_ends_it() {

@@ -6,8 +6,8 @@
 //! δ compression along the normal z, shoulder minus handle (m); k stiffness [N/m]; c damping [N·s/m].
 //! Holds for a massless shoulder. The unilateral force is continuous and kinks where N* = 0: that zero is the event,
 //! both ways. With c > 0 it opens before δ = 0, and a fast approach pushes before the surfaces meet: the law's known
-//! price. Energy: the spring stores ½kδ² while in contact; what is left in it at lift-off is lost in the damper, what
-//! it is given at a touch-down with δ ≠ 0 is taken back from it (both are booked, see [`crate::energy`]).
+//! price. Energy: the spring stores ½kδ² while it is pressed, δ > 0, whether or not N acts: what it gives while the handle is slack
+//! goes into the damper, as does what a fast approach gives before the surfaces meet. So nothing is dissipated that comes back.
 //!
 //! Alternative law, `hunt-crossley`: N* = k δ^p (1 + d δ̇), d = c/k, p exponent (1); k then in N/m^p, c in N·s/m^(p+1). Its damping vanishes with δ, so
 //! the force starts from zero at touch-down and never jumps; it is unilateral. For δ < 0 N* = −k|δ|^p max(1 + d δ̇, 0.01) only marks
@@ -126,7 +126,10 @@ impl Contact {
             Law::SpringDamper => {
                 let damping = pack((0..n).map(|i| self.damping_n_s_per_m.get(i)));
                 model.set_contact_damping(damping.clone());
-                let law = SpringDampers(stiffness.into_iter().zip(damping).collect());
+                let law = SpringDampers {
+                    springs: stiffness.into_iter().zip(damping).collect(),
+                    bilateral: self.bilateral,
+                };
                 model.add(Stage::Handles, law.clone());
                 model.add_account("contact", law);
                 1.0
@@ -171,6 +174,12 @@ impl HuntCrossley {
         };
         N::always(self.stiffness[p]) * bent
     }
+
+    /// ∫ k |δ|^p dδ, J.
+    fn bent_j(&self, p: usize, w: &Workspace) -> f64x2 {
+        let gap = w.pair[p].gap[2];
+        self.spring::<Now>(p, gap) * gap * (1.0 / (self.exponent + 1.0))
+    }
 }
 
 impl Local for HuntCrossley {
@@ -209,22 +218,34 @@ impl Book for HuntCrossley {
     fn stored_j(&self, w: &Workspace) -> f64 {
         let mut stored = f64x2::ZERO;
         for p in 0..w.pair.len() {
-            let gap = w.pair[p].gap[2];
-            let energy = self.spring::<Now>(p, gap) * gap * (1.0 / (self.exponent + 1.0));
-            stored += in_contact(&w.pair[p], energy);
+            stored += in_contact(&w.pair[p], self.bent_j(p, w));
         }
         crate::lanes::sum(stored)
+    }
+
+    fn lent_j(&self, w: &Workspace) -> f64 {
+        let mut lent = f64x2::ZERO;
+        for p in 0..w.pair.len() {
+            lent += lent_by(&w.pair[p], self.bent_j(p, w));
+        }
+        crate::lanes::sum(lent)
     }
 }
 
 /// The law for all handles. `gain` and `floor` of the workspace select the branch: see [`Workspace`].
 #[derive(Clone, Debug)]
-struct SpringDampers(Vec<(f64x2, f64x2)>);
+struct SpringDampers {
+    springs: Vec<(f64x2, f64x2)>,
+    bilateral: bool,
+}
 
 impl Local for SpringDampers {
     #[inline(always)]
     fn act<N: Moments>(&self, _t_s: N::Each, w: &mut Workspace<N>, part: impl Part) {
-        for (p, &(stiffness, damping)) in part.of_mut(&mut w.pair).iter_mut().zip(part.of(&self.0))
+        for (p, &(stiffness, damping)) in part
+            .of_mut(&mut w.pair)
+            .iter_mut()
+            .zip(part.of(&self.springs))
         {
             let spring = N::always(stiffness) * p.gap[2];
             let free = N::always(damping).madd(p.gap_rate[2], spring);
@@ -232,6 +253,12 @@ impl Local for SpringDampers {
             p.normal = (free * p.contact_gain).larger(p.contact_floor);
         }
     }
+}
+
+/// Of `bent_j`, the energy of a spring bent by δ, what the books hold and the spring does not, J. They hold it where N acts, whatever the
+/// sign of δ, so that nothing kinks within a step; the spring holds it while it is pressed.
+fn lent_by(p: &Pair, bent_j: f64x2) -> f64x2 {
+    in_contact::<Now>(p, bent_j) - p.gap[2].if_positive(bent_j, f64x2::ZERO)
 }
 
 /// `x` where N acts, 0 elsewhere.
@@ -249,7 +276,7 @@ impl Book for SpringDampers {
         first: usize,
     ) -> Power<N::Each> {
         let (mut work, mut absorbed) = (N::Pair::splat(0.0), N::Pair::splat(0.0));
-        for (p, &(stiffness, _)) in pairs.iter().zip(&self.0[first..]) {
+        for (p, &(stiffness, _)) in pairs.iter().zip(&self.springs[first..]) {
             // N δ̇ goes into the spring and the damper; the spring's part returns through `stored_j`.
             let spring = in_contact(p, N::always(stiffness) * p.gap[2]);
             work = p.normal.madd(p.base_rate[2], work);
@@ -263,9 +290,20 @@ impl Book for SpringDampers {
 
     fn stored_j(&self, w: &Workspace) -> f64 {
         let mut stored = f64x2::ZERO;
-        for (p, &(stiffness, _)) in w.pair.iter().zip(&self.0) {
+        for (p, &(stiffness, _)) in w.pair.iter().zip(&self.springs) {
             stored += in_contact(p, stiffness * p.gap[2] * p.gap[2] * 0.5);
         }
         crate::lanes::sum(stored)
+    }
+
+    fn lent_j(&self, w: &Workspace) -> f64 {
+        if self.bilateral {
+            return 0.0;
+        }
+        let mut lent = f64x2::ZERO;
+        for (p, &(stiffness, _)) in w.pair.iter().zip(&self.springs) {
+            lent += lent_by(p, stiffness * p.gap[2] * p.gap[2] * 0.5);
+        }
+        crate::lanes::sum(lent)
     }
 }

@@ -312,6 +312,11 @@ impl Model {
     pub fn stored_j(&self, w: &Workspace) -> f64 {
         self.accounts.iter().map(|(_, a)| a.stored_j(w)).sum()
     }
+
+    /// [`Account::lent_j`] of every account.
+    pub(crate) fn lent_j<'a>(&'a self, w: &'a Workspace) -> impl Iterator<Item = f64> + 'a {
+        self.accounts.iter().map(|(_, a)| a.lent_j(w))
+    }
 }
 
 /// [`lanes::sin_cos`], in code compiled for fused arithmetic or not.

@@ -276,6 +276,8 @@ pub trait Account: Send + Sync {
     unsafe fn power_fused(&self, w: &Workspace, pairs: &[Pair], first: usize) -> Power;
     /// Energy stored in the effect's springs, J.
     fn stored_j(&self, w: &Workspace) -> f64;
+    /// What of it no spring holds, J: it is told as dissipated.
+    fn lent_j(&self, w: &Workspace) -> f64;
     /// The power at eight moments side by side.
     fn on_eight(&self) -> &dyn PowerOnEight;
 }
@@ -291,6 +293,10 @@ pub trait Book: Send + Sync {
     ) -> Power<N::Each>;
     /// As [`Account::stored_j`].
     fn stored_j(&self, _w: &Workspace) -> f64 {
+        0.0
+    }
+    /// As [`Account::lent_j`].
+    fn lent_j(&self, _w: &Workspace) -> f64 {
         0.0
     }
 }
@@ -311,6 +317,9 @@ impl<T: Book> Account for T {
     }
     fn stored_j(&self, w: &Workspace) -> f64 {
         Book::stored_j(self, w)
+    }
+    fn lent_j(&self, w: &Workspace) -> f64 {
+        Book::lent_j(self, w)
     }
     fn on_eight(&self) -> &dyn PowerOnEight {
         self
