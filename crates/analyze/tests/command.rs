@@ -1254,3 +1254,50 @@ fn topics_of_other_times_meet_where_both_have_samples() {
         assert!((450..=901).contains(&rows), "{column}: {rows}");
     }
 }
+
+/// A gyroscope of ±125 °/s on what turns by 145 °/s: the roll is too small, and no interval may say otherwise.
+#[test]
+fn a_sensor_that_came_to_its_end_gives_no_interval() {
+    let folder = tempfile::tempdir().unwrap();
+    let message = |k: u32| {
+        let t = 0.01 * f64::from(k);
+        let (w, g) = (std::f64::consts::TAU, 9.80665);
+        let turn = f64::from(if k < 2500 { 10 } else { 23 }).to_radians();
+        let roll = turn * (w * t).sin();
+        let rate = (turn * w * (w * t).cos()).clamp(-2.18, 2.18);
+        let text = format!(
+            "{{\"angular_velocity\":{{\"x\":{rate},\"y\":0.0,\"z\":0.0}},\
+             \"linear_acceleration\":{{\"x\":0.0,\"y\":{},\"z\":{}}}}}",
+            g * roll.sin(),
+            g * roll.cos()
+        );
+        (t, text)
+    };
+    let file = told(folder.path(), &[("/s", (0..6000).map(message).collect())]);
+    let found = with_roles(folder.path(), &file, "imu = \"/s\"\n");
+    let remark = found["quality"]
+        .as_array()
+        .unwrap()
+        .iter()
+        .find(|q| q["kind"] == "saturated");
+    let text = remark.expect("saturated")["text"].as_str().unwrap();
+    assert!(
+        text.starts_with("the gyroscope came to its end at 2.180 rad/s in "),
+        "{text}"
+    );
+    let roll = &found["metrics"]["rms_roll_deg"];
+    assert!(roll["ci95"].is_null(), "{roll}");
+    assert!(
+        roll["reason"]
+            .as_str()
+            .unwrap()
+            .contains("the gyroscope came to the end of its range"),
+        "{roll}"
+    );
+    let roles = folder.path().join("roles.toml").display().to_string();
+    // Before it came there, nothing is missing.
+    let calm = json(&[
+        &file, "--format", "json", "--window", "0..20", "--roles", &roles,
+    ]);
+    assert!(calm["metrics"]["rms_roll_deg"]["ci95"].is_array());
+}

@@ -26,6 +26,7 @@ use crate::imu::Track;
 use crate::imu::interval;
 use crate::imu::orientation::Options;
 use crate::imu::rath::{self, Motion, Settings};
+use crate::imu::saturation::{Saturated, saturated};
 use crate::imu::unloading::unloadings;
 use crate::inputs::{Inputs, Window};
 use crate::metrics::{Metrics, Value, metrics_of};
@@ -57,6 +58,8 @@ pub struct Field {
     topic: Option<String>,
     motion: Option<Motion>,
     no_motion: Option<String>,
+    /// Where the sensor of the motion came to its end within the window.
+    saturated: Vec<Saturated>,
     carriers: Carriers,
     beat_s: Vec<f64>,
     /// Their numbers, where they have some.
@@ -173,6 +176,19 @@ impl Field {
             let said = said.map(|(kind, text)| Quality::remark(topic, kind, text));
             field.quality.extend(said);
             let is_rath = roles.topic(Role::Imu) == Some(topic.as_str());
+            let mut ends = saturated(&track);
+            for end in &ends {
+                field.quality.push(Quality {
+                    count: end.samples.len() as u64,
+                    t_s: Some(track.t_s[end.samples[0]]),
+                    ..Quality::remark(topic, "saturated", end.told(track.len()))
+                });
+            }
+            if is_rath {
+                let within = window.range(&track.t_s);
+                ends.retain(|end| end.samples.iter().any(|k| within.contains(k)));
+                field.saturated = ends;
+            }
             if !is_rath && roles.patterns(Role::Imu).contains(topic) {
                 if !one_clock {
                     clocks.hold_against(topic, &track);
@@ -396,6 +412,9 @@ impl Field {
         let mut out = Metrics::default();
         if let Some(motion) = &self.motion {
             out = interval::metrics(motion, window);
+            for end in &self.saturated {
+                interval::without(&mut out, end);
+            }
         }
         if (self.filled.phases || self.judge.is_some())
             && let Some(phases) = self.carriers.phases()
