@@ -195,11 +195,12 @@ impl Field {
                 }
                 continue;
             }
+            let mut clock_sd_s = 0.0;
             if !one_clock {
                 if is_rath {
                     clocks = Clocks::of_rath(topic, &track, leave);
                 } else {
-                    clocks.put_right(topic, &mut track);
+                    clock_sd_s = clocks.put_right(topic, &mut track, window);
                 }
             }
             if is_rath {
@@ -223,7 +224,7 @@ impl Field {
             }
             // The one sensor of a walker's phone plays the rath's role for want of another: steps tell.
             if !is_rath || (roles.patterns(Role::Carriers).is_empty() && !about_the_load(topic)) {
-                field.carriers.add(topic, &track, options);
+                field.carriers.add(topic, &track, options, clock_sd_s);
             }
         }
         if let Some(topic) = roles.topic(Role::Beats) {
@@ -428,13 +429,23 @@ impl Field {
             let detected = self.carriers.detected();
             let detected =
                 detected.map(|p| as_of(p, |n| n == "synchrony" || n == "pull_rad_per_s"));
-            let others: Vec<f64> = self
-                .carriers
-                .phases_else()
-                .filter_map(|p| as_of(p, |n| n == "synchrony").number("synchrony"))
-                .collect();
-            self.carriers
-                .interval(&mut together, &detected.unwrap_or_default(), &others);
+            let synchrony = |phases| as_of(phases, |n| n == "synchrony").number("synchrony");
+            let others: Vec<f64> = self.carriers.phases_else().filter_map(synchrony).collect();
+            let here = together.number("synchrony");
+            let by_taps = here.map_or(0.0, |x| {
+                let each = self.carriers.phases_by_clocks();
+                let farthest = each.map(|ends| {
+                    let ends = ends.into_iter().flatten().filter_map(synchrony);
+                    ends.map(|end| (end - x).abs()).fold(0.0, f64::max)
+                });
+                farthest.fold(0.0, f64::hypot)
+            });
+            self.carriers.interval(
+                &mut together,
+                &detected.unwrap_or_default(),
+                &others,
+                by_taps,
+            );
             out.0.extend(together.0);
         }
         // Taps and talk before and behind the music are heard too.
