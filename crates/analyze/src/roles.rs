@@ -371,9 +371,11 @@ impl Roles {
                 .patterns
                 .insert(Role::Carriers, natural_order(carriers));
         }
-        let beats = of_type(&["rath.Beat"]);
-        if !beats.is_empty() {
-            roles.patterns.insert(Role::Beats, beats[..1].to_vec());
+        let beats = of_type(&["rath.Beat"]).into_iter();
+        // Whatever its messages hold: one is a beat.
+        let named = channels.iter().filter(|(t, _)| *t == "/beat");
+        if let Some(topic) = beats.chain(named.map(|(t, _)| (*t).to_owned())).next() {
+            roles.patterns.insert(Role::Beats, vec![topic]);
         }
         let pose = [
             "geometry_msgs/PoseStamped",

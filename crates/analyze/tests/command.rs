@@ -1301,3 +1301,67 @@ fn a_sensor_that_came_to_its_end_gives_no_interval() {
     ]);
     assert!(calm["metrics"]["rms_roll_deg"]["ci95"].is_array());
 }
+
+/// A message on `/beat` is a beat, whatever it holds: nothing, or a stamp that knows better than the log when it was.
+#[test]
+fn every_message_on_beat_is_one() {
+    let folder = tempfile::tempdir().unwrap();
+    let swings = || {
+        (0..6000)
+            .map(|k| f64::from(k) * 0.01)
+            .map(|t| (t, swung(t)))
+    };
+    let bare = |k: u32| (0.5 * f64::from(k), "{\"by\":\"drum\"}".to_owned());
+    let late = |k: u32| {
+        let t = 0.5 * f64::from(k);
+        let (sec, nanosec) = (t.floor(), 1e9 * t.fract());
+        let text = format!("{{\"header\":{{\"stamp\":{{\"sec\":{sec},\"nanosec\":{nanosec}}}}}}}");
+        (t + 0.05 + 0.04 * tone(0.31, t), text)
+    };
+    for beats in [
+        (8..100).map(bare).collect::<Vec<_>>(),
+        (8..100).map(late).collect(),
+    ] {
+        let file = told(
+            folder.path(),
+            &[("/s", swings().collect()), ("/beat", beats)],
+        );
+        let found = with_roles(folder.path(), &file, "imu = \"/s\"\n");
+        assert!(
+            (metric(&found, "beat_hz") - 2.0).abs() < 1e-4,
+            "{}",
+            found["metrics"]["beat_hz"]
+        );
+        let ci95 = &found["metrics"]["beat_hz"]["ci95"];
+        let half = 0.5 * (ci95[1].as_f64().unwrap() - ci95[0].as_f64().unwrap());
+        assert!(half < 1e-4, "{ci95}");
+    }
+}
+
+/// Who looks in too late is told so.
+#[test]
+fn an_onset_before_the_window_is_told() {
+    let folder = tempfile::tempdir().unwrap();
+    let swings = (0..6000).map(|k| f64::from(k) * 0.01);
+    let file = told(
+        folder.path(),
+        &[("/s", swings.map(|t| (t, swung(t))).collect())],
+    );
+    let found = with_roles(
+        folder.path(),
+        &file,
+        "imu = \"/s\"\nanalysis_start_s = 20.0\n",
+    );
+    let onset = &found["metrics"]["onset_time_s"];
+    assert!(
+        (onset["value"].as_f64().unwrap() - 22.0).abs() < 0.05,
+        "{onset}"
+    );
+    assert!(
+        onset["reason"]
+            .as_str()
+            .unwrap()
+            .contains("may have begun before"),
+        "{onset}"
+    );
+}

@@ -137,6 +137,13 @@ impl Field {
         };
         let (mut signals, _) = recording.signals(&wanted)?;
         signals.extend(thin::read(recording, &factors)?);
+        if let Some(topic) = roles.topic(Role::Beats)
+            && !signals
+                .iter()
+                .any(|s| field_of(&s.path, topic) == Some(BEAT[1]))
+        {
+            signals.push(columns::came(recording, topic)?);
+        }
         for (topic, factor) in factors.iter().filter(|(_, factor)| **factor > 1) {
             field.quality.push(Quality::remark(
                 topic,

@@ -115,8 +115,11 @@ pub fn metrics(motion: &Motion, window: Window) -> Metrics {
         let of_rate = (OF_EDGES.contains(name) && rate_hz < ENOUGH_HZ).then(|| {
             format!("at {rate_hz:.0} Hz touch-downs fall between samples, and their overtones onto slower lines; 100 Hz or more are wanted")
         });
-        let reasons: Vec<String> = of_height
+        let reasons: Vec<String> = value
+            .reason
+            .take()
             .into_iter()
+            .chain(of_height)
             .chain(of_place)
             .chain(of_rate)
             .collect();
