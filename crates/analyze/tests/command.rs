@@ -1365,3 +1365,34 @@ fn an_onset_before_the_window_is_told() {
         "{onset}"
     );
 }
+
+/// A recording is not written under the name of a table.
+#[test]
+fn a_recording_is_not_named_a_table() {
+    let folder = tempfile::tempdir().unwrap();
+    let file = recording(folder.path());
+    let name = file.to_str().unwrap();
+    let log = folder.path().join("belt.csv");
+    std::fs::write(&log, "time,gFx,gFy,gFz\n0,0,0,1\n0.01,0,0,1\n").unwrap();
+    let (log, table) = (log.to_str().unwrap(), folder.path().join("x.CSV"));
+    let table = table.to_str().unwrap();
+    for args in [
+        &["ingest", log, "--out", table][..],
+        &[name, "--annotate", table],
+    ] {
+        let out = analyze(args);
+        let said = text(&out.stderr);
+        assert_eq!(out.status.code(), Some(1), "{said}");
+        assert!(
+            said.lines().count() == 1 && said.contains("ends in .mcap"),
+            "{said}"
+        );
+        assert!(!Path::new(table).exists());
+    }
+    let plain = folder.path().join("walk.2026-11-27");
+    assert!(
+        analyze(&["ingest", log, "--out", plain.to_str().unwrap()])
+            .status
+            .success()
+    );
+}
