@@ -113,11 +113,14 @@ impl Field {
         let factors = match thin::factors(recording, roles)? {
             Ok(factors) => factors,
             Err(samples) => {
-                field.quality.push(Quality::remark(
-                    "",
-                    "too_long",
-                    format!("motion is not estimated from {samples} inertial samples, which would take too much memory: name fewer sensors in a roles file, or give a part of the recording"),
-                ));
+                let why = format!(
+                    "motion is not estimated from {samples} inertial samples, which would take too much memory: name fewer sensors in a roles file, or give a part of the recording"
+                );
+                field
+                    .quality
+                    .push(Quality::remark("", "too_long", why.clone()));
+                field.topic = roles.topic(Role::Imu).map(str::to_owned);
+                field.no_motion = Some(why);
                 return Ok(field);
             }
         };
@@ -509,7 +512,9 @@ impl Field {
     /// What is odd about the sensors.
     pub fn quality(&mut self) -> Vec<Quality> {
         let mut out = std::mem::take(&mut self.quality);
-        if let (Some(topic), Some(why)) = (&self.topic, &self.no_motion) {
+        if let (Some(topic), Some(why)) = (&self.topic, &self.no_motion)
+            && out.iter().all(|q| q.kind != "too_long")
+        {
             out.push(Quality::remark(topic, "absent_field", why.clone()));
         }
         out.extend(self.carriers.quality());
