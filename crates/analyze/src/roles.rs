@@ -463,7 +463,8 @@ fn is_truth(topic: &str) -> bool {
     topic.to_lowercase().contains("truth")
 }
 
-fn is_carrier(topic: &str) -> bool {
+/// Whether a topic's name speaks of somebody who carries.
+pub(crate) fn is_carrier(topic: &str) -> bool {
     let topic = topic.to_lowercase();
     ["carrier", "bearer", "walker", "person"]
         .iter()

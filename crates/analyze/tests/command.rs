@@ -1396,3 +1396,34 @@ fn a_recording_is_not_named_a_table() {
             .success()
     );
 }
+
+/// Sensors of a type that nobody knows, by their names on those who carry, are told of with the line that names them all.
+#[test]
+fn carriers_of_an_unknown_type_are_told_with_their_remedy() {
+    let folder = tempfile::tempdir().unwrap();
+    let swings = || {
+        (0..2000)
+            .map(|k| f64::from(k) * 0.01)
+            .map(|t| (t, swung(t)))
+            .collect()
+    };
+    let channels = ["/imu/carrier_1", "/imu/carrier_2", "/imu/rath"].map(|t| (t, swings()));
+    let file = told(folder.path(), &channels);
+    let found = json(&[&file, "--format", "json"]);
+    let line = "carriers = [\"/imu/carrier_1\", \"/imu/carrier_2\"]";
+    let said = |topic: &str| {
+        let quality = found["quality"].as_array().unwrap();
+        let of = |q: &&Value| q["kind"] == "unknown_type" && q["topic"] == topic;
+        quality.iter().find(of).unwrap()["text"]
+            .as_str()
+            .unwrap()
+            .to_owned()
+    };
+    for topic in ["/imu/carrier_1", "/imu/carrier_2"] {
+        assert!(said(topic).contains(line), "{}", said(topic));
+    }
+    assert!(said("/imu/rath").contains("imu = \"/imu/rath\""));
+    let roles = format!("imu = \"/imu/rath\"\n{line}\n");
+    let named = with_roles(folder.path(), &file, &roles);
+    assert!(!kinds(&named).contains(&"unknown_type".to_owned()));
+}
