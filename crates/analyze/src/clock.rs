@@ -37,6 +37,13 @@ impl Clock {
         device_s + self.offset_s + 1e-6 * self.drift_ppm * (device_s - self.at_s)
     }
 
+    /// Standard error of [`Clock::reference_s`], s.
+    pub fn reference_sd_s(&self, device_s: f64) -> f64 {
+        let drift_sd_ppm = self.drift_sd_ppm.unwrap_or(PRIOR_PPM);
+        self.offset_sd_s
+            .hypot(1e-6 * drift_sd_ppm * (device_s - self.at_s))
+    }
+
     /// How far the device is ahead of the reference at `at_s`, s, and by how much it runs fast, ppm.
     pub fn ahead(&self) -> [f64; 2] {
         [self.at_s - self.reference_s(self.at_s), -self.drift_ppm]

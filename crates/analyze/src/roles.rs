@@ -371,9 +371,11 @@ impl Roles {
                 .patterns
                 .insert(Role::Carriers, natural_order(carriers));
         }
-        let beats = of_type(&["rath.Beat"]);
-        if !beats.is_empty() {
-            roles.patterns.insert(Role::Beats, beats[..1].to_vec());
+        let beats = of_type(&["rath.Beat"]).into_iter();
+        // Whatever its messages hold: one is a beat.
+        let named = channels.iter().filter(|(t, _)| *t == "/beat");
+        if let Some(topic) = beats.chain(named.map(|(t, _)| (*t).to_owned())).next() {
+            roles.patterns.insert(Role::Beats, vec![topic]);
         }
         let pose = [
             "geometry_msgs/PoseStamped",
@@ -461,7 +463,8 @@ fn is_truth(topic: &str) -> bool {
     topic.to_lowercase().contains("truth")
 }
 
-fn is_carrier(topic: &str) -> bool {
+/// Whether a topic's name speaks of somebody who carries.
+pub(crate) fn is_carrier(topic: &str) -> bool {
     let topic = topic.to_lowercase();
     ["carrier", "bearer", "walker", "person"]
         .iter()

@@ -1254,3 +1254,176 @@ fn topics_of_other_times_meet_where_both_have_samples() {
         assert!((450..=901).contains(&rows), "{column}: {rows}");
     }
 }
+
+/// A gyroscope of ±125 °/s on what turns by 145 °/s: the roll is too small, and no interval may say otherwise.
+#[test]
+fn a_sensor_that_came_to_its_end_gives_no_interval() {
+    let folder = tempfile::tempdir().unwrap();
+    let message = |k: u32| {
+        let t = 0.01 * f64::from(k);
+        let (w, g) = (std::f64::consts::TAU, 9.80665);
+        let turn = f64::from(if k < 2500 { 10 } else { 23 }).to_radians();
+        let roll = turn * (w * t).sin();
+        let rate = (turn * w * (w * t).cos()).clamp(-2.18, 2.18);
+        let text = format!(
+            "{{\"angular_velocity\":{{\"x\":{rate},\"y\":0.0,\"z\":0.0}},\
+             \"linear_acceleration\":{{\"x\":0.0,\"y\":{},\"z\":{}}}}}",
+            g * roll.sin(),
+            g * roll.cos()
+        );
+        (t, text)
+    };
+    let file = told(folder.path(), &[("/s", (0..6000).map(message).collect())]);
+    let found = with_roles(folder.path(), &file, "imu = \"/s\"\n");
+    let remark = found["quality"]
+        .as_array()
+        .unwrap()
+        .iter()
+        .find(|q| q["kind"] == "saturated");
+    let text = remark.expect("saturated")["text"].as_str().unwrap();
+    assert!(
+        text.starts_with("the gyroscope came to its end at 2.180 rad/s in "),
+        "{text}"
+    );
+    let roll = &found["metrics"]["rms_roll_deg"];
+    assert!(roll["ci95"].is_null(), "{roll}");
+    assert!(
+        roll["reason"]
+            .as_str()
+            .unwrap()
+            .contains("the gyroscope came to the end of its range"),
+        "{roll}"
+    );
+    let roles = folder.path().join("roles.toml").display().to_string();
+    // Before it came there, nothing is missing.
+    let calm = json(&[
+        &file, "--format", "json", "--window", "0..20", "--roles", &roles,
+    ]);
+    assert!(calm["metrics"]["rms_roll_deg"]["ci95"].is_array());
+}
+
+/// A message on `/beat` is a beat, whatever it holds: nothing, or a stamp that knows better than the log when it was.
+#[test]
+fn every_message_on_beat_is_one() {
+    let folder = tempfile::tempdir().unwrap();
+    let swings = || {
+        (0..6000)
+            .map(|k| f64::from(k) * 0.01)
+            .map(|t| (t, swung(t)))
+    };
+    let bare = |k: u32| (0.5 * f64::from(k), "{\"by\":\"drum\"}".to_owned());
+    let late = |k: u32| {
+        let t = 0.5 * f64::from(k);
+        let (sec, nanosec) = (t.floor(), 1e9 * t.fract());
+        let text = format!("{{\"header\":{{\"stamp\":{{\"sec\":{sec},\"nanosec\":{nanosec}}}}}}}");
+        (t + 0.05 + 0.04 * tone(0.31, t), text)
+    };
+    for beats in [
+        (8..100).map(bare).collect::<Vec<_>>(),
+        (8..100).map(late).collect(),
+    ] {
+        let file = told(
+            folder.path(),
+            &[("/s", swings().collect()), ("/beat", beats)],
+        );
+        let found = with_roles(folder.path(), &file, "imu = \"/s\"\n");
+        assert!(
+            (metric(&found, "beat_hz") - 2.0).abs() < 1e-4,
+            "{}",
+            found["metrics"]["beat_hz"]
+        );
+        let ci95 = &found["metrics"]["beat_hz"]["ci95"];
+        let half = 0.5 * (ci95[1].as_f64().unwrap() - ci95[0].as_f64().unwrap());
+        assert!(half < 1e-4, "{ci95}");
+    }
+}
+
+/// Who looks in too late is told so.
+#[test]
+fn an_onset_before_the_window_is_told() {
+    let folder = tempfile::tempdir().unwrap();
+    let swings = (0..6000).map(|k| f64::from(k) * 0.01);
+    let file = told(
+        folder.path(),
+        &[("/s", swings.map(|t| (t, swung(t))).collect())],
+    );
+    let found = with_roles(
+        folder.path(),
+        &file,
+        "imu = \"/s\"\nanalysis_start_s = 20.0\n",
+    );
+    let onset = &found["metrics"]["onset_time_s"];
+    assert!(
+        (onset["value"].as_f64().unwrap() - 22.0).abs() < 0.05,
+        "{onset}"
+    );
+    assert!(
+        onset["reason"]
+            .as_str()
+            .unwrap()
+            .contains("may have begun before"),
+        "{onset}"
+    );
+}
+
+/// A recording is not written under the name of a table.
+#[test]
+fn a_recording_is_not_named_a_table() {
+    let folder = tempfile::tempdir().unwrap();
+    let file = recording(folder.path());
+    let name = file.to_str().unwrap();
+    let log = folder.path().join("belt.csv");
+    std::fs::write(&log, "time,gFx,gFy,gFz\n0,0,0,1\n0.01,0,0,1\n").unwrap();
+    let (log, table) = (log.to_str().unwrap(), folder.path().join("x.CSV"));
+    let table = table.to_str().unwrap();
+    for args in [
+        &["ingest", log, "--out", table][..],
+        &[name, "--annotate", table],
+    ] {
+        let out = analyze(args);
+        let said = text(&out.stderr);
+        assert_eq!(out.status.code(), Some(1), "{said}");
+        assert!(
+            said.lines().count() == 1 && said.contains("ends in .mcap"),
+            "{said}"
+        );
+        assert!(!Path::new(table).exists());
+    }
+    let plain = folder.path().join("walk.2026-11-27");
+    assert!(
+        analyze(&["ingest", log, "--out", plain.to_str().unwrap()])
+            .status
+            .success()
+    );
+}
+
+/// Sensors of a type that nobody knows, by their names on those who carry, are told of with the line that names them all.
+#[test]
+fn carriers_of_an_unknown_type_are_told_with_their_remedy() {
+    let folder = tempfile::tempdir().unwrap();
+    let swings = || {
+        (0..2000)
+            .map(|k| f64::from(k) * 0.01)
+            .map(|t| (t, swung(t)))
+            .collect()
+    };
+    let channels = ["/imu/carrier_1", "/imu/carrier_2", "/imu/rath"].map(|t| (t, swings()));
+    let file = told(folder.path(), &channels);
+    let found = json(&[&file, "--format", "json"]);
+    let line = "carriers = [\"/imu/carrier_1\", \"/imu/carrier_2\"]";
+    let said = |topic: &str| {
+        let quality = found["quality"].as_array().unwrap();
+        let of = |q: &&Value| q["kind"] == "unknown_type" && q["topic"] == topic;
+        quality.iter().find(of).unwrap()["text"]
+            .as_str()
+            .unwrap()
+            .to_owned()
+    };
+    for topic in ["/imu/carrier_1", "/imu/carrier_2"] {
+        assert!(said(topic).contains(line), "{}", said(topic));
+    }
+    assert!(said("/imu/rath").contains("imu = \"/imu/rath\""));
+    let roles = format!("imu = \"/imu/rath\"\n{line}\n");
+    let named = with_roles(folder.path(), &file, &roles);
+    assert!(!kinds(&named).contains(&"unknown_type".to_owned()));
+}

@@ -154,6 +154,9 @@ fn raw_phone_files_become_the_papers_metrics() {
     assert!((off_ms("/imu/carrier_1") - 90.5).abs() < 2.0);
     assert!((off_ms("/imu/carrier_2") + 60.5).abs() < 2.0);
     assert!((off_ms("/audio/drum") + 3060.0).abs() < 6.0);
+    // Their errors, 2.7 ms of each, are in the synchrony's interval; the phases' own would make it 0.004 wide.
+    let [low, high] = found.metrics.get("synchrony").unwrap().ci95.unwrap();
+    assert!((0.005..0.01).contains(&(high - low)), "{low} {high}");
     // And they are not taken for beats: the music begins at 17 s.
     let first = found.events.iter().find(|e| e.kind == "beat").unwrap();
     assert!(first.t_s > 16.9, "{}", first.t_s);

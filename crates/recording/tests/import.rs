@@ -664,7 +664,7 @@ fn what_is_missing_or_odd_is_named() {
     };
     assert_eq!(
         error("a.csv", "foo,bar\n1,2\n", None),
-        "a.csv: is no log of Sensor Logger, phyphox, Movella DOT / Xsens, Shimmer, MetaBase, x-io, physics-toolbox, sensorlog, sensorlog-motion, androsensor, and no layout is given; found \"foo,bar\""
+        "a.csv: is no log of Sensor Logger, phyphox, Movella DOT / Xsens, Shimmer, MetaBase, x-io, x-imu3, physics-toolbox, sensorlog, sensorlog-motion, androsensor, Axivity, and no layout is given; found \"foo,bar\""
     );
     assert_eq!(
         error("b.csv", "Time (s),gyro\n1,2\n", Some("x-io")),
@@ -718,7 +718,7 @@ fn what_is_missing_or_odd_is_named() {
     );
     assert_eq!(
         error("e.csv", "a\n1\n", Some("nothing")),
-        "nothing: is neither a file nor a built-in layout; built in are x-io, physics-toolbox, sensorlog, sensorlog-motion, androsensor"
+        "nothing: is neither a file nor a built-in layout; built in are x-io, x-imu3, physics-toolbox, sensorlog, sensorlog-motion, androsensor"
     );
     assert_eq!(
         error(
@@ -925,4 +925,83 @@ fn halves_of_a_device_are_told() {
     // One phone that only counts steps beside a whole one is no half.
     assert_eq!(told(&paths[..1]), None);
     assert_eq!(told(&[folder.path().to_owned()]), None);
+}
+
+/// An AX6 and an AX3 write no header; what is dated like them and is not in g is none of theirs.
+#[test]
+fn exports_of_axivity_have_no_header() {
+    let folder = folder();
+    let row = |k: usize, rest: &str| {
+        format!(
+            "2025-11-24 16:00:{:02}.{:03},{rest}\n",
+            k / 100,
+            k % 100 * 10
+        )
+    };
+    let rows = |rest: &str| (0..300).map(|k| row(k, rest)).collect::<String>();
+    let ax6 = file(
+        folder.path(),
+        "carrier_1.csv",
+        &rows("0.1,-0.2,0.97,90.0,-45.0,0.5"),
+    );
+    let found = ingest(folder.path(), &[ax6], None).unwrap();
+    assert_eq!(found.ingested.topics, [("/imu/carrier_1".to_owned(), 300)]);
+    let first = |field: &str| found.values(&format!("/imu/carrier_1.{field}"))[0];
+    assert!((first("linear_acceleration.z") - 0.97 * 9.80665).abs() < 1e-12);
+    assert!((first("angular_velocity.x") - std::f64::consts::FRAC_PI_2).abs() < 1e-12);
+    // `date -u -d "2025-11-24 16:00:00" +%s`
+    assert_eq!(first("header.stamp.sec"), 1_764_000_000.0);
+    let ax3 = file(folder.path(), "ax3.csv", &rows("0.1,-0.2,0.97"));
+    let found = ingest(folder.path(), &[ax3], None).unwrap();
+    assert_eq!(
+        found.values("/imu/ax3.angular_velocity_covariance[0]")[0],
+        -1.0
+    );
+    let si = file(folder.path(), "si.csv", &rows("0.1,-0.2,9.7"));
+    let said = ingest(folder.path(), &[si], None)
+        .err()
+        .unwrap()
+        .to_string();
+    assert!(said.ends_with("as a rule; expected 1 g"), "{said}");
+    let bad = rows("0.1,-0.2,0.97")
+        .replacen(",-0.2", ",x", 3)
+        .replacen(",x", ",-0.2", 2);
+    let bad = file(folder.path(), "bad.csv", &bad);
+    let said = ingest(folder.path(), &[bad], None)
+        .err()
+        .unwrap()
+        .to_string();
+    assert!(said.contains("line 3, column \"ay\""), "{said}");
+}
+
+/// Newer versions of AndroSensor name the gyroscope's columns after turns of the phone that say nothing of its axes.
+#[test]
+fn columns_whose_axes_nobody_knows_are_told_of() {
+    let folder = folder();
+    let head = "ACCELEROMETER X (m/s²);ACCELEROMETER Y (m/s²);ACCELEROMETER Z (m/s²);GYROSCOPE Yaw (rad/s);GYROSCOPE Pitch (rad/s);GYROSCOPE Roll (rad/s);Time since start in ms ";
+    let rows: String = (0..100)
+        .map(|k| format!("0.{k};0;9.8;0.1;0.2;0.3;{}\n", 10 * k))
+        .collect();
+    let log = file(folder.path(), "rath.csv", &format!("{head}\n{rows}"));
+    let found = ingest(folder.path(), &[log], None).unwrap();
+    let told = &found.ingested.notes[0];
+    assert!(
+        told.contains("it has no GYROSCOPE X (rad/s), ") && told.contains("GYROSCOPE Yaw (rad/s), GYROSCOPE Pitch (rad/s), GYROSCOPE Roll (rad/s) are left out"),
+        "{told}"
+    );
+}
+
+#[test]
+fn an_x_imu3_counts_microseconds() {
+    let folder = folder();
+    let head = "Timestamp (us),Gyroscope X (deg/s),Gyroscope Y (deg/s),Gyroscope Z (deg/s),Accelerometer X (g),Accelerometer Y (g),Accelerometer Z (g)";
+    let rows: String = (0..100)
+        .map(|k| format!("{},180.0,0.0,{k}.0,0.0,0.0,1.0\n", 2500 * k))
+        .collect();
+    let log = file(folder.path(), "Inertial.csv", &format!("{head}\n{rows}"));
+    let found = ingest(folder.path(), &[log], None).unwrap();
+    let values = |field: &str| found.values(&format!("/imu/Inertial.{field}"))[99];
+    assert!((values("angular_velocity.x") - std::f64::consts::PI).abs() < 1e-12);
+    assert!((values("linear_acceleration.z") - 9.80665).abs() < 1e-12);
+    assert_eq!(values("header.stamp.nanosec"), 247_500_000.0);
 }

@@ -33,6 +33,9 @@ pub(super) fn run(args: &AnalyzeArgs) -> anyhow::Result<Done> {
             );
         }
     }
+    if let Some(path) = &args.annotate {
+        super::is_recording("--annotate", path)?;
+    }
     let outputs = single.iter().filter_map(|(_, path)| path.as_deref());
     whole::apart(outputs, args.files.iter().map(AsRef::as_ref)).map_err(anyhow::Error::msg)?;
     let mut analyses = Vec::new();

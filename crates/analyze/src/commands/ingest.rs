@@ -26,7 +26,7 @@ A file's name says whose device it was: carrier, bearer, walker or person in it 
 #[command(after_help = EXAMPLES)]
 pub(super) struct IngestArgs {
     /// Logs: .npz of the archive; .zip, .csv or folders of phone apps and inertial sensors (phyphox, Sensor Logger, SensorLog, Physics
-    /// Toolbox, AndroSensor; Movella DOT, Xsens, Shimmer, MetaBase, x-io); .wav of a sound recorder
+    /// Toolbox, AndroSensor; Movella DOT, Xsens, Shimmer, MetaBase, x-io, Axivity); .wav of a sound recorder
     #[arg(required = true, value_name = "FILE")]
     files: Vec<PathBuf>,
     /// The recording to write; `-` is standard output
@@ -62,6 +62,7 @@ fn ingest(args: &IngestArgs) -> anyhow::Result<Done> {
             args.sound_start
         );
     }
+    super::is_recording("--out", &args.out)?;
     let options = import::ImportOptions {
         layout: args.layout.as_deref(),
         sound_start_s: args.sound_start,

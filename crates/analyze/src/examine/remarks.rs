@@ -8,7 +8,7 @@ use super::pass::{Entry, Pass, field};
 use crate::field::{ACCEL, GYRO};
 use crate::inputs::Window;
 use crate::quality::Quality;
-use crate::roles::{Role, RolesFile, matches, stands_beside};
+use crate::roles::{Role, RolesFile, is_carrier, matches, stands_beside};
 
 /// A topic that begins so late or ends so early is worth a word: this share of the window, and this long (s).
 const LEAST_ABSENT: f64 = 0.02;
@@ -84,13 +84,27 @@ impl Pass<'_> {
         let paths: HashSet<&str> = self.entries.iter().map(|e| &*e.path).collect();
         let topics = self.recording.info().channels.iter();
         let topics: BTreeSet<&str> = topics.map(|c| c.topic.as_str()).collect();
+        let senses = |topic: &str| {
+            let mut fields = GYRO.iter().chain(&ACCEL);
+            fields.all(|f| paths.contains(&*format!("{topic}.{f}")))
+        };
+        let carriers = topics.iter().filter(|t| is_carrier(t) && senses(t));
+        let carriers: Vec<String> = carriers.map(|t| format!("\"{t}\"")).collect();
         let mut out = Vec::new();
         for topic in topics.into_iter().filter(|t| !stands_beside(t)) {
             let has = |field: String| paths.contains(&*format!("{topic}.{field}"));
+            if is_carrier(topic) && senses(topic) {
+                let text = format!(
+                    "holds what an inertial sensor tells, but its type does not say so: if a carrier wears it, write carriers = [{}] into a file for --roles",
+                    carriers.join(", ")
+                );
+                out.push(Quality::remark(topic, "unknown_type", text));
+                continue;
+            }
             let transforms = TRANSFORMS
                 .iter()
                 .find(|(place, turn)| has(format!("{place}.z")) && has(format!("{turn}.roll")));
-            let (what, lines) = if GYRO.iter().chain(&ACCEL).all(|f| has((*f).to_owned())) {
+            let (what, lines) = if senses(topic) {
                 (
                     "holds what an inertial sensor tells",
                     format!("imu = \"{topic}\""),

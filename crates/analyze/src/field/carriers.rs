@@ -42,6 +42,8 @@ struct Worn {
     ahead_s: f64,
     /// What else it may be ahead, as far as the motion tells, s; of all sensors the same number.
     or_ahead_s: Vec<f64>,
+    /// Standard error of its clock, where taps have set it, s.
+    clock_sd_s: f64,
 }
 
 /// Times (s) and the phases there (rad), one column for each who walks.
@@ -77,8 +79,8 @@ pub fn of_all(name: &str) -> bool {
 }
 
 impl Carriers {
-    /// Takes one sensor.
-    pub fn add(&mut self, topic: &str, track: &Track, options: Options) {
+    /// Takes one sensor, and the standard error of its clock where taps have set that (s).
+    pub fn add(&mut self, topic: &str, track: &Track, options: Options, clock_sd_s: f64) {
         let turns = track.gyro_rad_per_s.iter().any(|w| *w != [0.0; 3]);
         let heave: Vec<f64> = if turns {
             let up = |(q, a): (&UnitQuaternion<f64>, &[f64; 3])| (q * Vector3::from(*a)).z;
@@ -104,6 +106,7 @@ impl Carriers {
             t_s: track.t_s.clone(),
             ahead_s: 0.0,
             or_ahead_s: Vec::new(),
+            clock_sd_s,
         });
     }
 
@@ -189,6 +192,20 @@ impl Carriers {
         })
     }
 
+    /// For each clock that taps have set: with it 1.96 standard errors behind, and ahead.
+    pub fn phases_by_clocks(&self) -> impl Iterator<Item = [Option<Phases>; 2]> + '_ {
+        let set = (0..self.worn.len()).filter(|k| self.worn[*k].clock_sd_s > 0.0);
+        set.map(|k| {
+            [-1.96, 1.96].map(|sds| {
+                let moved = |worn: &Worn| match std::ptr::eq(worn, &self.worn[k]) {
+                    true => worn.ahead_s + sds * worn.clock_sd_s,
+                    false => worn.ahead_s,
+                };
+                self.phases_as(|steps| steps.phase_rad.clone(), moved)
+            })
+        })
+    }
+
     fn phases_as(
         &self,
         phase: impl Fn(&Steps) -> Vec<f64>,
@@ -261,10 +278,17 @@ impl Carriers {
     }
 
     /// 95 % intervals of the synchrony and the pull: the phases' own error, what had to be put back into them (`detected`: the same metrics
-    /// without), and, of the synchrony, the clocks that were put on each other by motion, as twins show them, or otherwise (`synchrony_else`).
-    pub fn interval(&self, metrics: &mut Metrics, detected: &Metrics, synchrony_else: &[f64]) {
+    /// without), and, of the synchrony, the clocks: those that were put on each other by motion, as twins show them, or otherwise (`synchrony_else`), and what
+    /// the errors of those that taps have set make of it (`by_taps`).
+    pub fn interval(
+        &self,
+        metrics: &mut Metrics,
+        detected: &Metrics,
+        synchrony_else: &[f64],
+        by_taps: f64,
+    ) {
         let moved = self.worn.iter().any(|worn| worn.ahead_s != 0.0);
-        let clocks = if moved { MOVED_ERROR } else { 0.0 };
+        let clocks = if moved { MOVED_ERROR } else { by_taps };
         let put_back = |name: &str, x: f64| x - detected.number(name).unwrap_or(x);
         let ends = metrics.number("synchrony").map(|x| {
             let all = synchrony_else.iter().copied().filter(|x| x.is_finite());
@@ -445,7 +469,7 @@ mod tests {
                     t_s,
                     dropped: 0,
                 };
-                carriers.add(&format!("/imu/{k}"), &track, Options::default());
+                carriers.add(&format!("/imu/{k}"), &track, Options::default(), 0.0);
             }
             let said = carriers.align(None, false);
             assert!(
@@ -459,7 +483,7 @@ mod tests {
                 ..Default::default()
             };
             let mut metrics = metrics_of(&inputs, Window::ALL, |name| name == "synchrony");
-            carriers.interval(&mut metrics, &Metrics::default(), &[]);
+            carriers.interval(&mut metrics, &Metrics::default(), &[], 0.0);
             let synchrony = metrics.get("synchrony").unwrap();
             assert!(synchrony.as_f64().unwrap() > 0.9 && synchrony.ci95.is_none());
             assert!(

@@ -5,6 +5,7 @@
 use crate::clock::{Clock, ClockError, from_events, from_signals, taps};
 use crate::imu::Track;
 use crate::imu::track::period_s;
+use crate::inputs::Window;
 use crate::quality::Quality;
 
 /// Fewer taps than this set no clock: two may be chance.
@@ -55,14 +56,16 @@ impl Clocks {
         }
     }
 
-    /// Puts the samples of another sensor on the rath's clock, where taps tell how.
-    pub fn put_right(&mut self, topic: &str, track: &mut Track) {
+    /// Puts the samples of another sensor on the rath's clock, where taps tell how; gives the standard error of their times in the middle of
+    /// `window` (s), 0 where nothing was done.
+    pub fn put_right(&mut self, topic: &str, track: &mut Track, window: Window) -> f64 {
         if self.tap_s.len() < FEWEST {
-            return;
+            return 0.0;
         }
         let tap_s = felt(track);
         let fit = from_events(&tap_s, &self.tap_s, SEARCH_S, TOLERANCE_S);
-        if let Some(mut clock) = self.found(topic, fit, tap_s.len().min(self.tap_s.len())) {
+        let taps = tap_s.len().min(self.tap_s.len());
+        self.found(topic, fit, taps).map_or(0.0, |mut clock| {
             // A tap falls anywhere between two samples, of either sensor; the scatter does not show it where both samplings keep step.
             let spread_s = |t_s: &[f64]| period_s(t_s).unwrap_or_default() / 12f64.sqrt();
             let sampled_s = spread_s(&track.t_s).hypot(spread_s(&self.turning.0));
@@ -70,12 +73,16 @@ impl Clocks {
             clock.offset_sd_s = clock.offset_sd_s.max(floor_s);
             self.say(topic, &clock, clock.ahead());
             if self.leave {
-                return;
+                return 0.0;
             }
+            let within = window.range(&track.t_s);
+            let middle_s = track.t_s.get((within.start + within.end) / 2);
+            let sd_s = clock.reference_sd_s(middle_s.copied().unwrap_or(clock.at_s));
             for t in &mut track.t_s {
                 *t = clock.reference_s(*t);
             }
-        }
+            sd_s
+        })
     }
 
     /// Says how the clock of another sensor on the load goes, by how fast both turn: on a rigid body that is the same everywhere, whichever way a

@@ -1,5 +1,6 @@
 //! What is read of sensors and beats: their columns by topic, and when each value was taken.
 
+use recording::read::{ReadError, Recording};
 use recording::signal::{Signal, field_of, seconds_since};
 
 use super::dates::{Dated, dated, delay_s, ends_s};
@@ -206,6 +207,34 @@ impl Columns {
         let number = number.map(|number| beats.iter().map(|(_, k)| number[*k]).collect());
         (beats.into_iter().map(|b| b.0).collect(), number, remark)
     }
+}
+
+/// When the messages of a topic were stamped, or else that they came, whatever is in them: of beats, each is one.
+///
+/// # Errors
+/// Where the file cannot be read.
+pub(super) fn came(recording: &Recording, topic: &str) -> Result<Signal, ReadError> {
+    let start_ns = recording.info().start_ns;
+    let (mut times_ns, mut own_s, mut stamped) = (Vec::new(), Vec::new(), true);
+    recording.stream(&|_| false, &mut |batch| {
+        if batch.topic == topic {
+            times_ns.extend_from_slice(batch.times_ns);
+            stamped &= batch.stamps_ns.is_some();
+            own_s.extend(seconds_since(
+                batch.stamps_ns.unwrap_or(batch.times_ns),
+                start_ns,
+            ));
+        }
+    })?;
+    // Whoever fills no stamps in leaves them at one time.
+    let differ = own_s.windows(2).any(|w| w[0] != w[1]);
+    let field = if stamped && differ { BEAT[1] } else { "log" };
+    Ok(Signal {
+        path: format!("{topic}.{field}"),
+        unit: "s".into(),
+        times_ns: times_ns.into(),
+        values: own_s,
+    })
 }
 
 /// Beats' own times on the log's clock: moved so that none lies behind its log time, and stretched where the delays surely grow or fall. Beats are

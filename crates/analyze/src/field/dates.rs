@@ -17,8 +17,9 @@ const MORE_EVEN: f64 = 0.8;
 const EVEN_S: f64 = 2e-5;
 /// Samples whose usual step is below this share of their mean step came in packets.
 const PACKETS: f64 = 0.6;
-/// Packets of so many samples on average leave fewer than one step in twenty, which then look like holes; and so many of them tell their rate.
-const LONG_PACKET: usize = 20;
+/// Packets of so many samples on average leave hardly more than one step in twenty; of 20, fewer, which then look like holes. So many of them tell
+/// their rate.
+const LONG_PACKET: usize = 19;
 const FEWEST_PACKETS: usize = 4;
 /// Stamps whose span is not the log's within this share run at another pace, or tell no times.
 const SAME_SPAN: f64 = 0.1;
@@ -344,6 +345,25 @@ mod tests {
             let late = found.t_s[0] - taken(0);
             let off = worst(&found.t_s, (0..12_000).map(|k| taken(k) + late));
             assert!(late.abs() < 0.02 && off < 1e-4, "{late} {off}");
+        }
+    }
+
+    /// Whether one step in twenty is a little more or less than that must not matter.
+    #[test]
+    fn packets_of_twenty_are_spread_wherever_the_first_begins() {
+        for (each, skipped) in (15..25).flat_map(|each| [0, 7, 12].map(|skipped| (each, skipped))) {
+            let kept = skipped..12_000;
+            let log = kept.clone().map(|k| f64::from(k / each * each) * 0.005);
+            let found = dated(log.collect(), None);
+            assert_eq!(
+                found.remark.map(|r| r.0),
+                Some("packets"),
+                "{each} {skipped}"
+            );
+            let late = found.t_s[6000] - f64::from(6000 + skipped) * 0.005;
+            let off = worst(&found.t_s, kept.map(|k| f64::from(k) * 0.005 + late));
+            // Half a packet.
+            assert!(off < 0.0025 * f64::from(each), "{each} {skipped}: {off}");
         }
     }
 

@@ -26,6 +26,7 @@ use crate::imu::Track;
 use crate::imu::interval;
 use crate::imu::orientation::Options;
 use crate::imu::rath::{self, Motion, Settings};
+use crate::imu::saturation::{Saturated, saturated};
 use crate::imu::unloading::unloadings;
 use crate::inputs::{Inputs, Window};
 use crate::metrics::{Metrics, Value, metrics_of};
@@ -57,6 +58,8 @@ pub struct Field {
     topic: Option<String>,
     motion: Option<Motion>,
     no_motion: Option<String>,
+    /// Where the sensor of the motion came to its end within the window.
+    saturated: Vec<Saturated>,
     carriers: Carriers,
     beat_s: Vec<f64>,
     /// Their numbers, where they have some.
@@ -110,11 +113,14 @@ impl Field {
         let factors = match thin::factors(recording, roles)? {
             Ok(factors) => factors,
             Err(samples) => {
-                field.quality.push(Quality::remark(
-                    "",
-                    "too_long",
-                    format!("motion is not estimated from {samples} inertial samples, which would take too much memory: name fewer sensors in a roles file, or give a part of the recording"),
-                ));
+                let why = format!(
+                    "motion is not estimated from {samples} inertial samples, which would take too much memory: name fewer sensors in a roles file, or give a part of the recording"
+                );
+                field
+                    .quality
+                    .push(Quality::remark("", "too_long", why.clone()));
+                field.topic = roles.topic(Role::Imu).map(str::to_owned);
+                field.no_motion = Some(why);
                 return Ok(field);
             }
         };
@@ -134,6 +140,13 @@ impl Field {
         };
         let (mut signals, _) = recording.signals(&wanted)?;
         signals.extend(thin::read(recording, &factors)?);
+        if let Some(topic) = roles.topic(Role::Beats)
+            && !signals
+                .iter()
+                .any(|s| field_of(&s.path, topic) == Some(BEAT[1]))
+        {
+            signals.push(columns::came(recording, topic)?);
+        }
         for (topic, factor) in factors.iter().filter(|(_, factor)| **factor > 1) {
             field.quality.push(Quality::remark(
                 topic,
@@ -173,17 +186,31 @@ impl Field {
             let said = said.map(|(kind, text)| Quality::remark(topic, kind, text));
             field.quality.extend(said);
             let is_rath = roles.topic(Role::Imu) == Some(topic.as_str());
+            let mut ends = saturated(&track);
+            for end in &ends {
+                field.quality.push(Quality {
+                    count: end.samples.len() as u64,
+                    t_s: Some(track.t_s[end.samples[0]]),
+                    ..Quality::remark(topic, "saturated", end.told(track.len()))
+                });
+            }
+            if is_rath {
+                let within = window.range(&track.t_s);
+                ends.retain(|end| end.samples.iter().any(|k| within.contains(k)));
+                field.saturated = ends;
+            }
             if !is_rath && roles.patterns(Role::Imu).contains(topic) {
                 if !one_clock {
                     clocks.hold_against(topic, &track);
                 }
                 continue;
             }
+            let mut clock_sd_s = 0.0;
             if !one_clock {
                 if is_rath {
                     clocks = Clocks::of_rath(topic, &track, leave);
                 } else {
-                    clocks.put_right(topic, &mut track);
+                    clock_sd_s = clocks.put_right(topic, &mut track, window);
                 }
             }
             if is_rath {
@@ -207,7 +234,7 @@ impl Field {
             }
             // The one sensor of a walker's phone plays the rath's role for want of another: steps tell.
             if !is_rath || (roles.patterns(Role::Carriers).is_empty() && !about_the_load(topic)) {
-                field.carriers.add(topic, &track, options);
+                field.carriers.add(topic, &track, options, clock_sd_s);
             }
         }
         if let Some(topic) = roles.topic(Role::Beats) {
@@ -396,6 +423,9 @@ impl Field {
         let mut out = Metrics::default();
         if let Some(motion) = &self.motion {
             out = interval::metrics(motion, window);
+            for end in &self.saturated {
+                interval::without(&mut out, end);
+            }
         }
         if (self.filled.phases || self.judge.is_some())
             && let Some(phases) = self.carriers.phases()
@@ -409,13 +439,23 @@ impl Field {
             let detected = self.carriers.detected();
             let detected =
                 detected.map(|p| as_of(p, |n| n == "synchrony" || n == "pull_rad_per_s"));
-            let others: Vec<f64> = self
-                .carriers
-                .phases_else()
-                .filter_map(|p| as_of(p, |n| n == "synchrony").number("synchrony"))
-                .collect();
-            self.carriers
-                .interval(&mut together, &detected.unwrap_or_default(), &others);
+            let synchrony = |phases| as_of(phases, |n| n == "synchrony").number("synchrony");
+            let others: Vec<f64> = self.carriers.phases_else().filter_map(synchrony).collect();
+            let here = together.number("synchrony");
+            let by_taps = here.map_or(0.0, |x| {
+                let each = self.carriers.phases_by_clocks();
+                let farthest = each.map(|ends| {
+                    let ends = ends.into_iter().flatten().filter_map(synchrony);
+                    ends.map(|end| (end - x).abs()).fold(0.0, f64::max)
+                });
+                farthest.fold(0.0, f64::hypot)
+            });
+            self.carriers.interval(
+                &mut together,
+                &detected.unwrap_or_default(),
+                &others,
+                by_taps,
+            );
             out.0.extend(together.0);
         }
         // Taps and talk before and behind the music are heard too.
@@ -472,7 +512,9 @@ impl Field {
     /// What is odd about the sensors.
     pub fn quality(&mut self) -> Vec<Quality> {
         let mut out = std::mem::take(&mut self.quality);
-        if let (Some(topic), Some(why)) = (&self.topic, &self.no_motion) {
+        if let (Some(topic), Some(why)) = (&self.topic, &self.no_motion)
+            && out.iter().all(|q| q.kind != "too_long")
+        {
             out.push(Quality::remark(topic, "absent_field", why.clone()));
         }
         out.extend(self.carriers.quality());

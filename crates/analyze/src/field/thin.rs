@@ -12,8 +12,10 @@ use crate::roles::{Role, Roles};
 /// Bytes that the estimates hold per sample of the rath's sensor, and of a carrier's (measured on 300,000 and 600,000; they hold many columns at once).
 const RATH_BYTES: u64 = 850;
 const CARRIER_BYTES: u64 = 550;
-/// What the estimates may hold (bytes).
+/// What the estimates may hold (bytes) before sensors are thinned; and where they are thinned to the least rate, before there are none: two hours of a
+/// rath and four carriers.
 const MOST_BYTES: u64 = 360_000_000;
+const LAST_BYTES: u64 = 1_400_000_000;
 /// Sensors are thinned to the first of these rates (Hz), or to the next where that is not enough: what moves on shoulders lies below a tenth of either.
 const LEAST_HZ: [f64; 2] = [100.0, 50.0];
 /// No device samples faster (Hz): such a log was written at once, and the stamps tell the rate.
@@ -73,12 +75,13 @@ fn fitting(sensors: &[(u64, u64, f64)]) -> Option<Vec<usize>> {
         each.map(|(.., hz)| ((1.01 * hz / least_hz) as usize).max(1))
             .collect()
     };
-    let fits = |factors: &Vec<usize>| {
+    let fits = |(factors, most_bytes): &(Vec<usize>, u64)| {
         let each = sensors.iter().zip(factors);
         let bytes: u64 = each.map(|((n, bytes, _), f)| n / *f as u64 * bytes).sum();
-        bytes <= MOST_BYTES
+        bytes <= *most_bytes
     };
-    LEAST_HZ.iter().map(at).find(fits)
+    let tried = LEAST_HZ.iter().map(at).zip([MOST_BYTES, LAST_BYTES]);
+    Some(tried.into_iter().find(fits)?.0)
 }
 
 /// From the first to the last stamp of each topic that has stamps, s.
@@ -289,7 +292,11 @@ mod tests {
         assert_eq!(of_three(1.0, 199.9), Some(vec![4; 3]));
         assert_eq!(of_three(1.0, 99.99), Some(vec![2; 3]));
         assert_eq!(of_three(1.0, 50.0), Some(vec![1; 3]));
-        assert_eq!(of_three(1.1, 99.99), None);
+        assert_eq!(of_three(3.9, 99.99), Some(vec![2; 3]));
+        assert_eq!(of_three(4.2, 99.99), None);
+        let carrier = hours(1.0, 100.0, CARRIER_BYTES);
+        let of_nine = [vec![hours(1.0, 200.0, RATH_BYTES)], vec![carrier; 8]].concat();
+        assert_eq!(fitting(&of_nine), Some([vec![4], vec![2; 8]].concat()));
     }
 
     #[test]

@@ -4,6 +4,7 @@
 //! at the paper's 30 Hz with a random phase; the metric's spread over the draws is its standard error, 1.96 of which are given.
 
 use super::rath::{Motion, Mounting};
+use super::saturation::Saturated;
 use super::unloading::unloadings;
 use crate::inputs::{Inputs, Window, between};
 use crate::line::rival_hz;
@@ -88,7 +89,7 @@ pub fn metrics(motion: &Motion, window: Window) -> Metrics {
             value.datum = Datum::Number(root);
             value.ci95 = Some(ci95);
             if !matches!(motion.settings.mounting, Mounting::Known(_)) {
-                value.reason = Some("about its mean over the window: how the sensor sits cannot be told from how the load leans; give mounting_roll_pitch_yaw_deg in a roles file".into());
+                value.reason = Some("about its mean over the window: how the sensor sits cannot be told from how the load leans; give imu_mounting_roll_pitch_yaw_deg in a roles file".into());
             }
             continue;
         }
@@ -114,8 +115,11 @@ pub fn metrics(motion: &Motion, window: Window) -> Metrics {
         let of_rate = (OF_EDGES.contains(name) && rate_hz < ENOUGH_HZ).then(|| {
             format!("at {rate_hz:.0} Hz touch-downs fall between samples, and their overtones onto slower lines; 100 Hz or more are wanted")
         });
-        let reasons: Vec<String> = of_height
+        let reasons: Vec<String> = value
+            .reason
+            .take()
             .into_iter()
+            .chain(of_height)
             .chain(of_place)
             .chain(of_rate)
             .collect();
@@ -140,6 +144,25 @@ pub fn metrics(motion: &Motion, window: Window) -> Metrics {
         }
     }
     out
+}
+
+/// Takes the intervals from numbers that rest on a sensor which came to its end: what is missing is in no budget. An accelerometer's missing peaks
+/// hardly turn the attitude.
+pub fn without(metrics: &mut Metrics, end: &Saturated) {
+    for (name, value) in &mut metrics.0 {
+        let rests_on = end.gyroscope || is_of_height(name) || *name == "t_float";
+        if rests_on && value.ci95.take().is_some() {
+            let sensor = match end.gyroscope {
+                true => "gyroscope",
+                false => "accelerometer",
+            };
+            let why = format!("without an interval: the {sensor} came to the end of its range");
+            value.reason = Some(match value.reason.take() {
+                Some(reason) => format!("{why}; {reason}"),
+                None => why,
+            });
+        }
+    }
 }
 
 /// What a sensor off the centre of mass feels otherwise, by its lever.

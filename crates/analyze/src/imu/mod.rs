@@ -12,12 +12,14 @@
 //! | [`budget`] | how sure a sensor can be |
 //! | [`interval`] | every metric that rests on the motion, with its interval |
 //! | [`unloading`] | when the support falls below a share of the weight |
+//! | [`saturation`] | where a sensor came to the end of its range |
 //! | [`truth`] | errors against a recorded truth |
 
 pub mod budget;
 pub mod interval;
 pub mod orientation;
 pub mod rath;
+pub mod saturation;
 pub mod track;
 pub mod truth;
 pub mod unloading;

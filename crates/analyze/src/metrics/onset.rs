@@ -38,8 +38,18 @@ pub fn stretch_samples(t_s: &[f64]) -> Option<usize> {
 }
 
 pub fn onset_time_s(c: &Context) -> Value {
-    c.onset()
-        .map_or_else(|| Value::missing("no onset"), Value::number)
+    let Some(onset_s) = c.onset() else {
+        return Value::missing("no onset");
+    };
+    let t_s = &c.roll().t_s;
+    let earliest = stretch_samples(t_s).and_then(|m| t_s.get(m - 1));
+    let reason = (earliest == Some(&onset_s)).then(|| {
+        "it rolls so from the window's beginning on, and may have begun before".to_owned()
+    });
+    Value {
+        reason,
+        ..Value::number(onset_s)
+    }
 }
 
 pub fn unstable(c: &Context) -> Value {

@@ -15,6 +15,7 @@ use crate::text::read_text;
 /// Layouts that come with the program; of two that fit a file, the first is taken.
 pub const BUILT_IN: &[(&str, &str)] = &[
     ("x-io", include_str!("layouts/x-io.toml")),
+    ("x-imu3", include_str!("layouts/x-imu3.toml")),
     (
         "physics-toolbox",
         include_str!("layouts/physics-toolbox.toml"),
@@ -167,9 +168,11 @@ pub(super) fn read(layout: &Layout, name: &str, text: &str) -> Result<Log, Impor
     table.take_units();
     table.drop_cut_row(name, &mut notes);
     let time = table.find_all([layout.time.column.as_str()])?[0];
-    let columns = |vector: &Option<Vector>, units: &[(&str, f64)]| {
+    let mut lacking = Vec::new();
+    let mut columns = |vector: &Option<Vector>, units: &[(&str, f64)]| {
         let there = |v: &&Vector| !v.optional || v.columns.iter().any(|c| table.find(c).is_some());
         let Some(vector) = vector.as_ref().filter(there) else {
+            lacking.extend(vector.iter().flat_map(|v| v.columns.iter().cloned()));
             return Ok(None);
         };
         let found = table.find_all(vector.columns.each_ref().map(String::as_str))?;
@@ -187,6 +190,29 @@ pub(super) fn read(layout: &Layout, name: &str, text: &str) -> Result<Log, Impor
         return Err(
             table.problem("the layout names neither acceleration nor angular_velocity".to_owned())
         );
+    }
+    if !lacking.is_empty() {
+        // Under another name nobody knows which axis is which.
+        let like = |name: &&String| {
+            let name = name.to_lowercase();
+            ["gyro", "rotation", "angular"]
+                .iter()
+                .any(|word| name.contains(word))
+        };
+        let others: Vec<&str> = table
+            .columns
+            .iter()
+            .filter(like)
+            .map(|c| c.trim())
+            .collect();
+        let others = match others.is_empty() {
+            true => String::new(),
+            false => format!(
+                "; {} are left out, for they do not tell its axes: if you know which is which, give a layout",
+                others.join(", ")
+            ),
+        };
+        notes.push(format!("it has no {}{others}", lacking.join(", ")));
     }
     let start_ns = imu::nanoseconds(layout.time.start_s)
         .ok_or_else(|| table.problem("the layout's start_s is no time since 1970".to_owned()))?;

@@ -3,6 +3,7 @@
 //! [`ingest`] finds out what each file is. Inertial logs become `sensor_msgs/msg/Imu` in the convention of REP-145, WAV files
 //! `foxglove.RawAudio`, several devices in one recording, in the order of time.
 
+mod axivity;
 mod date;
 mod imu;
 pub mod layout;
@@ -315,6 +316,9 @@ fn read(files: &Files, layout: Option<&layout::Layout>) -> Result<imu::Log, Impo
     if let Some((layout, text)) = layout::fitting(files) {
         return layout::read(&layout, &files.name, text);
     }
+    if let Some(export) = axivity::export(files) {
+        return axivity::read(&files.name, export);
+    }
     let head = |(_, text): (&str, &str)| {
         let line = text.lines().next().unwrap_or_default();
         format!("{:?}", line.chars().take(120).collect::<String>())
@@ -326,7 +330,12 @@ fn read(files: &Files, layout: Option<&layout::Layout>) -> Result<imu::Log, Impo
         heads.join(", ")
     };
     let layouts = layout::BUILT_IN.iter().map(|(name, _)| *name);
-    let known: Vec<&str> = FORMATS.iter().map(|f| f.name).chain(layouts).collect();
+    let known: Vec<&str> = FORMATS
+        .iter()
+        .map(|f| f.name)
+        .chain(layouts)
+        .chain([axivity::NAME])
+        .collect();
     let problem = format!(
         "is no log of {}, and no layout is given; found {found}",
         known.join(", ")

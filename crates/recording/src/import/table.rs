@@ -93,6 +93,16 @@ impl Table {
         })
     }
 
+    /// Reads a table without a header; as many of `columns` as its first row has cells.
+    pub fn headless(name: &str, text: &str, columns: &[&str]) -> Result<Self, ImportError> {
+        let text = text.trim_start_matches('\u{feff}');
+        let cells = text.lines().next().unwrap_or_default().split(',').count();
+        let header = columns[..cells.min(columns.len())].join(",");
+        let mut table = Self::parse(name, &format!("{header}\n{text}"), |_| true)?;
+        table.header_line = 0;
+        Ok(table)
+    }
+
     /// Leaves out a last row that was cut off, with a note; `log` is the log that this table belongs to.
     ///
     /// Its last cell may be half a number. Rows may all be shorter than the header: what counts is also the row before.
