@@ -102,7 +102,11 @@ pub fn adler(
     measured: bool,
 ) -> Result<Adler, &'static str> {
     let walk = Walk::new(t_s, phase_rad, beat_rad, measured)?;
-    let (x, best) = walk.climb(walk.start()?, false);
+    let [a, b] = walk.starts()?.map(|start| walk.climb(start, false));
+    let (x, best) = match b.1.value > a.1.value || !a.1.value.is_finite() {
+        true => b,
+        false => a,
+    };
     let cover = best.information.variances().ok_or(walk::TOO_LITTLE)?;
     let carriers = walk.phase.len();
     let bent = match walk.before_s > 0.0 && measured {
