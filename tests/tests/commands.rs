@@ -206,6 +206,38 @@ fn bad_input_gets_one_sentence_and_leaves_nothing() {
         assert_eq!(out.status.code(), Some(2), "{flag} {wrong}");
         assert!(said.contains(expected), "{flag} {wrong} says: {said}");
     }
+    for (name, flag, wrong, expected) in [
+        ("study", "--shard", "-1/3", "expected K/N"),
+        (
+            "study",
+            "--shards",
+            "-3",
+            "expected a whole number, 1 or more",
+        ),
+        (
+            "analyze",
+            "--max-items",
+            "-1",
+            "expected a whole number, 0 or more",
+        ),
+        (
+            "analyze",
+            "--max-chunk-bytes",
+            "-1",
+            "expected a whole number, 0 or more",
+        ),
+        (
+            "analyze",
+            "--max-message-bytes",
+            "1k",
+            "expected a whole number, 0 or more",
+        ),
+    ] {
+        let out = run_in(folder.path(), name, &["mine.toml", flag, wrong]);
+        let said = String::from_utf8_lossy(&out.stderr);
+        assert_eq!(out.status.code(), Some(2), "{flag} {wrong}");
+        assert!(said.contains(expected), "{flag} {wrong} says: {said}");
+    }
     let help = good(run_in(folder.path(), "sim", &["--help"])).stdout;
     let help = String::from_utf8_lossy(&help);
     for code in ["0 done;", "1 it", "2 wrong usage;", "3 done, but"] {

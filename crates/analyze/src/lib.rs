@@ -22,6 +22,7 @@ mod line;
 pub mod mechanism;
 mod median;
 pub mod metrics;
+mod pairs;
 pub mod peaks;
 pub mod phase;
 pub mod quality;

@@ -4,7 +4,9 @@ use std::collections::HashMap;
 use std::f64::consts::{PI, TAU};
 use std::sync::Mutex;
 
+use crate::pairs::products;
 use crate::random::Random;
+use nalgebra::DMatrix;
 use realfft::RealFftPlanner;
 use realfft::num_complex::Complex64;
 
@@ -219,17 +221,24 @@ pub fn relative_phase(phi_rad: &[f64], psi_rad: &[f64], p: f64, q: f64) -> Optio
     circular(phi_rad.iter().zip(psi_rad).map(|(a, b)| p * a - q * b))
 }
 
-/// Every pair of carriers (first, second, statistics of φ_first − φ_second), first < second.
-pub fn pairs(phases_rad: &[&[f64]]) -> Vec<(usize, usize, Circular)> {
-    let mut out = Vec::new();
-    for i in 0..phases_rad.len() {
-        for j in i + 1..phases_rad.len() {
-            if let Some(c) = relative_phase(phases_rad[i], phases_rad[j], 1.0, 1.0) {
-                out.push((i, j, c));
-            }
-        }
+/// PLV |⟨e^{i(φ_j − φ_k)}⟩| of every pair of carriers, (0, 1), (0, 2), …: products of their unit vectors, N sines for N²/2 differences.
+pub fn locking(phases_rad: &[&[f64]]) -> Vec<f64> {
+    let samples = phases_rad.iter().map(|p| p.len()).min().unwrap_or(0);
+    if samples == 0 {
+        return Vec::new();
     }
-    out
+    let (mut unit, mut turned) = (Vec::new(), Vec::new());
+    for phases in phases_rad {
+        let (sin, cos): (Vec<f64>, Vec<f64>) =
+            phases[..samples].iter().map(|phi| phi.sin_cos()).unzip();
+        turned.extend(sin.iter().copied().chain(cos.iter().map(|c| -c)));
+        unit.extend(cos.into_iter().chain(sin));
+    }
+    let columns = |x| DMatrix::from_vec(2 * samples, phases_rad.len(), x);
+    let (unit, turned) = (columns(unit), columns(turned));
+    let length = |(re, im): (f64, f64)| ((re * re + im * im).sqrt() / samples as f64).min(1.0);
+    let parts = products(&unit, &unit).into_iter();
+    parts.zip(products(&turned, &unit)).map(length).collect()
 }
 
 /// What mean r the same phases give when each carrier is shifted in time by a random, circular amount: the chance level of *measured*
@@ -332,6 +341,30 @@ pub fn unwrap(phase_rad: &[f64]) -> Vec<f64> {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn locking_of_pairs_is_that_of_their_relative_phases() {
+        let mut random = Random(3);
+        let mut walk = |turns: f64| {
+            let mut phase = 0.0;
+            let step = |k| {
+                phase += random.uniform() - 0.5;
+                phase + turns * f64::from(k)
+            };
+            (0..900).map(step).collect::<Vec<f64>>()
+        };
+        let phases: Vec<Vec<f64>> = (0..70).map(|c| walk(0.4 + 0.001 * f64::from(c))).collect();
+        let phases: Vec<&[f64]> = phases.iter().map(|p| &p[..]).collect();
+        let mut found = locking(&phases).into_iter();
+        for (j, a) in phases.iter().enumerate() {
+            for b in &phases[j + 1..] {
+                let plain = relative_phase(a, b, 1.0, 1.0).unwrap().resultant;
+                assert!((found.next().unwrap() - plain).abs() < 1e-12);
+            }
+        }
+        assert!(found.next().is_none());
+        assert!(locking(&[&[], &[]]).is_empty());
+    }
 
     #[test]
     fn a_hole_does_not_swallow_what_comes_after_it() {

@@ -904,7 +904,7 @@ fn limits_are_named() {
     );
     let said = text(&analyze(&[&file]).stderr);
     assert!(
-        said.contains("a has more than 64 items (the limit max_items)"),
+        said.contains("a has more than 64 items (the limit --max-items)"),
         "{said}"
     );
     let keys: Vec<String> = (0..5000).map(|k| format!("\"k{k}\":{k}")).collect();

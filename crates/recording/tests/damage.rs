@@ -445,7 +445,7 @@ fn a_chunk_that_claims_a_terabyte_is_refused() {
     assert_eq!(
         lines,
         [
-            "too_large the chunk at byte 60 claims 1099511627776 bytes unpacked; the limit max_chunk_bytes is 4294967296; it was left out"
+            "too_large the chunk at byte 60 claims 1099511627776 bytes unpacked; the limit is 4294967296; it was left out"
         ]
     );
 }
@@ -603,7 +603,7 @@ fn a_large_chunk_is_read_in_pieces() {
     assert_eq!(signals[0].values.len(), 1_000_001);
     assert_eq!(
         findings[0].text,
-        "1 message is longer than the limit max_message_bytes of 4194304"
+        "1 message is longer than the limit of 4194304"
     );
 
     let wrong = file(&[

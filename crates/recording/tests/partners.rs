@@ -217,7 +217,7 @@ fn a_small_limit_on_items_is_said() {
         .collect();
     assert!(
         long.iter()
-            .any(|text| text.starts_with("loose has more than 2 items (the limit max_items) in")),
+            .any(|text| text.starts_with("loose has more than 2 items (the limit) in")),
         "{long:?}"
     );
 }

@@ -278,7 +278,7 @@ fn readings_that_are_given_up_leave_no_counts() {
         lines(&found),
         [
             "absent_field /w: a is declared as not given (covariance -1)",
-            "long_sequence /w: long has more than 64 items (the limit max_items) in 6 messages; it is not among the signals there",
+            "long_sequence /w: long has more than 64 items (the limit) in 6 messages; it is not among the signals there",
         ]
     );
 }

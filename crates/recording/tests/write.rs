@@ -16,7 +16,7 @@ use recording::{
     read::{ReadOptions, Recording},
     schema::rath,
     topics::{self, MessageKind},
-    write::{RawChannel, RecordingWriter, WriteError, WriterOptions},
+    write::{ChannelId, RawChannel, RecordingWriter, WriteError, WriterOptions},
 };
 
 fn fill(writer: &mut RecordingWriter, messages: i64) -> Result<(), WriteError> {
@@ -143,6 +143,144 @@ fn the_same_content_gives_the_same_bytes_to_a_file_and_to_a_stream() {
         assert!(chunk.uncompressed_size < 520 << 10, "{chunk:?}");
         let spans_ns = chunk.message_end_time - chunk.message_start_time;
         assert!(spans_ns <= 10_033_000_000, "{chunk:?}");
+    }
+}
+
+/// A channel of bare bytes.
+fn bytes_channel(writer: &mut RecordingWriter) -> ChannelId {
+    let raw = RawChannel {
+        topic: "/bytes",
+        message_encoding: "",
+        schema_name: "",
+        schema_encoding: "",
+        schema_data: &[],
+        metadata: &BTreeMap::new(),
+    };
+    writer.raw_channel(&raw).expect("opens")
+}
+
+/// Unpacked bytes, first and last log time of every chunk that a recording has.
+fn chunks(
+    options: &WriterOptions,
+    fill: impl FnOnce(&mut RecordingWriter, ChannelId),
+) -> Vec<(u64, [u64; 2])> {
+    let shared = Shared::default();
+    let mut writer = RecordingWriter::to_stream(shared.clone(), options).expect("begins");
+    let channel = bytes_channel(&mut writer);
+    fill(&mut writer, channel);
+    writer.finish().expect("finishes");
+    let summary = mcap::Summary::read(&shared.take()).expect("reads");
+    let of = |c: &mcap::records::ChunkIndex| {
+        let span_ns = [c.message_start_time, c.message_end_time];
+        (c.uncompressed_size, span_ns)
+    };
+    summary
+        .expect("there")
+        .chunk_indexes
+        .iter()
+        .map(of)
+        .collect()
+}
+
+#[test]
+fn a_chunk_closes_when_it_holds_so_many_bytes() {
+    for options in both_ways() {
+        let chunks = chunks(&options, |writer, channel| {
+            for _ in 0..3000 {
+                let message = [7_u8; 1000];
+                writer.message(channel, 1, &message[..]).expect("writes");
+            }
+        });
+        let (last, whole) = chunks.split_last().expect("some");
+        // 31 bytes of each record come on top.
+        let most = (512 << 10) + 1031 + 100;
+        let fits = |bytes: u64| (512 << 10..most).contains(&bytes);
+        assert!(
+            whole.len() == 5 && whole.iter().all(|c| fits(c.0)),
+            "{chunks:?}"
+        );
+        assert!(last.0 < most, "{chunks:?}");
+    }
+}
+
+#[test]
+fn a_chunk_spans_so_much_log_time_from_its_own_first_message() {
+    const S: u64 = 1_000_000_000;
+    type Beside = fn(&mut RecordingWriter);
+    let attached: Beside = |w| w.attachment("a", "text/plain", b"a").expect("writes");
+    let noted: Beside = |w| w.metadata("a", &BTreeMap::new()).expect("writes");
+    for options in both_ways() {
+        for (beside, expected) in [
+            (None, vec![[0, 10 * S], [11 * S, 21 * S], [22 * S, 24 * S]]),
+            // Either closes the chunk, and the next one's time runs from its own beginning.
+            (
+                Some(attached),
+                vec![[0, 6 * S], [7 * S, 17 * S], [18 * S, 24 * S]],
+            ),
+            (
+                Some(noted),
+                vec![[0, 6 * S], [7 * S, 17 * S], [18 * S, 24 * S]],
+            ),
+        ] {
+            let chunks = chunks(&options, |writer, channel| {
+                for second in 0..25_i64 {
+                    if let (7, Some(beside)) = (second, beside) {
+                        beside(writer);
+                    }
+                    let t_ns = second * S.cast_signed();
+                    writer.message(channel, t_ns, &[7_u8][..]).expect("writes");
+                }
+            });
+            let spans: Vec<[u64; 2]> = chunks.iter().map(|c| c.1).collect();
+            assert_eq!(spans, expected);
+        }
+    }
+}
+
+/// How many whole chunks the beginning of a recording holds.
+fn whole_chunks(beginning: &[u8]) -> usize {
+    let mut chunks = 0;
+    let mut rest = beginning.get(8..).unwrap_or_default();
+    while let Some((head, body)) = rest.split_first_chunk::<9>() {
+        let length = u64::from_le_bytes(head[1..].try_into().expect("eight bytes"));
+        let Some(after) = body.get(length as usize..) else {
+            break;
+        };
+        chunks += usize::from(head[0] == 6);
+        rest = after;
+    }
+    chunks
+}
+
+/// What waits for the thread is little, and not for long: what a batch holds back is not in the file that a killed program leaves.
+#[test]
+fn what_waits_for_the_thread_goes_on_its_way() {
+    for (messages, bytes, step_ns) in [(1, 32 << 10, 0), (1024, 0, 0), (2, 0, 1_000_000_000)] {
+        // Each message closes its chunk, and a closed chunk is flushed.
+        let options = WriterOptions {
+            chunk_ns: 0,
+            ..WriterOptions::beside()
+        };
+        let shared = Shared::default();
+        let mut writer = RecordingWriter::to_stream(shared.clone(), &options).expect("begins");
+        let channel = bytes_channel(&mut writer);
+        for i in 0..messages {
+            let message = vec![7_u8; bytes];
+            writer
+                .message(channel, i * step_ns, &message[..])
+                .expect("writes");
+        }
+        let (mut arrived, mut there) = (Vec::new(), 0);
+        for _ in 0..1000 {
+            arrived.extend(shared.take());
+            there = whole_chunks(&arrived);
+            if there == messages as usize {
+                break;
+            }
+            std::thread::sleep(Duration::from_millis(10));
+        }
+        assert_eq!(there, messages as usize, "{bytes} bytes, {step_ns} ns");
+        drop(writer);
     }
 }
 

@@ -128,6 +128,28 @@ fn wrong_types_and_signs_are_pointed_at() {
     expect("name = \"a\"\nduration_s = nan", "2:14", &["NaN"]);
     expect("name = \"a\"\nlog_rate_hz = 0.0", "2:15", &["above zero"]);
     expect("name = \"a\"\nlog_rate_hz = 1e12", "2:15", &["samples"]);
+    // Of two that are too much together, the one that is farther from its default is pointed at.
+    for (text, place) in [
+        ("duration_s = 1e12\nlog_rate_hz = 1.0", "2:14"),
+        ("log_rate_hz = 60.0\nduration_s = 2e7", "3:14"),
+        (
+            "duration_s = 2e7\nlog_rate_hz = 1.0\n[solver]\nmethod = \"rk4\"",
+            "2:14",
+        ),
+        (
+            "duration_s = 70.0\n[solver]\nmethod = \"rk4\"\nstep_s = 1e-12",
+            "5:10",
+        ),
+        (
+            "duration_s = 1e8\nlog_rate_hz = 1.0\n[effects.noise]",
+            "2:14",
+        ),
+        ("duration_s = 70.0\n[effects.noise]\ngrid_hz = 1e9", "4:11"),
+        ("duration_s = 1e8\nlog_rate_hz = 1.0\n[effects.imu]", "2:14"),
+        ("duration_s = 70.0\n[effects.imu]\nrate_hz = 1e9", "4:11"),
+    ] {
+        expect(&format!("name = \"a\"\n{text}"), place, &[" s "]);
+    }
     expect("name = \"a\"\nseed = -4", "2:8", &["-4"]);
     expect(
         "name = \"a\"\n[body]\nmass_kg = 0.0",

@@ -2,9 +2,11 @@
 
 mod common;
 
+use std::collections::BTreeMap;
 use std::process::Command;
 
 use recording::read::Recording;
+use recording::write::{RawChannel, RecordingWriter, WriterOptions};
 use view::load::{Detail, load, options};
 use view::store::Encoded;
 
@@ -32,6 +34,35 @@ fn the_same_recording_gives_the_same_bytes() {
     });
     let same = files[0].iter().zip(&files[1]).take_while(|(a, b)| a == b);
     assert!(same.count() > bytes().len() - 100);
+}
+
+/// What `analyze` would say with an option of its own has none here.
+#[test]
+fn no_option_is_named_that_view_does_not_have() {
+    let folder = tempfile::tempdir().unwrap();
+    let mcap = folder.path().join("long.mcap");
+    let mut writer = RecordingWriter::create(&mcap, &WriterOptions::default()).unwrap();
+    let raw = RawChannel {
+        topic: "/big",
+        message_encoding: "json",
+        schema_name: "",
+        schema_encoding: "",
+        schema_data: &[],
+        metadata: &BTreeMap::new(),
+    };
+    let big = writer.raw_channel(&raw).unwrap();
+    for t_ns in [0, 1] {
+        let list = format!("{{\"a\":{:?}}}", vec![1.5; 5000]);
+        writer.message(big, t_ns, list.as_bytes()).unwrap();
+    }
+    writer.finish().unwrap();
+    let rrd = folder.path().join("long.rrd");
+    let output = view(&[mcap.to_str().unwrap(), "--save", rrd.to_str().unwrap()]);
+    let said = String::from_utf8_lossy(&output.stderr).into_owned();
+    assert!(
+        said.contains("a has more than 4097 items (the limit) in 2 messages"),
+        "{said}"
+    );
 }
 
 #[test]

@@ -101,6 +101,7 @@ fn open(path: &Path, limits: &Limits) -> anyhow::Result<Recording> {
         max_chunk_bytes: limits.max_chunk_bytes,
         max_message_bytes: limits.max_message_bytes,
         max_items: limits.max_items,
+        limits_are_options: true,
         ..ReadOptions::default()
     };
     if path.as_os_str() == "-" {

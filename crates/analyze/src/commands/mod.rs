@@ -108,14 +108,20 @@ struct AnalyzeArgs {
 #[command(next_help_heading = "Limits of the reader")]
 struct Limits {
     /// Leave out chunks that claim more bytes than this, unpacked
-    #[arg(long, value_name = "BYTES", default_value_t = ReadOptions::default().max_chunk_bytes)]
+    #[arg(long, value_name = "BYTES", default_value_t = ReadOptions::default().max_chunk_bytes, value_parser = limit::<u64>, allow_negative_numbers = true)]
     max_chunk_bytes: u64,
     /// Leave out longer messages in large chunks
-    #[arg(long, value_name = "BYTES", default_value_t = ReadOptions::default().max_message_bytes)]
+    #[arg(long, value_name = "BYTES", default_value_t = ReadOptions::default().max_message_bytes, value_parser = limit::<u64>, allow_negative_numbers = true)]
     max_message_bytes: u64,
     /// List the items of a sequence that has at most so many
-    #[arg(long, value_name = "N", default_value_t = ReadOptions::default().max_items)]
+    #[arg(long, value_name = "N", default_value_t = ReadOptions::default().max_items, value_parser = limit::<usize>, allow_negative_numbers = true)]
     max_items: usize,
+}
+
+/// Takes a limit.
+fn limit<N: std::str::FromStr>(text: &str) -> Result<N, String> {
+    let given = text.parse();
+    given.map_err(|_| "expected a whole number, 0 or more".into())
 }
 
 impl AnalyzeArgs {

@@ -1,6 +1,8 @@
 //! Who holds it and when nobody does: contact, unloading, force statistics.
 
 use super::{Context, Value};
+use crate::pairs::products;
+use nalgebra::DMatrix;
 
 /// The share ε of the weight below which the support counts as gone (paper: 0.05).
 pub const FLOAT_SHARE: f64 = 0.05;
@@ -70,24 +72,19 @@ pub fn force_correlation(c: &Context) -> Value {
     if columns.len() < 2 {
         return Value::missing("a correlation needs two handles");
     }
-    let mut per = Vec::new();
-    for (i, a) in columns.iter().enumerate() {
-        for b in &columns[i + 1..] {
-            let (ma, mb) = (mean(a), mean(b));
-            let shared = a
-                .iter()
-                .zip(b.iter())
-                .map(|(a, b)| (a - ma) * (b - mb))
-                .sum::<f64>()
-                / a.len() as f64;
-            let still = |x: &[f64], mean: f64| variance(x).sqrt() <= 1e-12 * mean.abs();
-            per.push(match still(a, ma) || still(b, mb) {
-                // What remains of a constant is rounding.
-                true => f64::NAN,
-                false => shared / (variance(a) * variance(b)).sqrt(),
-            });
-        }
-    }
+    // Off the mean, over √n σ; what remains of a constant is rounding.
+    let scaled = columns.iter().flat_map(|x| {
+        let (m, v) = (mean(x), variance(x));
+        let still = v.sqrt() <= 1e-12 * m.abs();
+        let size = if still {
+            f64::NAN
+        } else {
+            (v * x.len() as f64).sqrt()
+        };
+        x.iter().map(move |x| (x - m) / size)
+    });
+    let scaled = DMatrix::from_iterator(columns[0].len(), columns.len(), scaled);
+    let per = products(&scaled, &scaled);
     Value::number(mean(&per)).per(per)
 }
 

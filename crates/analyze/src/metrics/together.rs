@@ -68,11 +68,10 @@ pub fn step_rate_hz(c: &Context) -> Value {
 }
 
 pub fn plv(c: &Context) -> Value {
-    let pairs = phase::pairs(&c.phases().slices());
-    if pairs.is_empty() {
+    let per = phase::locking(&c.phases().slices());
+    if per.is_empty() {
         return Value::missing("a pair needs two carriers");
     }
-    let per: Vec<f64> = pairs.iter().map(|(_, _, p)| p.resultant).collect();
     Value::number(mean(&per)).per(per)
 }
 

@@ -236,8 +236,9 @@ impl<'a> Worker<'a> {
             Ok(0) => return,
             Ok(count) => {
                 let text = format!(
-                    "{} longer than the limit max_message_bytes of {}",
+                    "{} longer than {} of {}",
                     counted(count, "message is", "messages are"),
+                    options.limit("--max-message-bytes"),
                     options.max_message_bytes
                 );
                 let trouble = Trouble {

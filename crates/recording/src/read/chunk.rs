@@ -151,8 +151,10 @@ pub(super) fn open<'a>(body: &'a [u8], options: &ReadOptions) -> Result<ChunkHea
         return Err((
             Kind::TooLarge,
             format!(
-                "claims {} bytes unpacked; the limit max_chunk_bytes is {}",
-                header.uncompressed, options.max_chunk_bytes
+                "claims {} bytes unpacked; {} is {}",
+                header.uncompressed,
+                options.limit("--max-chunk-bytes"),
+                options.max_chunk_bytes
             ),
         ));
     }

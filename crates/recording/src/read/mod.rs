@@ -54,6 +54,18 @@ pub struct ReadOptions {
     pub max_items: usize,
     /// Threads that unpack and decode, the caller's included; 0 asks the machine.
     pub threads: usize,
+    /// Whether these limits are options of the program, `--max-items` and so on: then what is said of one names it.
+    pub limits_are_options: bool,
+}
+
+impl ReadOptions {
+    /// A limit, as a sentence has it.
+    pub(crate) fn limit(&self, option: &str) -> String {
+        match self.limits_are_options {
+            true => format!("the limit {option}"),
+            false => "the limit".into(),
+        }
+    }
 }
 
 /// Lists in the project's own messages hold a value for each carrier.
@@ -66,6 +78,7 @@ impl Default for ReadOptions {
             max_message_bytes: 256 << 20,
             max_items: 64,
             threads: 0,
+            limits_are_options: false,
         }
     }
 }

@@ -570,9 +570,10 @@ impl<'a> Taker<'a> {
                         whole(field)
                     ),
                     None => format!(
-                        "{} has more than {} items (the limit max_items) in {messages}; it is not among the signals there",
+                        "{} has more than {} items ({}) in {messages}; it is not among the signals there",
                         whole(field),
-                        self.recording.most_items(&info.schema)
+                        self.recording.most_items(&info.schema),
+                        self.recording.options.limit("--max-items")
                     ),
                 };
                 say(Kind::LongSequence, *count, None, text);

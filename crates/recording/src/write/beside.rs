@@ -127,3 +127,30 @@ impl Drop for Beside {
         }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Whether a batch of so many messages of so many bytes, so far apart, goes on its way.
+    fn full(messages: u64, bytes: usize, step_ns: u64) -> bool {
+        let mut batch = Batch::default();
+        for i in 0..messages {
+            batch.bytes.extend(vec![7; bytes]);
+            batch.close(MessageHeader {
+                channel_id: 0,
+                sequence: 0,
+                log_time: i * step_ns,
+                publish_time: 0,
+            });
+        }
+        batch.is_full()
+    }
+
+    #[test]
+    fn a_batch_is_full_by_bytes_by_messages_and_by_log_time() {
+        assert!(!full(1, (32 << 10) - 1, 0) && full(1, 32 << 10, 0));
+        assert!(!full(1023, 0, 0) && full(1024, 0, 0));
+        assert!(!full(2, 0, 999_999_999) && full(2, 0, 1_000_000_000));
+    }
+}

@@ -4,7 +4,7 @@
 
 use crate::model::Model;
 use crate::scene::Scene;
-use crate::scene::problem::{Checker, MOST_SAMPLES, Problem, problem, shown};
+use crate::scene::problem::{Checker, MOST_SAMPLES, Problem, larger, problem, shown};
 use crate::sensors::imu::{Draws, Seat, Triad};
 use nalgebra::UnitQuaternion;
 use schemars::JsonSchema;
@@ -111,8 +111,9 @@ impl Imu {
         let key = |name: &str| format!("effects.imu.{name}");
         Checker::positive(&key("rate_hz"), self.rate_hz)?;
         if self.rate_hz * scene.duration_s * self.sensors.len().max(1) as f64 > MOST_SAMPLES {
+            let times = self.rate_hz / Self::default().rate_hz;
             return Err(problem(
-                &key("rate_hz"),
+                larger(scene.duration_s, &key("rate_hz"), times),
                 format!(
                     "{} Hz for {} s are more than {MOST_SAMPLES:e} samples",
                     shown(self.rate_hz),

@@ -11,7 +11,7 @@
 use crate::model::{Model, Switch, Workspace};
 use crate::random::{Stream, normal_pair};
 use crate::scene::Scene;
-use crate::scene::problem::{Checker, MOST_SAMPLES, Problem, problem, shown};
+use crate::scene::problem::{Checker, MOST_SAMPLES, Problem, larger, problem, shown};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
@@ -43,8 +43,9 @@ impl Noise {
         let key = "effects.noise.grid_hz";
         Checker::positive(key, self.grid_hz)?;
         if self.grid_hz * scene.duration_s > MOST_SAMPLES {
+            let times = self.grid_hz / Self::default().grid_hz;
             return Err(problem(
-                key,
+                larger(scene.duration_s, key, times),
                 format!(
                     "{} Hz for {} s are more than {MOST_SAMPLES:e} cells of noise; a gait cannot tell a grid of some hundred hertz from a finer one",
                     shown(self.grid_hz),

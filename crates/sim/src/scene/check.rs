@@ -1,11 +1,8 @@
 //! What a scene must satisfy beyond its types.
 
 use super::Scene;
-use super::problem::{Checker, MOST_SAMPLES, Problem, problem, shown};
+use super::problem::{Checker, MOST_SAMPLES, Problem, larger, problem, shown};
 use crate::body::Body;
-
-/// Whoever asks for more than a year has likelier slipped there than in what goes with it, s.
-const LONG_S: f64 = 3.2e7;
 
 /// Most steps that a run of fixed steps may take: an hour or so of computing.
 const MOST_STEPS: f64 = 1e10;
@@ -19,11 +16,8 @@ pub fn check(scene: &Scene) -> Result<(), Problem> {
     Checker::positive("log_rate_hz", scene.log_rate_hz)?;
     let samples = scene.duration_s * scene.log_rate_hz;
     if samples > MOST_SAMPLES {
-        let key = if scene.duration_s > LONG_S {
-            "duration_s"
-        } else {
-            "log_rate_hz"
-        };
+        let times = scene.log_rate_hz / super::default::log_rate_hz();
+        let key = larger(scene.duration_s, "log_rate_hz", times);
         return Err(problem(
             key,
             format!(
@@ -142,10 +136,11 @@ pub fn check(scene: &Scene) -> Result<(), Problem> {
     let method = crate::solve::method(&scene.solver.method)
         .map_err(|message| problem("solver.method", message))?;
     if !method.adaptive && scene.duration_s / scene.solver.step_s > MOST_STEPS {
+        let times = super::Solver::default().step_s / scene.solver.step_s;
         return Err(problem(
-            "solver.step_s",
+            larger(scene.duration_s, "solver.step_s", times),
             format!(
-                "{} s in steps of {} s are more than {MOST_STEPS:e}; take longer ones",
+                "{} s in steps of {} s are more than {MOST_STEPS:e}; simulate less, or take longer ones",
                 shown(scene.duration_s),
                 shown(scene.solver.step_s)
             ),

@@ -80,7 +80,7 @@ impl Scene {
     }
 }
 
-mod default {
+pub(crate) mod default {
     pub fn duration_s() -> f64 {
         60.0
     }

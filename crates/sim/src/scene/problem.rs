@@ -104,5 +104,13 @@ pub(crate) fn problem(key: &str, message: impl Into<String>) -> Problem {
     }
 }
 
+/// The key to blame where a duration times something, or over something, is too much: the one that is farther from its default, which is 1 in `times`.
+pub(crate) fn larger(duration_s: f64, key: &str, times: f64) -> &str {
+    match duration_s / super::default::duration_s() > times {
+        true => "duration_s",
+        false => key,
+    }
+}
+
 /// Most samples that a run may log, and cells that its noise may have; beyond it a slip of the keyboard is likelier than a wish.
 pub(crate) const MOST_SAMPLES: f64 = 1e9;

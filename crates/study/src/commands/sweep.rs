@@ -28,10 +28,10 @@ pub struct Args {
     out: Option<PathBuf>,
     /// Compute only part K of N, and leave what is there already; `merge` puts all parts together.
     /// Slurm, AWS Batch and PBS say K and N by themselves, Kubernetes says K.
-    #[arg(long, value_name = "K/N", value_parser = Shard::parse)]
+    #[arg(long, value_name = "K/N", value_parser = Shard::parse, allow_hyphen_values = true)]
     shard: Option<Shard>,
     /// N of `--shard`, where the scheduler says only K.
-    #[arg(long, value_name = "N", conflicts_with = "shard")]
+    #[arg(long, value_name = "N", conflicts_with = "shard", value_parser = count(1..=u64::MAX), allow_negative_numbers = true)]
     shards: Option<u64>,
     /// Go on where an earlier run of the same study stopped.
     #[arg(long)]

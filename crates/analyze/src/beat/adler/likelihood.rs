@@ -1,12 +1,13 @@
 //! How likely phases are under Adler's equation, and what makes them most likely.
 
 use super::dual;
+use super::information::Information;
 use super::unknowns::{
     BEGUN, BUILD_UP, ERROR, LEAST, MOST, N, NOISE, OFFSET, OWN, PULL, SHARED, place,
 };
 use super::walk::{WINDOW, Walk};
 use crate::phase::wrap;
-use nalgebra::{DMatrix, DVector};
+use nalgebra::DVector;
 use std::f64::consts::TAU;
 
 type Dual = dual::Dual<N>;
@@ -15,7 +16,7 @@ type Dual = dual::Dual<N>;
 pub struct Score {
     pub value: f64,
     pub gradient: DVector<f64>,
-    pub information: DMatrix<f64>,
+    pub information: Information,
 }
 
 /// The distribution of a carrier's phase, rad and rad².
@@ -115,7 +116,7 @@ impl Walk {
         let mut out = Score {
             value: 0.0,
             gradient: DVector::zeros(x.len()),
-            information: DMatrix::zeros(x.len(), x.len()),
+            information: Information::zero(self.phase.len()),
         };
         let shared = |k: usize| Dual::unknown(x[k], k);
         let pull = shared(PULL).exp();
@@ -193,7 +194,6 @@ impl Walk {
                 window = Window::from(state);
             }
         }
-        out.information.fill_upper_triangle_with_lower_triangle();
         self.add_priors(x, &mut out);
         out
     }
@@ -214,7 +214,7 @@ impl Walk {
             let off = x[k] - middle;
             out.value -= 0.5 * (off / sd).powi(2);
             out.gradient[k] -= off / (sd * sd);
-            out.information[(k, k)] += 1.0 / (sd * sd);
+            *out.information.diagonal(k) += 1.0 / (sd * sd);
         }
     }
 
@@ -227,10 +227,10 @@ impl Walk {
         for _ in 0..60 {
             let mut normal = here.information.clone();
             for k in 0..x.len() {
-                normal[(k, k)] *= 1.0 + damping;
+                *normal.diagonal(k) *= 1.0 + damping;
             }
-            normal[(PULL, PULL)] += if held { 1e18 } else { 1e-9 };
-            let Some(step) = normal.cholesky().map(|c| c.solve(&here.gradient)) else {
+            *normal.diagonal(PULL) += if held { 1e18 } else { 1e-9 };
+            let Some(step) = normal.solve(&here.gradient) else {
                 break;
             };
             // Nothing moves by more than a factor of two or 40° at once.
@@ -281,10 +281,8 @@ impl Score {
                 0.5 * spread.slope[i] * weight * weight,
             );
             self.gradient[place(i, c)] += a * miss + spread.slope[i] * surprise;
-            for j in 0..=i {
-                self.information[(place(i, c), place(j, c))] +=
-                    a * mean.slope[j] + b * spread.slope[j];
-            }
+            self.information
+                .add(c, i, |j| a * mean.slope[j] + b * spread.slope[j]);
         }
         let gain = with_phase * inverse;
         let mut missed = mean * -1.0;

@@ -21,6 +21,7 @@
 //! Särkkä, Bayesian Filtering and Smoothing (2013), ch. 9 and 12.
 
 mod dual;
+mod information;
 mod likelihood;
 #[cfg(test)]
 mod tests;
@@ -101,15 +102,19 @@ pub fn adler(
     measured: bool,
 ) -> Result<Adler, &'static str> {
     let walk = Walk::new(t_s, phase_rad, beat_rad, measured)?;
-    let (x, best) = walk.climb(walk.start()?, false);
-    let cover = best.information.try_inverse().ok_or(walk::TOO_LITTLE)?;
+    let [a, b] = walk.starts()?.map(|start| walk.climb(start, false));
+    let (x, best) = match b.1.value > a.1.value || !a.1.value.is_finite() {
+        true => b,
+        false => a,
+    };
+    let cover = best.information.variances().ok_or(walk::TOO_LITTLE)?;
     let carriers = walk.phase.len();
     let bent = match walk.before_s > 0.0 && measured {
         true => BENT_RAD / walk.before_s,
         false => 0.0,
     };
     let own: Vec<usize> = (0..carriers).map(|c| place(OWN, c)).collect();
-    let sd = cover[(PULL, PULL)].max(0.0).sqrt();
+    let sd = cover[PULL].max(0.0).sqrt();
     let mut ends = [false, true].map(|up| walk.end(&x, best.value, sd, up));
     let settled = walk.someone_came_unseen();
     // At its limit the search tells no pull from a stronger one.
@@ -129,7 +134,7 @@ pub fn adler(
         build_up_s: x[BUILD_UP].exp(),
         noise_rad_per_sqrt_s: walk.noise(&x),
         detuning_rad_per_s: own.iter().map(|k| x[*k] - walk.omega_rad_per_s).collect(),
-        detuning_half_rad_per_s: own.iter().map(|k| half(cover[(*k, *k)])).collect(),
+        detuning_half_rad_per_s: own.iter().map(|k| half(cover[*k])).collect(),
         offset_rad: (0..carriers).map(|c| wrap(x[place(OFFSET, c)])).collect(),
         beat_rad_per_s: walk.omega_rad_per_s,
     };

@@ -158,12 +158,23 @@ impl Walk {
         })
     }
 
-    /// Where the climb begins: increments of each phase on the sines at their beginning, by least squares, for a quick and a slow build-up.
-    pub fn start(&self) -> Result<DVector<f64>, &'static str> {
+    /// Where the climb begins. Once near what the increments say; where a pull is soon all there, or carriers come from far behind, these lead to a summit
+    /// beside the highest, so once more without offsets and with so much noise that the phases may be anywhere.
+    pub fn starts(&self) -> Result<[DVector<f64>; 2], &'static str> {
+        let near = self.start(&[2.0, 10.0])?;
+        let mut anywhere = self.start(&[1.0])?;
+        anywhere[NOISE] = 0.0;
+        anywhere[ERROR] = 2.0 * 0.2f64.ln();
+        (0..self.phase.len()).for_each(|c| anywhere[place(OFFSET, c)] = 0.0);
+        Ok([near, anywhere])
+    }
+
+    /// Increments of each phase on the sines at their beginning, by least squares, for the build-up of these that fits best.
+    fn start(&self, built_up_s: &[f64]) -> Result<DVector<f64>, &'static str> {
         // How far the beat goes from the middle of a window to its end.
         let late = self.behind_s() * self.omega_rad_per_s;
         let mut best: Option<(f64, DVector<f64>)> = None;
-        for build_up_s in [2.0, 10.0] {
+        for &build_up_s in built_up_s {
             let mut x = DVector::zeros(SHARED + 2 * self.phase.len());
             let (mut squares, mut pull) = (0.0, 0.0);
             for (c, phase) in self.phase.iter().enumerate() {
