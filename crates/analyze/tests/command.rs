@@ -1302,6 +1302,55 @@ fn a_sensor_that_came_to_its_end_gives_no_interval() {
     assert!(calm["metrics"]["rms_roll_deg"]["ci95"].is_array());
 }
 
+/// An accelerometer that stops at 30 s, a gyroscope whose y has died: both are told, and the first leaves no interval.
+#[test]
+fn a_sensor_that_stands_still_in_motion_is_told() {
+    let folder = tempfile::tempdir().unwrap();
+    let stopped = |k: u32| {
+        let (w, g) = (std::f64::consts::TAU, 9.80665);
+        let at = |k: u32| 0.01 * f64::from(k);
+        let roll = |t: f64| 0.2 * (w * t).sin();
+        let t = at(k);
+        let felt = at(k.min(3000));
+        let rate = 0.2 * w * (w * t).cos();
+        let text = format!(
+            "{{\"angular_velocity\":{{\"x\":{rate},\"y\":0.0,\"z\":{}}},\
+             \"linear_acceleration\":{{\"x\":0.0,\"y\":{},\"z\":{}}}}}",
+            0.3 * (0.7 * w * t).sin(),
+            g * roll(felt).sin(),
+            g * roll(felt).cos()
+        );
+        (t, text)
+    };
+    let file = told(folder.path(), &[("/s", (0..6000).map(stopped).collect())]);
+    let found = with_roles(folder.path(), &file, "imu = \"/s\"\n");
+    let quality = found["quality"].as_array().unwrap();
+    let frozen: Vec<(&str, u64)> = quality
+        .iter()
+        .filter(|q| q["kind"] == "frozen")
+        .map(|q| (q["text"].as_str().unwrap(), q["count"].as_u64().unwrap()))
+        .collect();
+    assert_eq!(frozen.len(), 2, "{frozen:?}");
+    assert!(
+        frozen[0].0.starts_with("the gyroscope's y never changes"),
+        "{frozen:?}"
+    );
+    assert!(
+        frozen[1]
+            .0
+            .starts_with("the accelerometer gives one reading")
+            && frozen[1].1 == 3000,
+        "{frozen:?}"
+    );
+    let roll = &found["metrics"]["rms_roll_deg"];
+    assert!(roll["ci95"].is_null(), "{roll}");
+    let roles = folder.path().join("roles.toml").display().to_string();
+    let before = json(&[
+        &file, "--format", "json", "--window", "0..29", "--roles", &roles,
+    ]);
+    assert!(before["metrics"]["rms_roll_deg"]["ci95"].is_array());
+}
+
 /// A message on `/beat` is a beat, whatever it holds: nothing, or a stamp that knows better than the log when it was.
 #[test]
 fn every_message_on_beat_is_one() {

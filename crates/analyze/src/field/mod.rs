@@ -23,10 +23,11 @@ use recording::text::counted;
 use crate::beat::lock::Course;
 use crate::events::Event;
 use crate::imu::Track;
-use crate::imu::interval;
+use crate::imu::frozen::frozen;
+use crate::imu::interval::{self, Lost};
 use crate::imu::orientation::Options;
 use crate::imu::rath::{self, Motion, Settings};
-use crate::imu::saturation::{Saturated, saturated};
+use crate::imu::saturation::saturated;
 use crate::imu::unloading::unloadings;
 use crate::inputs::{Inputs, Window};
 use crate::metrics::{Metrics, Value, metrics_of};
@@ -58,8 +59,8 @@ pub struct Field {
     topic: Option<String>,
     motion: Option<Motion>,
     no_motion: Option<String>,
-    /// Where the sensor of the motion came to its end within the window.
-    saturated: Vec<Saturated>,
+    /// What the sensor of the motion did not tell within the window.
+    lost: Vec<Lost>,
     carriers: Carriers,
     beat_s: Vec<f64>,
     /// Their numbers, where they have some.
@@ -186,18 +187,33 @@ impl Field {
             let said = said.map(|(kind, text)| Quality::remark(topic, kind, text));
             field.quality.extend(said);
             let is_rath = roles.topic(Role::Imu) == Some(topic.as_str());
-            let mut ends = saturated(&track);
-            for end in &ends {
+            let within = window.range(&track.t_s);
+            let mut lost = |kind, told: String, samples: &[usize], what: Option<Lost>| {
                 field.quality.push(Quality {
-                    count: end.samples.len() as u64,
-                    t_s: Some(track.t_s[end.samples[0]]),
-                    ..Quality::remark(topic, "saturated", end.told(track.len()))
+                    count: samples.len() as u64,
+                    t_s: Some(track.t_s[samples[0]]),
+                    ..Quality::remark(topic, kind, told)
                 });
+                if is_rath && samples.iter().any(|k| within.contains(k)) {
+                    field.lost.extend(what);
+                }
+            };
+            for end in saturated(&track) {
+                let gyroscope = end.gyroscope;
+                let told = end.told(track.len());
+                lost(
+                    "saturated",
+                    told,
+                    &end.samples,
+                    Some(Lost::Peaks { gyroscope }),
+                );
             }
-            if is_rath {
-                let within = window.range(&track.t_s);
-                ends.retain(|end| end.samples.iter().any(|k| within.contains(k)));
-                field.saturated = ends;
+            // What a device says it does not have stands still too.
+            let has = |gyroscope| if gyroscope { turns } else { feels };
+            for still in frozen(&track).into_iter().filter(|s| has(s.gyroscope)) {
+                let gyroscope = still.gyroscope;
+                let all = still.axis.is_none().then_some(Lost::All { gyroscope });
+                lost("frozen", still.told(track.len()), &still.samples, all);
             }
             if !is_rath && roles.patterns(Role::Imu).contains(topic) {
                 if !one_clock {
@@ -423,8 +439,8 @@ impl Field {
         let mut out = Metrics::default();
         if let Some(motion) = &self.motion {
             out = interval::metrics(motion, window);
-            for end in &self.saturated {
-                interval::without(&mut out, end);
+            for lost in &self.lost {
+                interval::without(&mut out, *lost);
             }
         }
         if (self.filled.phases || self.judge.is_some())

@@ -4,7 +4,6 @@
 //! at the paper's 30 Hz with a random phase; the metric's spread over the draws is its standard error, 1.96 of which are given.
 
 use super::rath::{Motion, Mounting};
-use super::saturation::Saturated;
 use super::unloading::unloadings;
 use crate::inputs::{Inputs, Window, between};
 use crate::line::rival_hz;
@@ -146,17 +145,36 @@ pub fn metrics(motion: &Motion, window: Window) -> Metrics {
     out
 }
 
-/// Takes the intervals from numbers that rest on a sensor which came to its end: what is missing is in no budget. An accelerometer's missing peaks
-/// hardly turn the attitude.
-pub fn without(metrics: &mut Metrics, end: &Saturated) {
+/// What a sensor did not tell of the motion.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Lost {
+    /// What went beyond its range.
+    Peaks {
+        /// The gyroscope's, else the accelerometer's.
+        gyroscope: bool,
+    },
+    /// All, while it stood still.
+    All {
+        /// The gyroscope's, else the accelerometer's.
+        gyroscope: bool,
+    },
+}
+
+/// Takes the intervals from numbers that rest on what was lost, which is in no budget. An accelerometer's missing peaks hardly turn the attitude.
+pub fn without(metrics: &mut Metrics, lost: Lost) {
+    let (gyroscope, why) = match lost {
+        Lost::Peaks { gyroscope } => (gyroscope, "came to the end of its range"),
+        Lost::All { gyroscope } => (gyroscope, "gave one reading while the device moved"),
+    };
+    let attitude = gyroscope || matches!(lost, Lost::All { .. });
     for (name, value) in &mut metrics.0 {
-        let rests_on = end.gyroscope || is_of_height(name) || *name == "t_float";
+        let rests_on = attitude || is_of_height(name) || *name == "t_float";
         if rests_on && value.ci95.take().is_some() {
-            let sensor = match end.gyroscope {
+            let sensor = match gyroscope {
                 true => "gyroscope",
                 false => "accelerometer",
             };
-            let why = format!("without an interval: the {sensor} came to the end of its range");
+            let why = format!("without an interval: the {sensor} {why}");
             value.reason = Some(match value.reason.take() {
                 Some(reason) => format!("{why}; {reason}"),
                 None => why,

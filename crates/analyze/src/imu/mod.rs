@@ -13,9 +13,11 @@
 //! | [`interval`] | every metric that rests on the motion, with its interval |
 //! | [`unloading`] | when the support falls below a share of the weight |
 //! | [`saturation`] | where a sensor came to the end of its range |
+//! | [`frozen`] | where a sensor stands still in moving hands |
 //! | [`truth`] | errors against a recorded truth |
 
 pub mod budget;
+pub mod frozen;
 pub mod interval;
 pub mod orientation;
 pub mod rath;
