@@ -59,6 +59,11 @@ const PATIENCE_PER_S: f64 = 8_000.0;
 /// Below this part of the largest margin the least one is a reason to look for events: as in `super::events`.
 const NEAR: f64 = 0.5;
 
+/// So exactly an event is located, s.
+fn resolution_s(t_s: f64) -> f64 {
+    0.5 * same_moment_s(t_s)
+}
+
 /// Whether runs of a model can go abreast: its right-hand side is written for eight, and nothing but the log looks at it.
 pub fn suits(model: &Model) -> bool {
     model.on_eight() && model.sensor_clocks().is_empty() && model.layout().ledger == 0

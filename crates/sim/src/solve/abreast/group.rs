@@ -1,7 +1,6 @@
 //! Eight lanes in the registers, state by state: what all of them do at once.
 
-use super::lane::resolution_s;
-use super::{LEAST_ERROR, Lane, SHARE, SLOWEST_PER_S, STAGES, Together};
+use super::{LEAST_ERROR, Lane, SHARE, SLOWEST_PER_S, STAGES, Together, resolution_s};
 use crate::lanes::{Eight, LANES, Two};
 use crate::model::{Model, Octet, Registers, SideBySide, Workspace};
 use crate::solve::course::Course;

@@ -1,14 +1,12 @@
 //! A run under way in a lane: where its steps end, and what has become of them.
 
 use super::group::Group;
-use super::{FEW, MOST_SECANTS, MOST_TRIES, NEXT_TO, NEXT_TO_S, STAGES, STRETCH, TURNED, Together};
-use crate::solve::course::{Course, same_moment_s};
+use super::{
+    FEW, MOST_SECANTS, MOST_TRIES, NEXT_TO, NEXT_TO_S, STAGES, STRETCH, TURNED, Together,
+    resolution_s,
+};
+use crate::solve::course::Course;
 use crate::solve::first_steps::FirstSteps;
-
-/// So exactly an event is located, s.
-pub(super) fn resolution_s(t_s: f64) -> f64 {
-    0.5 * same_moment_s(t_s)
-}
 
 /// One run under way in a lane.
 pub(super) struct Lane<'m> {
