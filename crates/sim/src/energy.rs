@@ -12,7 +12,7 @@ use crate::model::{Model, Workspace};
 use crate::scene::Scene;
 use crate::solve::{Method, Settings};
 
-/// What held at the start: K + P + S, and what each account had lent ([`crate::model::Account::lent_j`]), J.
+/// What held at the start: K + P + S by the books, and what each account had lent ([`crate::model::Account::lent_j`]), J.
 #[derive(Debug)]
 pub(crate) struct Start {
     held_j: f64,
@@ -45,21 +45,26 @@ impl Energy {
             return None;
         }
         let [kinetic_j, potential_j] = model.freedoms().energy_j(y);
-        let elastic_j = model.stored_j(w) - model.lent_j(w).sum::<f64>();
-        let held_j = kinetic_j + potential_j + elastic_j;
+        let stored_j = model.stored_j(w);
+        let held_j = kinetic_j + potential_j + stored_j;
         let start = at_start.get_or_insert_with(|| Start {
             held_j,
             lent_j: model.lent_j(w).collect(),
         });
         let (mut work_in_j, mut dissipated_j) = (0.0, 0.0);
+        // By the books, lent energy is stored and none of it dissipated.
+        let (mut all_lent_j, mut booked_j) = (0.0, 0.0);
         let pages = y[model.layout().ledger_range()].chunks_exact(2);
         let lent = model.lent_j(w).zip(&start.lent_j);
         for ((share, page), (lent_j, at_start_j)) in shares_j.iter_mut().zip(pages).zip(lent) {
             *share = [page[0], page[1] + lent_j - at_start_j];
             work_in_j += share[0];
             dissipated_j += share[1];
+            all_lent_j += lent_j;
+            booked_j += page[1];
         }
-        let unexplained_j = held_j - start.held_j - work_in_j + dissipated_j;
+        let elastic_j = stored_j - all_lent_j;
+        let unexplained_j = held_j - start.held_j - work_in_j + booked_j;
         Some(Self {
             kinetic_j,
             potential_j,
