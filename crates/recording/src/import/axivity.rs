@@ -43,15 +43,13 @@ pub(super) fn read(log: &str, (name, text): (&str, &str)) -> Result<Log, ImportE
     )];
     table.drop_cut_row(log, &mut notes);
     let times_ns = times_ns(&table, 0, 1)?;
-    let force = table.track(&times_ns, [1, 2, 3], 1.0)?;
-    if !imu::usual_length(&force).is_some_and(|length| ONE_G.contains(&length)) {
+    let force = table.track(&times_ns, [1, 2, 3], STANDARD_GRAVITY)?;
+    let usual_g = imu::usual_length(&force).unwrap_or(0.0) / STANDARD_GRAVITY;
+    if !ONE_G.contains(&usual_g) {
         return Err(table.problem(format!(
-            "is laid out as an export of Axivity's, but the acceleration is {:.2} as a rule; expected 1 g",
-            imu::usual_length(&force).unwrap_or(f64::NAN)
+            "is laid out as an export of Axivity's, but the acceleration is {usual_g:.2} as a rule; expected 1 g"
         )));
     }
-    let in_si = |(t_ns, force): &(i64, [f64; 3])| (*t_ns, force.map(|x| x * STANDARD_GRAVITY));
-    let force = force.iter().map(in_si).collect();
     let rate = match turns {
         true => table.track(&times_ns, [4, 5, 6], 1f64.to_radians())?,
         false => Track::new(),

@@ -316,6 +316,7 @@ fn read(files: &Files, layout: Option<&layout::Layout>) -> Result<imu::Log, Impo
     if let Some((layout, text)) = layout::fitting(files) {
         return layout::read(&layout, &files.name, text);
     }
+    // Without a header to know it by, it comes last.
     if let Some(export) = axivity::export(files) {
         return axivity::read(&files.name, export);
     }
