@@ -28,6 +28,7 @@ use crate::imu::interval::{self, Lost};
 use crate::imu::orientation::Options;
 use crate::imu::rath::{self, Motion, Settings};
 use crate::imu::saturation::saturated;
+use crate::imu::track::Instrument;
 use crate::imu::unloading::unloadings;
 use crate::inputs::{Inputs, Window};
 use crate::metrics::{Metrics, Value, metrics_of};
@@ -199,20 +200,16 @@ impl Field {
                 }
             };
             for end in saturated(&track) {
-                let gyroscope = end.gyroscope;
-                let told = end.told(track.len());
-                lost(
-                    "saturated",
-                    told,
-                    &end.samples,
-                    Some(Lost::Peaks { gyroscope }),
-                );
+                let what = Some(Lost::Peaks(end.instrument));
+                lost("saturated", end.told(track.len()), &end.samples, what);
             }
             // What a device says it does not have stands still too.
-            let has = |gyroscope| if gyroscope { turns } else { feels };
-            for still in frozen(&track).into_iter().filter(|s| has(s.gyroscope)) {
-                let gyroscope = still.gyroscope;
-                let all = still.axis.is_none().then_some(Lost::All { gyroscope });
+            let has = |instrument| match instrument {
+                Instrument::Gyroscope => turns,
+                Instrument::Accelerometer => feels,
+            };
+            for still in frozen(&track).into_iter().filter(|s| has(s.instrument)) {
+                let all = still.axis.is_none().then_some(Lost::All(still.instrument));
                 lost("frozen", still.told(track.len()), &still.samples, all);
             }
             if !is_rath && roles.patterns(Role::Imu).contains(topic) {

@@ -1,21 +1,26 @@
 //! Where a sensor gives the same reading again and again while the other one of the same device tells of motion: its driver has stopped, a wire
 //! is off, a logger writes the last value it has.
 
-use super::track::Track;
+use super::track::{Instrument, Track};
 
 /// So long, s, and so many samples.
 const LEAST_S: f64 = 1.0;
 const LEAST_SAMPLES: usize = 20;
-/// What the other sensor's readings range over meanwhile [rad/s, m/s²]: more than a coarse sensor's last digit, and than anybody who stands still.
-const MOVES: [f64; 2] = [0.2, 1.0];
+/// What the other sensor's readings range over meanwhile, in its unit: more than a coarse sensor's last digit, and than anybody who stands still.
+const fn moves(of: Instrument) -> f64 {
+    match of {
+        Instrument::Gyroscope => 0.2,
+        Instrument::Accelerometer => 1.0,
+    }
+}
 /// A fine sensor's axis takes so many values.
 const FINE: usize = 100;
 
 /// A sensor that stood still in moving hands.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Frozen {
-    /// The gyroscope, else the accelerometer.
-    pub gyroscope: bool,
+    /// What did.
+    pub instrument: Instrument,
     /// The axis, if it is one alone, for all the time.
     pub axis: Option<usize>,
     /// Which samples, ascending.
@@ -25,10 +30,7 @@ pub struct Frozen {
 impl Frozen {
     /// One line for people.
     pub fn told(&self, all: usize) -> String {
-        let what = match self.gyroscope {
-            true => "gyroscope",
-            false => "accelerometer",
-        };
+        let what = self.instrument.name();
         match self.axis {
             Some(axis) => format!(
                 "the {what}'s {} never changes while its other axes do: if that is no made-up motion, this axis is dead",
@@ -44,26 +46,29 @@ impl Frozen {
 
 /// What of a track is frozen.
 pub fn frozen(track: &Track) -> Vec<Frozen> {
-    let both = [&track.gyro_rad_per_s, &track.accel_m_per_s2];
     let mut out = Vec::new();
-    for (own, gyroscope) in [(0, true), (1, false)] {
-        let samples: Vec<usize> = runs(both[own])
+    for instrument in Instrument::BOTH {
+        let (own, other) = (track.readings(instrument), instrument.other());
+        let moved = |run: &std::ops::Range<usize>| {
+            let ranges = ranges(&track.readings(other)[run.clone()]);
+            ranges.iter().any(|range| *range > moves(other))
+        };
+        let samples: Vec<usize> = runs(own)
             .filter(|run| run.len() >= LEAST_SAMPLES)
             .filter(|run| track.t_s[run.end - 1] - track.t_s[run.start] >= LEAST_S)
-            .filter(|run| moves(&both[1 - own][run.clone()], MOVES[1 - own]))
+            .filter(moved)
             .flatten()
             .collect();
-        let axis = dead_axis(both[own], MOVES[own]);
         if !samples.is_empty() {
             out.push(Frozen {
-                gyroscope,
+                instrument,
                 axis: None,
                 samples,
             });
-        } else if axis.is_some() {
+        } else if let Some(axis) = dead_axis(own, moves(instrument)) {
             out.push(Frozen {
-                gyroscope,
-                axis,
+                instrument,
+                axis: Some(axis),
                 samples: (0..track.len()).collect(),
             });
         }
@@ -89,16 +94,9 @@ fn ranges(readings: &[[f64; 3]]) -> [f64; 3] {
     })
 }
 
-fn moves(readings: &[[f64; 3]], least: f64) -> bool {
-    ranges(readings).iter().any(|range| *range > least)
-}
-
 /// The one axis that never changes, where both others do by more than `least`, in many steps: what a coarse sensor's axis feels may be less than its
 /// last digit.
 fn dead_axis(readings: &[[f64; 3]], least: f64) -> Option<usize> {
-    if readings.len() < LEAST_SAMPLES {
-        return None;
-    }
     let ranges = ranges(readings);
     let axis = ranges.iter().position(|range| *range == 0.0)?;
     let steps = |axis: usize| {
@@ -150,13 +148,13 @@ mod tests {
             stopped.accel_m_per_s2[700..].fill(last);
             let found = frozen(&stopped);
             assert_eq!(found.len(), 1);
-            assert!(!found[0].gyroscope && found[0].axis.is_none());
+            assert!(found[0].instrument == Instrument::Accelerometer && found[0].axis.is_none());
             assert_eq!(found[0].samples.last(), Some(&1999));
             assert!(found[0].samples[0].abs_diff(700) < 3, "{quantum}");
             let mut silent = sound.clone();
             silent.gyro_rad_per_s.fill([0.0; 3]);
             assert_eq!(frozen(&silent)[0].samples.len(), 2000);
-            assert!(frozen(&silent)[0].gyroscope);
+            assert_eq!(frozen(&silent)[0].instrument, Instrument::Gyroscope);
         }
     }
 
@@ -165,7 +163,9 @@ mod tests {
         let mut dead = swaying(0.001);
         dead.gyro_rad_per_s.iter_mut().for_each(|w| w[2] = 0.013);
         let found = frozen(&dead);
-        assert!(found.len() == 1 && found[0].gyroscope && found[0].axis == Some(2));
+        assert_eq!(found.len(), 1);
+        let found = (found[0].instrument, found[0].axis);
+        assert_eq!(found, (Instrument::Gyroscope, Some(2)));
     }
 
     #[test]

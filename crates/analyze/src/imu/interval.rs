@@ -4,6 +4,7 @@
 //! at the paper's 30 Hz with a random phase; the metric's spread over the draws is its standard error, 1.96 of which are given.
 
 use super::rath::{Motion, Mounting};
+use super::track::Instrument;
 use super::unloading::unloadings;
 use crate::inputs::{Inputs, Window, between};
 use crate::line::rival_hz;
@@ -149,32 +150,22 @@ pub fn metrics(motion: &Motion, window: Window) -> Metrics {
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Lost {
     /// What went beyond its range.
-    Peaks {
-        /// The gyroscope's, else the accelerometer's.
-        gyroscope: bool,
-    },
+    Peaks(Instrument),
     /// All, while it stood still.
-    All {
-        /// The gyroscope's, else the accelerometer's.
-        gyroscope: bool,
-    },
+    All(Instrument),
 }
 
 /// Takes the intervals from numbers that rest on what was lost, which is in no budget. An accelerometer's missing peaks hardly turn the attitude.
 pub fn without(metrics: &mut Metrics, lost: Lost) {
-    let (gyroscope, why) = match lost {
-        Lost::Peaks { gyroscope } => (gyroscope, "came to the end of its range"),
-        Lost::All { gyroscope } => (gyroscope, "gave one reading while the device moved"),
+    let (instrument, why) = match lost {
+        Lost::Peaks(of) => (of, "came to the end of its range"),
+        Lost::All(of) => (of, "gave one reading while the device moved"),
     };
-    let attitude = gyroscope || matches!(lost, Lost::All { .. });
+    let attitude = lost != Lost::Peaks(Instrument::Accelerometer);
     for (name, value) in &mut metrics.0 {
         let rests_on = attitude || is_of_height(name) || *name == "t_float";
         if rests_on && value.ci95.take().is_some() {
-            let sensor = match gyroscope {
-                true => "gyroscope",
-                false => "accelerometer",
-            };
-            let why = format!("without an interval: the {sensor} {why}");
+            let why = format!("without an interval: the {} {why}", instrument.name());
             value.reason = Some(match value.reason.take() {
                 Some(reason) => format!("{why}; {reason}"),
                 None => why,

@@ -1,9 +1,14 @@
 //! Where a sensor came to the end of its range: what moved beyond it was read as the end itself, and nothing brings it back.
 
-use super::track::Track;
+use super::track::{Instrument, Track};
 
-/// No sensor has a smaller range: ±125 °/s and ±2 g, less a tenth for scale and offset [rad/s, m/s²].
-const LEAST_END: [f64; 2] = [0.9 * 2.18, 0.9 * 19.6];
+/// No sensor has a smaller range: ±125 °/s and ±2 g, less a tenth for scale and offset.
+const fn least_end(of: Instrument) -> f64 {
+    match of {
+        Instrument::Gyroscope => 0.9 * 2.18,
+        Instrument::Accelerometer => 0.9 * 19.6,
+    }
+}
 /// So many samples at the end, three of them in a row, and so many times as many as at one of the values below it: the crest of a sine has four times as many.
 const LEAST_SAMPLES: usize = 8;
 const PILED_UP: f64 = 8.0;
@@ -13,9 +18,9 @@ const BELOW: usize = 8;
 /// What stayed at the end of its range.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Saturated {
-    /// The gyroscope, else the accelerometer.
-    pub gyroscope: bool,
-    /// The largest reading (rad/s or m/s²).
+    /// What did.
+    pub instrument: Instrument,
+    /// The largest reading, in its unit.
     pub end: f64,
     /// Which samples, ascending.
     pub samples: Vec<usize>,
@@ -24,13 +29,11 @@ pub struct Saturated {
 impl Saturated {
     /// One line for people.
     pub fn told(&self, all: usize) -> String {
-        let (what, unit) = match self.gyroscope {
-            true => ("gyroscope", "rad/s"),
-            false => ("accelerometer", "m/s²"),
-        };
         format!(
-            "the {what} came to its end at {:.3} {unit} in {} of {all} samples: what went beyond is lost, and no interval knows of it",
+            "the {} came to its end at {:.3} {} in {} of {all} samples: what went beyond is lost, and no interval knows of it",
+            self.instrument.name(),
             self.end,
+            self.instrument.unit(),
             self.samples.len()
         )
     }
@@ -38,18 +41,18 @@ impl Saturated {
 
 /// What of a track is the end of a range: its gyroscope, its accelerometer.
 pub fn saturated(track: &Track) -> Vec<Saturated> {
-    let both = [&track.gyro_rad_per_s, &track.accel_m_per_s2];
-    let each = both.into_iter().zip(LEAST_END).zip([true, false]);
-    each.filter_map(|((vectors, least), gyroscope)| {
+    let each = Instrument::BOTH.into_iter();
+    each.filter_map(|instrument| {
+        let readings = track.readings(instrument);
         let mut found = Saturated {
-            gyroscope,
+            instrument,
             end: 0.0,
             samples: Vec::new(),
         };
         for axis in 0..3 {
             for sign in [1.0, -1.0] {
-                let x: Vec<f64> = vectors.iter().map(|v| sign * v[axis]).collect();
-                if let Some((end, samples)) = piled_up(&x, least) {
+                let x: Vec<f64> = readings.iter().map(|v| sign * v[axis]).collect();
+                if let Some((end, samples)) = piled_up(&x, least_end(instrument)) {
                     found.end = found.end.max(end);
                     found.samples.extend(samples);
                 }
@@ -103,7 +106,10 @@ mod tests {
         for quantum in [1e-9, 0.001, 0.05] {
             let found = saturated(&turning(quantum, 2.5));
             assert_eq!(found.len(), 1, "{quantum}");
-            assert!(found[0].gyroscope && (found[0].end - 2.5).abs() < quantum);
+            assert!(
+                found[0].instrument == Instrument::Gyroscope
+                    && (found[0].end - 2.5).abs() < quantum
+            );
             // |sin| > 2.5 / 4 of the time.
             let share = found[0].samples.len() as f64 / 4000.0;
             let truth = 1.0 - (2.5f64 / 4.0).asin() / std::f64::consts::FRAC_PI_2;

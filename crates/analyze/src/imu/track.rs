@@ -9,6 +9,44 @@ const ACCEL_LIMIT_M_PER_S2: f64 = 1e5;
 /// What a straight line may bridge, s: of 10 m/s² at 4 Hz it misses a velocity of 10 mm/s.
 pub(crate) const BRIDGED_S: f64 = 0.025;
 
+/// What an inertial sensor reads.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Instrument {
+    /// Angular velocity, rad/s.
+    Gyroscope,
+    /// Specific force, m/s².
+    Accelerometer,
+}
+
+impl Instrument {
+    /// Both.
+    pub const BOTH: [Self; 2] = [Self::Gyroscope, Self::Accelerometer];
+
+    /// Its name.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Gyroscope => "gyroscope",
+            Self::Accelerometer => "accelerometer",
+        }
+    }
+
+    /// Its unit.
+    pub fn unit(self) -> &'static str {
+        match self {
+            Self::Gyroscope => "rad/s",
+            Self::Accelerometer => "m/s²",
+        }
+    }
+
+    /// The other one of the same device.
+    pub fn other(self) -> Self {
+        match self {
+            Self::Gyroscope => Self::Accelerometer,
+            Self::Accelerometer => Self::Gyroscope,
+        }
+    }
+}
+
 /// Samples of one inertial sensor in ascending time; every number finite.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Track {
@@ -50,6 +88,14 @@ impl Track {
             }
         }
         track
+    }
+
+    /// What one of its instruments read.
+    pub fn readings(&self, instrument: Instrument) -> &[[f64; 3]] {
+        match instrument {
+            Instrument::Gyroscope => &self.gyro_rad_per_s,
+            Instrument::Accelerometer => &self.accel_m_per_s2,
+        }
     }
 
     /// Number of samples.
