@@ -167,4 +167,18 @@ mod tests {
             assert!((hz - 2.0).abs() < 0.005, "{late_s} {lost}: {hz}");
         }
     }
+
+    /// More than half a turn over a lost message: only the usual rate tells that it was not less than half the other way.
+    #[test]
+    fn turns_over_a_lost_message_are_counted_by_the_usual_rate() {
+        let kept = (0..400).filter(|k| k % 5 != 4).map(|k| f64::from(k) / 8.0);
+        let (t_s, beat_phase_rad) = kept.map(|t| (t, TAU * 2.5 * t)).unzip();
+        let inputs = Inputs {
+            t_s,
+            beat_phase_rad,
+            ..Inputs::default()
+        };
+        let hz = metrics(&inputs, Window::ALL).number("beat_hz").unwrap();
+        assert!((hz - 2.5).abs() < 1e-9, "{hz}");
+    }
 }
