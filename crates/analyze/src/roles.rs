@@ -128,6 +128,9 @@ pub struct RolesFile {
     /// How old an accelerometer's sample is at its stamp (s).
     #[serde(default, deserialize_with = "age")]
     pub accel_age_s: Option<f64>,
+    /// Standard deviation of what is constantly wrong with an accelerometer's axis (m/s²).
+    #[serde(default, deserialize_with = "not_negative")]
+    pub accel_bias_m_per_s2: Option<f64>,
 }
 
 /// Unit of an angle.
@@ -302,6 +305,8 @@ pub struct Sensors {
     pub gyro_age_s: Option<f64>,
     /// Age of accelerometers' samples, s.
     pub accel_age_s: Option<f64>,
+    /// Standard deviation of the bias of the load's accelerometer, m/s².
+    pub accel_bias_m_per_s2: Option<f64>,
 }
 
 impl Roles {
@@ -394,6 +399,7 @@ impl Roles {
                 mounting_roll_pitch_yaw_deg: user.imu_mounting_roll_pitch_yaw_deg,
                 gyro_age_s: user.gyro_age_s,
                 accel_age_s: user.accel_age_s,
+                accel_bias_m_per_s2: user.accel_bias_m_per_s2,
             };
             for role in Role::ALL {
                 let said = user.patterns(role);

@@ -675,6 +675,46 @@ fn swung(t: f64) -> String {
     )
 }
 
+/// A layout that exchanges two of a gyroscope's columns is found out, and believed no interval.
+#[test]
+fn axes_that_a_layout_exchanged_are_told() {
+    let folder = tempfile::tempdir().unwrap();
+    let mut table = "t,ax,ay,az,gx,gy,gz\n".to_owned();
+    for k in 0..4000 {
+        let t = f64::from(k) * 0.01;
+        let w = std::f64::consts::TAU;
+        let (roll, turned) = (0.35 * (w * t).sin(), 0.35 * w * (w * t).cos());
+        let (y, z) = (9.81 * roll.sin(), 9.81 * roll.cos());
+        table += &format!("{t:.2},0.01,{y:.4},{z:.4},{turned:.5},0.001,0.002\n");
+    }
+    let log = folder.path().join("rath.csv");
+    std::fs::write(&log, table).unwrap();
+    for (gyro, told) in [
+        (["gx", "gy", "gz"], None),
+        (["gy", "gx", "gz"], Some("y, x, z")),
+    ] {
+        let layout = folder.path().join("layout.toml");
+        let text = format!(
+            "[time]\ncolumn = \"t\"\nunit = \"s\"\n[acceleration]\ncolumns = [\"ax\", \"ay\", \"az\"]\nunit = \"m/s^2\"\n[angular_velocity]\ncolumns = {gyro:?}\nunit = \"rad/s\"\n"
+        );
+        std::fs::write(&layout, text).unwrap();
+        let file = folder.path().join("walk.mcap");
+        let [log, layout, file] = [&log, &layout, &file].map(|p| p.to_str().unwrap());
+        analyze(&["ingest", log, "--layout", layout, "--out", file]);
+        let found = json(&[file, "--format", "json"]);
+        let quality = found["quality"].as_array().unwrap();
+        let axes = quality.iter().find(|q| q["kind"] == "axes");
+        let text = axes.map(|q| q["text"].as_str().unwrap());
+        assert_eq!(text.is_some(), told.is_some(), "{text:?}");
+        assert!(
+            text.is_none_or(|text| text.contains(told.unwrap())),
+            "{text:?}"
+        );
+        let roll = &found["metrics"]["rms_roll_deg"];
+        assert_eq!(roll["ci95"].is_null(), told.is_some(), "{roll}");
+    }
+}
+
 /// A log that was written at once, within a quarter of a second, or beside a simulation that ran at a third of the wall's clock.
 #[test]
 fn stamps_tell_the_times_where_the_log_keeps_another_pace() {

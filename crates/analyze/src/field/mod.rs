@@ -23,6 +23,7 @@ use recording::text::counted;
 use crate::beat::lock::Course;
 use crate::events::Event;
 use crate::imu::Track;
+use crate::imu::axes::misfit;
 use crate::imu::frozen::frozen;
 use crate::imu::interval::{self, Lost};
 use crate::imu::orientation::Options;
@@ -211,6 +212,17 @@ impl Field {
             for still in frozen(&track).into_iter().filter(|s| has(s.instrument)) {
                 let all = still.axis.is_none().then_some(Lost::All(still.instrument));
                 lost("frozen", still.told(track.len()), &still.samples, all);
+            }
+            if turns
+                && feels
+                && let Some(found) = misfit(&track, gravity_m_per_s2)
+            {
+                field
+                    .quality
+                    .push(Quality::remark(topic, "axes", found.told()));
+                if is_rath {
+                    field.lost.push(Lost::Axes);
+                }
             }
             if !is_rath && roles.patterns(Role::Imu).contains(topic) {
                 if !one_clock {

@@ -5,6 +5,7 @@ use std::collections::HashMap;
 use nalgebra::UnitQuaternion;
 use recording::read::Recording;
 
+use crate::imu::budget::Budget;
 use crate::imu::rath::{Mounting, Settings};
 use crate::roles::Sensors;
 
@@ -17,6 +18,8 @@ pub struct Place {
     pub is_known: bool,
     /// Body from sensor, where somebody says.
     pub body_from_sensor: Option<UnitQuaternion<f64>>,
+    /// Standard deviation of its accelerometer's bias, m/s², where somebody says.
+    pub accel_bias_m_per_s2: Option<f64>,
 }
 
 impl Place {
@@ -32,6 +35,10 @@ impl Place {
             mounting: turned
                 .or(self.body_from_sensor)
                 .map_or(Mounting::Levelled, Mounting::Known),
+            budget: Budget {
+                accel_bias_m_per_s2: said.accel_bias_m_per_s2.or(self.accel_bias_m_per_s2),
+                ..Budget::default()
+            },
             ..Settings::default()
         }
     }
@@ -44,7 +51,8 @@ pub fn is_simulated(recording: &Recording) -> bool {
         .is_some_and(|s| s == "sim")
 }
 
-/// Places by topic, from the attachment `scene.toml` (`effects.imu.sensors`: `on`, `name`, `place_m`, `mounting_roll_pitch_yaw_deg`).
+/// Places by topic, from the attachment `scene.toml` (`effects.imu.sensors`: `on`, `name`, `place_m`, `mounting_roll_pitch_yaw_deg`; of all of them
+/// `accel_bias_sd_m_per_s2`).
 ///
 /// Empty where there is no such attachment or it cannot be read; sensors then count as levelled and at the centre of mass.
 pub fn places(recording: &Recording) -> HashMap<String, Place> {
@@ -59,9 +67,11 @@ fn from_scene(text: &str) -> HashMap<String, Place> {
     let Ok(scene) = text.parse::<toml::Table>() else {
         return out;
     };
-    let sensors = scene
-        .get("effects")
-        .and_then(|e| e.get("imu"))
+    let number = |v: &toml::Value| v.as_float().or_else(|| v.as_integer().map(|i| i as f64));
+    let imu = scene.get("effects").and_then(|e| e.get("imu"));
+    let bias = imu.and_then(|i| i.get("accel_bias_sd_m_per_s2"));
+    let accel_bias_m_per_s2 = bias.and_then(number).unwrap_or(0.0);
+    let sensors = imu
         .and_then(|i| i.get("sensors"))
         .and_then(|s| s.as_array());
     for sensor in sensors.into_iter().flatten() {
@@ -70,8 +80,6 @@ fn from_scene(text: &str) -> HashMap<String, Place> {
             continue;
         };
         let triple = |key: &str| -> Option<[f64; 3]> {
-            let number =
-                |v: &toml::Value| v.as_float().or_else(|| v.as_integer().map(|i| i as f64));
             let values: Vec<f64> = sensor
                 .get(key)?
                 .as_array()?
@@ -87,6 +95,7 @@ fn from_scene(text: &str) -> HashMap<String, Place> {
             lever_m: triple("place_m").unwrap_or_default(),
             is_known: true,
             body_from_sensor: Some(UnitQuaternion::from_euler_angles(roll, pitch, yaw)),
+            accel_bias_m_per_s2: Some(accel_bias_m_per_s2),
         };
         out.entry(format!("/imu/{name}")).or_insert(place);
     }
@@ -107,6 +116,18 @@ mod tests {
         let settings = |place: Place, said: &Sensors| place.or_as_said(said).lever_is_known;
         let nothing = Sensors::default();
         assert!(settings(found["/imu/rath"], &nothing) && !settings(Place::default(), &nothing));
+        let bias = |text: &str, said: Option<f64>| {
+            let said = Sensors {
+                accel_bias_m_per_s2: said,
+                ..nothing
+            };
+            let place = from_scene(text).get("/imu/rath").copied();
+            let settings = place.unwrap_or_default().or_as_said(&said);
+            settings.budget.accel_bias_m_per_s2
+        };
+        let scene = "[effects.imu]\naccel_bias_sd_m_per_s2 = 0.02\n[[effects.imu.sensors]]\n";
+        let biases = [bias(scene, None), bias(scene, Some(0.1)), bias("", None)];
+        assert_eq!(biases, [Some(0.02), Some(0.1), None]);
         assert!(from_scene("no toml [").is_empty());
     }
 }

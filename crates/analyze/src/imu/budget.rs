@@ -1,9 +1,16 @@
 //! How sure an inertial sensor on what is carried can be.
 
+/// Bias of an accelerometer's axis that nobody has measured, m/s² (one standard deviation). Data sheets of those in phones and wearables give ±20 mg as
+/// soldered (LSM6DSO, BMI270, ICM-42688-P: "zero-g level offset"), read as two of them; older ones ±50 mg (MPU-6050).
+pub const UNCALIBRATED_M_PER_S2: f64 = 0.1;
+
 /// What the sensor and the method leave uncertain, one standard deviation each.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Budget {
-    /// Roll and pitch: constant part, rad.
+    /// Constant bias of each axis of the accelerometer, m/s², where that is known; else [`UNCALIBRATED_M_PER_S2`], or what gravity is off by, if that
+    /// is more. It tilts what stands on a known mounting, and is levelled out of what does not.
+    pub accel_bias_m_per_s2: Option<f64>,
+    /// Roll and pitch: what a bias walks besides, and the method, rad.
     pub tilt_offset_rad: f64,
     /// Roll and pitch: part that wanders over seconds, rad.
     pub tilt_wander_rad: f64,
@@ -13,7 +20,7 @@ pub struct Budget {
     pub height_scale: f64,
     /// Height: wandering over seconds, m.
     pub height_wander_m: f64,
-    /// Support ratio: constant part (accelerometer's bias over g).
+    /// Support ratio: constant part, beside what gravity is off by.
     pub support_offset: f64,
     /// Support ratio: relative.
     pub support_scale: f64,
@@ -25,6 +32,7 @@ impl Default for Budget {
     /// A calibrated MEMS sensor; checked against simulated twins (docs/field.md).
     fn default() -> Self {
         Self {
+            accel_bias_m_per_s2: None,
             tilt_offset_rad: 0.11f64.to_radians(),
             tilt_wander_rad: 0.05f64.to_radians(),
             angle_scale: 0.003,

@@ -3,6 +3,7 @@
 //! The estimated columns are varied within the [`Budget`](super::budget::Budget) of what the sensor and the method leave uncertain, and sampled
 //! at the paper's 30 Hz with a random phase; the metric's spread over the draws is its standard error, 1.96 of which are given.
 
+use super::budget::UNCALIBRATED_M_PER_S2;
 use super::rath::{Motion, Mounting};
 use super::track::Instrument;
 use super::unloading::unloadings;
@@ -60,15 +61,22 @@ pub fn is_of_height(name: &str) -> bool {
 /// Every metric that rests on the motion alone, over `window`, each number with its 95 % interval.
 pub fn metrics(motion: &Motion, window: Window) -> Metrics {
     let mut out = metrics_of(&motion.inputs, window, gives);
-    let draws: Vec<Metrics> = (0..DRAWS)
-        .map(|k| {
-            metrics_of(&varied(motion, window, k as u64), Window::ALL, |name| {
-                gives(name) && name != "mechanism"
-            })
-        })
+    let drawn = |tilt_rad: f64, wanted: fn(&str) -> bool| -> Vec<Metrics> {
+        let varied = (0..DRAWS).map(|k| varied(motion, window, k as u64, tilt_rad));
+        varied
+            .map(|inputs| metrics_of(&inputs, Window::ALL, wanted))
+            .collect()
+    };
+    let tilt_rad = constant_tilt_rad(motion);
+    let draws = drawn(tilt_rad, |name| gives(name) && name != "mechanism");
+    let untilted = (tilt_rad > 0.0).then(|| drawn(0.0, |name| MEAN_SQUARES.contains(&name)));
+    let untilted = untilted.as_ref().unwrap_or(&draws);
+    let onsets: Vec<f64> = draws
+        .iter()
+        .filter_map(|d| d.number("onset_time_s"))
         .collect();
     let range = window.range(&motion.inputs.t_s);
-    let support_ratio = &motion.inputs.support_ratio[range];
+    let support_ratio = &motion.inputs.support_ratio[range.clone()];
     let rate_hz = rate_hz(&motion.inputs);
     for (name, value) in &mut out.0 {
         if let Some((_, why)) = BEYOND.iter().find(|(n, _)| n == name) {
@@ -76,8 +84,31 @@ pub fn metrics(motion: &Motion, window: Window) -> Metrics {
             value.source = "imu".into();
             continue;
         }
+        if *name == "unstable"
+            && let Datum::Bool(found) = value.datum
+        {
+            let others = if found {
+                DRAWS - onsets.len()
+            } else {
+                onsets.len()
+            };
+            value.reason = doubtful(others, if found { "none" } else { "one" });
+            continue;
+        }
         let Datum::Number(x) = value.datum else {
             continue;
+        };
+        if *name == "onset_time_s" {
+            let end_s = motion.inputs.t_s[range.clone()].last().copied();
+            value.ci95 = Some(onset_between(x, &onsets, end_s.unwrap_or(x)));
+            let reason = doubtful(DRAWS - onsets.len(), "none");
+            value.reason = value.reason.take().or(reason);
+            continue;
+        }
+        let draws = if MEAN_SQUARES.contains(name) {
+            untilted
+        } else {
+            &draws
         };
         let drawn: Vec<f64> = draws.iter().filter_map(|d| d.number(name)).collect();
         if drawn.len() < DRAWS / 2 {
@@ -86,9 +117,21 @@ pub fn metrics(motion: &Motion, window: Window) -> Metrics {
         // About the estimate, not about the draws' mean: what the draws add on average is theirs.
         if MEAN_SQUARES.contains(name) {
             let (root, ci95) = without_noise(x, &drawn);
+            let angle = match *name {
+                "rms_roll_deg" => &motion.inputs.roll_rad[range.clone()],
+                _ => &motion.inputs.pitch_rad[range.clone()],
+            };
+            let mean_deg = angle.iter().sum::<f64>().to_degrees() / angle.len() as f64;
             value.datum = Datum::Number(root);
-            value.ci95 = Some(ci95);
-            if !matches!(motion.settings.mounting, Mounting::Known(_)) {
+            value.ci95 = Some(tilted(root, ci95, mean_deg, 1.96 * tilt_rad.to_degrees()));
+            if matches!(motion.settings.mounting, Mounting::Known(_)) {
+                if motion.settings.budget.accel_bias_m_per_s2.is_none() {
+                    value.reason = Some(format!(
+                        "as if nobody had calibrated the accelerometer (a bias of {:.2} m/s², SD); accel_bias_m_per_s2 in a roles file says otherwise",
+                        accel_bias_m_per_s2(motion)
+                    ));
+                }
+            } else {
                 value.reason = Some("about its mean over the window: how the sensor sits cannot be told from how the load leans; give imu_mounting_roll_pitch_yaw_deg in a roles file".into());
             }
             continue;
@@ -153,6 +196,8 @@ pub enum Lost {
     Peaks(Instrument),
     /// All, while it stood still.
     All(Instrument),
+    /// About which axes it turned.
+    Axes,
 }
 
 /// Takes the intervals from numbers that rest on what was lost, which is in no budget. An accelerometer's missing peaks hardly turn the attitude.
@@ -160,6 +205,10 @@ pub fn without(metrics: &mut Metrics, lost: Lost) {
     let (instrument, why) = match lost {
         Lost::Peaks(of) => (of, "came to the end of its range"),
         Lost::All(of) => (of, "gave one reading while the device moved"),
+        Lost::Axes => (
+            Instrument::Gyroscope,
+            "does not stand on the accelerometer's axes",
+        ),
     };
     let attitude = lost != Lost::Peaks(Instrument::Accelerometer);
     for (name, value) in &mut metrics.0 {
@@ -209,6 +258,58 @@ fn without_noise(x: f64, drawn: &[f64]) -> (f64, [f64; 2]) {
     let half = 1.96 * variance(&squares).sqrt();
     let root = |square: f64| square.max(0.0).sqrt();
     (root(square), [root(square - half), root(square + half)])
+}
+
+/// Standard deviation of the accelerometer's bias, m/s²: as said, or of one that nobody calibrated, on the evidence of the axis that gravity shows.
+fn accel_bias_m_per_s2(motion: &Motion) -> f64 {
+    let seen = motion.gravity_off_m_per_s2.abs();
+    let said = motion.settings.budget.accel_bias_m_per_s2;
+    said.unwrap_or(UNCALIBRATED_M_PER_S2.max(seen))
+}
+
+/// By how much such a bias tilts up for good, rad (one standard deviation).
+fn constant_tilt_rad(motion: &Motion) -> f64 {
+    match motion.settings.mounting {
+        Mounting::Known(_) => accel_bias_m_per_s2(motion) / motion.settings.gravity_m_per_s2,
+        // What is up is found with the same bias.
+        Mounting::Levelled | Mounting::Walking => 0.0,
+    }
+}
+
+/// The interval of a root mean square that may lean by up to `most` more or less than seen, all the time:
+///
+/// ```text
+/// x² = v + m²,    v + (|m| − c)² … v + (|m| + c)²
+/// ```
+/// m the mean, v the variance about it, which such a lean leaves alone, c what it may be; none below v. Errors add by squares.
+fn tilted(root: f64, [low, high]: [f64; 2], mean: f64, most: f64) -> [f64; 2] {
+    let mean = mean.abs();
+    let square = root * root;
+    let down = mean * mean - (mean - most).max(0.0).powi(2);
+    let up = (mean + most).powi(2) - mean * mean;
+    let low = square - (square - low * low).hypot(down);
+    let high = square + (high * high - square).hypot(up);
+    [low.max(0.0).sqrt(), high.sqrt()]
+}
+
+/// What the definition counts in, s.
+const ONSET_STEP_S: f64 = 1.0 / 30.0;
+
+/// From the earliest to the latest onset that equally good sensors find, of which one in forty may find none. The roll's mean square climbs by stairs, two
+/// to each of its periods: where the threshold lies near a landing, onsets fall on both sides of it, and no standard deviation tells of that.
+fn onset_between(found_s: f64, drawn_s: &[f64], end_s: f64) -> [f64; 2] {
+    let all = || drawn_s.iter().copied().chain([found_s]);
+    let latest_s = match drawn_s.len() + 1 < DRAWS {
+        true => end_s,
+        false => all().fold(f64::MIN, f64::max) + ONSET_STEP_S,
+    };
+    [all().fold(f64::MAX, f64::min) - ONSET_STEP_S, latest_s]
+}
+
+/// Said where more than one in forty equally good sensors would find an onset, or none, against the one that did not.
+fn doubtful(others: usize, what: &str) -> Option<String> {
+    (others > 1)
+        .then(|| format!("of {DRAWS} sensors as good as this one {others} would find {what}"))
 }
 
 /// Share of samples with a support of a twentieth of the weight or less, without what noise makes of it: where the support stays a little below
@@ -293,8 +394,6 @@ fn beyond_the_budget(name: &str, motion: &Motion, window: Window) -> f64 {
             let (t_s, x): (Vec<f64>, Vec<f64>) = all.filter(|(_, x)| x.is_finite()).unzip();
             bin.hypot(rival_hz(&t_s, &x) / 1.96)
         }
-        // The definition counts samples at 30 Hz; others of the same motion come up to one of them later, evenly spread.
-        "onset_time_s" => (1.0 / 30.0) / 3f64.sqrt(),
         // What is slower than the corner is missing or too much.
         "dz_pp_m" => lost_course_m(motion, range),
         // The weights 1, 2, 1 move a touch-down by a part of a sample, all of them to the same side (docs/field.md: twins at 100 and 200 Hz).
@@ -410,9 +509,10 @@ fn farthest(
 }
 
 /// The window's columns as they might have come out of an equally good sensor, at 30 Hz or its own rate.
-fn varied(motion: &Motion, window: Window, draw: u64) -> Inputs {
+fn varied(motion: &Motion, window: Window, draw: u64, tilt_rad: f64) -> Inputs {
     let budget = &motion.settings.budget;
-    let mut random = Random(SEED ^ (draw.wrapping_add(1)).wrapping_mul(0x9e37_79b9_7f4a_7c15));
+    let seed = SEED ^ (draw.wrapping_add(1)).wrapping_mul(0x9e37_79b9_7f4a_7c15);
+    let (mut random, mut tilt) = (Random(seed), Random(!seed));
     let inputs = &motion.inputs;
     let range = window.range(&inputs.t_s);
     let Some(first) = inputs.t_s[range.clone()].first() else {
@@ -433,9 +533,9 @@ fn varied(motion: &Motion, window: Window, draw: u64) -> Inputs {
     let steps = motion.stretches.iter().flat_map(within);
     let t_s: Vec<f64> = steps.map(|k| begin + k as f64 * step_s).collect();
     let pick = |x: &[f64]| between(&inputs.t_s[range.clone()], &x[range.clone()], &t_s);
-    let angle = |x: &[f64], random: &mut Random| -> Vec<f64> {
+    let mut angle = |x: &[f64], random: &mut Random| -> Vec<f64> {
         let (offset, scale) = (
-            budget.tilt_offset_rad * random.normal(),
+            budget.tilt_offset_rad * random.normal() + tilt_rad * tilt.normal(),
             1.0 + budget.angle_scale * random.normal(),
         );
         let wander = random.wander(t_s.len(), step_s, budget.tilt_wander_rad, WANDER_S);
@@ -454,8 +554,10 @@ fn varied(motion: &Motion, window: Window, draw: u64) -> Inputs {
         .zip(wander)
         .map(|(z, w)| scale * z + w)
         .collect();
+    // A bias upwards is seen, but not whether it is one or a wrong scale.
+    let off = motion.gravity_off_m_per_s2 / motion.settings.gravity_m_per_s2;
     let (offset, scale) = (
-        budget.support_offset * random.normal(),
+        budget.support_offset.hypot(off) * random.normal(),
         1.0 + budget.support_scale * random.normal(),
     );
     let support_ratio = pick(&inputs.support_ratio)
@@ -476,6 +578,158 @@ fn varied(motion: &Motion, window: Window, draw: u64) -> Inputs {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::imu::budget::Budget;
+    use crate::imu::orientation::Options;
+    use crate::imu::rath::{Settings, motion};
+    use crate::imu::track::Track;
+    use nalgebra::{UnitQuaternion, Vector3};
+    use std::f64::consts::{PI, TAU};
+
+    const G: f64 = 9.80665;
+    const MOST: Window = Window {
+        start_s: 5.0,
+        end_s: 35.0,
+    };
+
+    /// What a sensor at the centre of mass makes of a roll [rad] and of a support [1] over time, its gyroscope's scale off and its accelerometer biased.
+    fn felt(
+        roll: impl Fn(f64) -> f64,
+        support: impl Fn(f64) -> f64,
+        scale: f64,
+        bias: [f64; 3],
+        mounting: Mounting,
+        told: Option<f64>,
+    ) -> Motion {
+        let mut track = Track::default();
+        for t in (0..4000).map(|k| 0.01 * f64::from(k)) {
+            let rate = (roll(t + 1e-5) - roll(t - 1e-5)) / 2e-5;
+            let body_from_earth = UnitQuaternion::from_axis_angle(&Vector3::x_axis(), -roll(t));
+            let force = body_from_earth * Vector3::new(0.0, 0.0, G * support(t));
+            track.t_s.push(t);
+            track.gyro_rad_per_s.push([scale * rate, 0.0, 0.0]);
+            track
+                .accel_m_per_s2
+                .push((force + Vector3::from(bias)).into());
+        }
+        let settings = Settings {
+            orientation: Options::without_latency(),
+            mounting,
+            gravity_m_per_s2: G,
+            budget: Budget {
+                accel_bias_m_per_s2: told,
+                ..Budget::default()
+            },
+            ..Settings::default()
+        };
+        motion(&track, &settings).unwrap()
+    }
+
+    const AS_IT_SITS: Mounting = Mounting::Known(UnitQuaternion::new_unchecked(
+        nalgebra::Quaternion::new(1.0, 0.0, 0.0, 0.0),
+    ));
+
+    /// A bias of 1.8 standard deviations is within every interval, and without one that of a calibrated sensor is narrow.
+    #[test]
+    fn a_bias_is_in_the_intervals_of_a_known_mounting() {
+        let roll = |t: f64| 0.02 * (TAU * 1.07 * t).sin();
+        for (sd, told) in [(0.03, Some(0.03)), (0.2, Some(0.2)), (0.1, None)] {
+            let off = 1.8 * sd;
+            let found = felt(roll, |_| 1.0, 1.0, [off, -off, 0.0], AS_IT_SITS, told);
+            let found = metrics(&found, MOST);
+            for (name, truth) in [
+                ("rms_roll_deg", 0.02f64.to_degrees() / 2f64.sqrt()),
+                ("rms_pitch_deg", 0.0),
+            ] {
+                let [low, high] = found.get(name).unwrap().ci95.unwrap();
+                assert!((low..=high).contains(&truth), "{sd} {name}: {low} {high}");
+            }
+            let said = found.get("rms_roll_deg").unwrap().reason.is_some();
+            assert_eq!(said, told.is_none());
+        }
+        let width = |mounting, told| {
+            let found = metrics(&felt(roll, |_| 1.0, 1.0, [0.0; 3], mounting, told), MOST);
+            let [low, high] = found.get("rms_pitch_deg").unwrap().ci95.unwrap();
+            high - low
+        };
+        assert!(width(AS_IT_SITS, Some(0.0)) < 0.2 && width(Mounting::Levelled, None) < 0.2);
+    }
+
+    /// A constant angle seen with one that is off at random: what is stated holds it 95 times in a hundred.
+    #[test]
+    fn a_lean_is_held_as_often_as_stated() {
+        let mut random = Random(9);
+        for (mean, swing, lean) in [(0.0, 0.0, 1.0), (0.0, 1.0, 1.0), (2.0, 0.5, 0.3)] {
+            let truth = f64::hypot(mean, swing);
+            let rounds = 4000;
+            let mut kept = 0;
+            for _ in 0..rounds {
+                let seen = mean + lean * random.normal();
+                let root = f64::hypot(seen, swing);
+                let [low, high] = tilted(root, [root; 2], seen, 1.96 * lean);
+                kept += usize::from(low <= truth + 1e-12 && truth <= high);
+            }
+            let covers = f64::from(u32::try_from(kept).unwrap()) / f64::from(rounds);
+            assert!((0.94..1.0).contains(&covers), "{mean} {swing}: {covers}");
+        }
+    }
+
+    /// Gravity 2 % too long may be a scale, of which nothing is left when nothing is felt, or a bias, of which all is.
+    #[test]
+    fn a_bias_upwards_is_in_the_interval_of_what_floats() {
+        let support = |t: f64| 1.0 + 1.2 * (TAU * 1.8 * t).sin();
+        let truth = (PI - 2.0 * (0.95f64 / 1.2).asin()) / TAU;
+        for off in [-0.2, 0.2] {
+            let found = felt(
+                |_| 0.0,
+                support,
+                1.0,
+                [0.0, 0.0, off],
+                Mounting::Levelled,
+                None,
+            );
+            let found = metrics(&found, MOST);
+            let [low, high] = found.get("t_float").unwrap().ci95.unwrap();
+            assert!((low..=high).contains(&truth), "{off}: {low} {truth} {high}");
+        }
+    }
+
+    /// A roll that jumps to just below the threshold and later beyond it, seen by a gyroscope that shows 0.5 % too much: 1.7 standard deviations.
+    #[test]
+    fn an_onset_near_a_landing_is_in_its_interval() {
+        for k in 0..40 {
+            let at = 10.0 + 0.025 * f64::from(k);
+            let jump = |t: f64| 1.0 + (t / 0.1).tanh();
+            let amplitude = |t: f64| 6.0 + 4.0 * jump(t - at) + 2.0 * jump(t - at - 9.0);
+            let roll = |t: f64| amplitude(t).to_radians() * (TAU * 1.07 * t).sin();
+            let t_s: Vec<f64> = (150..1050).map(|k| f64::from(k) / 30.0).collect();
+            let truth = Inputs {
+                roll_rad: t_s.iter().map(|t| roll(*t)).collect(),
+                t_s,
+                ..Inputs::default()
+            };
+            let truth = metrics_of(&truth, Window::ALL, |n| n == "onset_time_s");
+            let truth = truth.number("onset_time_s").unwrap();
+            let found = felt(roll, |_| 1.0, 1.005, [0.0; 3], AS_IT_SITS, Some(0.0));
+            let found = metrics(&found, MOST);
+            let [low, high] = found.get("onset_time_s").unwrap().ci95.unwrap();
+            assert!((low..=high).contains(&truth), "{k}: {low} {truth} {high}");
+            assert!(high - low < 1.5, "{k}: {low} {high}");
+        }
+    }
+
+    /// Whether a roll has an onset whose 2 s, at most √(1 + |sin 4πf s| / 4πf s) times the mean, just reach the threshold, nobody knows.
+    #[test]
+    fn an_onset_that_others_would_not_find_is_said_to_be_doubtful() {
+        let roll = |t: f64| {
+            13.76f64.to_radians() * (TAU * 1.07 * t).sin() / (1.0 + (0.05 * (t - 20.0)).powi(4))
+        };
+        let found = felt(roll, |_| 1.0, 1.0, [0.0; 3], AS_IT_SITS, Some(0.0));
+        let found = metrics(&found, MOST);
+        for name in ["onset_time_s", "unstable"] {
+            let said = found.get(name).unwrap().reason.as_deref().unwrap_or("");
+            assert!(said.contains("sensors as good"), "{name}: {said}");
+        }
+    }
 
     #[test]
     fn noise_is_taken_out_of_a_mean_square() {

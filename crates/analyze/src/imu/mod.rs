@@ -13,9 +13,11 @@
 //! | [`interval`] | every metric that rests on the motion, with its interval |
 //! | [`unloading`] | when the support falls below a share of the weight |
 //! | [`saturation`] | where a sensor came to the end of its range |
+//! | [`axes`] | whether a gyroscope stands on its accelerometer's axes |
 //! | [`frozen`] | where a sensor stands still in moving hands |
 //! | [`truth`] | errors against a recorded truth |
 
+pub mod axes;
 pub mod budget;
 pub mod frozen;
 pub mod interval;

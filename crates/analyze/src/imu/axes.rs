@@ -1,0 +1,362 @@
+//! Whether a gyroscope and the accelerometer of the same device stand on the same axes: a table's layout may have exchanged or turned them.
+//!
+//! ```text
+//! ω = P ω_read        m = ∫ w R f dt        r² = |m_B − m_A|² + (½|m_A + m_B| − g)²
+//! ```
+//! P one of the 48 signed permutations; R the turn since the window's beginning, integrated from ω; f specific force [m/s²], w Hann's weight of the first
+//! (A) or the second half (B) of a window of 4 s. Turned by the right rates, gravity stays where it is and as long as it is, and whatever else is felt has
+//! a mean of nothing, wherever the sensor sits; by wrong rates it wanders or shrinks. A bias of the gyroscope is fitted to each P.
+//!
+//! Holds for a device that tilts, by a few degrees at least. Both sensors turned alike cannot be told, nor an accelerometer that reads −f. Turning about
+//! one axis alone leaves several P alike: then the one nearest to the axes as read is named.
+
+use super::Track;
+use nalgebra::{Matrix3, UnitQuaternion, Vector3};
+
+/// Samples are averaged over this, s.
+const BLOCK_S: f64 = 0.04;
+const WINDOW_S: f64 = 4.0;
+/// Only windows in which it turns faster than this count, rad/s RMS, and so many of them.
+const TURNS_RAD_PER_S: f64 = 0.1;
+const FEWEST: usize = 3;
+/// Gravity that wanders by less than this is as it should be, m/s² RMS: 2°, more than an uncalibrated sensor and a first step make.
+const WANDERS_M_PER_S2: f64 = 0.4;
+/// So many times better have other axes to fit, on the whole, and better at all in this share of the windows.
+const TIMES: f64 = 3.0;
+const MOSTLY: f64 = 0.75;
+/// Within this factor two ways fit alike.
+const ALIKE: f64 = 1.3;
+/// What a bias is held at nothing by: its standard deviation (rad/s), and that of a window's residual (m/s²).
+const BIAS_RAD_PER_S: f64 = 0.1;
+const RESIDUAL_M_PER_S2: f64 = 0.2;
+const ROUNDS: usize = 3;
+
+/// Axes that do not agree.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Misfit {
+    /// The gyroscope's axes as they would fit, x, y, z: which of those read, and whether with the other sign.
+    pub read_as: [(usize, bool); 3],
+    /// How many other ways fit as well.
+    pub others: usize,
+    /// By how much gravity wanders as it was read, m/s² RMS.
+    pub wanders_m_per_s2: f64,
+    /// And as it would fit, m/s² RMS.
+    pub fits_m_per_s2: f64,
+}
+
+impl Misfit {
+    /// One line for people.
+    pub fn told(&self) -> String {
+        let axis = |(axis, turned): (usize, bool)| {
+            format!("{}{}", if turned { "−" } else { "" }, ["x", "y", "z"][axis])
+        };
+        let others = match self.others {
+            0 => String::new(),
+            n => format!(", and as well in {n} other ways"),
+        };
+        format!(
+            "gyroscope and accelerometer do not stand on the same axes: turned by the gyroscope, gravity wanders by {:.2} m/s² within seconds, but by {:.2} with its x, y, z read as {}{others}; or it is the accelerometer's that are exchanged. No interval knows of it: mend the layout",
+            self.wanders_m_per_s2,
+            self.fits_m_per_s2,
+            self.read_as.map(axis).join(", ")
+        )
+    }
+}
+
+/// Mean of some samples.
+struct Block {
+    /// Till the next one, s.
+    step_s: f64,
+    rate: Vector3<f64>,
+    force: Vector3<f64>,
+}
+
+/// Whether other axes fit a track much better than its own; `None` where they do not, or it hardly turns.
+pub fn misfit(track: &Track, gravity_m_per_s2: f64) -> Option<Misfit> {
+    let windows = windows(track);
+    if windows.len() < FEWEST {
+        return None;
+    }
+    let still = Vector3::zeros();
+    let as_read = Fit::of(&windows, &Matrix3::identity(), still, gravity_m_per_s2);
+    if as_read.rms() < WANDERS_M_PER_S2 {
+        return None;
+    }
+    // A large bias is not found from none: what hardly turns shows it as its mean.
+    let blocks = || windows.iter().flatten();
+    let mean = blocks().map(|b| b.rate).sum::<Vector3<f64>>() / blocks().count() as f64;
+    let fit = |axes: &Matrix3<f64>| {
+        let [a, b] = [still, mean].map(|bias| Fit::of(&windows, axes, bias, gravity_m_per_s2));
+        if a.rms() < b.rms() { a } else { b }
+    };
+    let as_read = fit(&Matrix3::identity());
+    let mut fits: Vec<(Matrix3<f64>, Fit)> = signed_permutations()
+        .map(|axes| (axes, fit(&axes)))
+        .collect();
+    let least = fits.iter().map(|(_, f)| f.rms()).fold(f64::MAX, f64::min);
+    fits.retain(|(_, fit)| fit.rms() <= ALIKE * least);
+    // Axes that stay come first, then signs.
+    let kept = |axes: &Matrix3<f64>| 8.0 * axes.trace() + axes.sum();
+    let (axes, fit) = fits
+        .iter()
+        .max_by(|a, b| kept(&a.0).total_cmp(&kept(&b.0)))?;
+    let each = fit.squares.iter().zip(&as_read.squares);
+    let better = each.filter(|(fit, as_read)| fit < as_read).count();
+    if as_read.rms() < TIMES * fit.rms() || (better as f64) < MOSTLY * windows.len() as f64 {
+        return None;
+    }
+    let read_as = [0, 1, 2].map(|row| {
+        let of = (0..3).find(|of| axes[(row, *of)] != 0.0).unwrap_or(row);
+        (of, axes[(row, of)] < 0.0)
+    });
+    Some(Misfit {
+        read_as,
+        others: fits.len() - 1,
+        wanders_m_per_s2: as_read.rms(),
+        fits_m_per_s2: fit.rms(),
+    })
+}
+
+/// The windows in which it turns, as blocks.
+fn windows(track: &Track) -> Vec<Vec<Block>> {
+    let Some(period_s) = track.period_s() else {
+        return Vec::new();
+    };
+    let samples = ((BLOCK_S / period_s).round() as usize).max(1);
+    let mut out = Vec::new();
+    for stretch in track.stretches() {
+        let mut window: Vec<Block> = Vec::new();
+        let mut length_s = 0.0;
+        for start in stretch.clone().step_by(samples) {
+            let end = start + samples;
+            if end >= stretch.end {
+                break;
+            }
+            let mean = |v: &[[f64; 3]]| {
+                v[start..end]
+                    .iter()
+                    .map(|v| Vector3::from(*v))
+                    .sum::<Vector3<f64>>()
+                    / samples as f64
+            };
+            let step_s = track.t_s[end] - track.t_s[start];
+            window.push(Block {
+                step_s,
+                rate: mean(&track.gyro_rad_per_s),
+                force: mean(&track.accel_m_per_s2),
+            });
+            length_s += step_s;
+            if length_s >= WINDOW_S {
+                let square: f64 = window
+                    .iter()
+                    .map(|b| b.rate.norm_squared() * b.step_s)
+                    .sum();
+                let window = std::mem::take(&mut window);
+                if square > TURNS_RAD_PER_S.powi(2) * length_s {
+                    out.push(window);
+                }
+                length_s = 0.0;
+            }
+        }
+    }
+    out
+}
+
+/// All of them, those with a mirror among them.
+fn signed_permutations() -> impl Iterator<Item = Matrix3<f64>> {
+    let orders = [
+        [0, 1, 2],
+        [0, 2, 1],
+        [1, 0, 2],
+        [1, 2, 0],
+        [2, 0, 1],
+        [2, 1, 0],
+    ];
+    orders.into_iter().flat_map(|order| {
+        (0..8u8).map(move |signs| {
+            let mut axes = Matrix3::zeros();
+            for (row, of) in order.into_iter().enumerate() {
+                axes[(row, of)] = if signs >> row & 1 == 0 { 1.0 } else { -1.0 };
+            }
+            axes
+        })
+    })
+}
+
+/// How well some axes fit: r² of each window [m²/s⁴].
+struct Fit {
+    squares: Vec<f64>,
+}
+
+impl Fit {
+    fn of(
+        windows: &[Vec<Block>],
+        axes: &Matrix3<f64>,
+        mut bias: Vector3<f64>,
+        gravity_m_per_s2: f64,
+    ) -> Self {
+        // Least squares of r over what is left of the bias, r = m_B − m_A + J b, a few times: large ones turn it far.
+        let held = (RESIDUAL_M_PER_S2 / BIAS_RAD_PER_S).powi(2);
+        let mut squares = Vec::new();
+        for _ in 0..ROUNDS {
+            let seen: Vec<Seen> = (windows.iter())
+                .map(|window| Seen::of(window, axes, bias))
+                .collect();
+            let mut normal = Matrix3::identity() * held;
+            let mut right = -held * bias;
+            for s in &seen {
+                normal += s.by_bias.transpose() * s.by_bias;
+                right -= s.by_bias.transpose() * s.moved;
+            }
+            let Some(cholesky) = normal.cholesky() else {
+                break;
+            };
+            let more = cholesky.solve(&right);
+            bias += more;
+            let square = |s: &Seen| {
+                let moved = s.moved + s.by_bias * more;
+                moved.norm_squared() + (s.length - gravity_m_per_s2).powi(2)
+            };
+            squares = seen.iter().map(square).collect();
+        }
+        Self { squares }
+    }
+
+    fn rms(&self) -> f64 {
+        (self.squares.iter().sum::<f64>() / self.squares.len() as f64).sqrt()
+    }
+}
+
+/// What a window shows of gravity.
+struct Seen {
+    /// m_B − m_A [m/s²].
+    moved: Vector3<f64>,
+    /// What a bias adds to it [m/s² per rad/s].
+    by_bias: Matrix3<f64>,
+    /// ½|m_A + m_B| [m/s²].
+    length: f64,
+}
+
+impl Seen {
+    fn of(window: &[Block], axes: &Matrix3<f64>, bias: Vector3<f64>) -> Self {
+        let whole_s: f64 = window.iter().map(|b| b.step_s).sum();
+        let mut turn = UnitQuaternion::identity();
+        let (mut means, mut weights) = ([Vector3::zeros(); 2], [0.0; 2]);
+        let (mut turned, mut by_bias) = (Matrix3::zeros(), [Matrix3::zeros(); 2]);
+        let mut t_s = 0.0;
+        for block in window {
+            let half =
+                UnitQuaternion::from_scaled_axis(axes * (block.rate - bias) * (0.5 * block.step_s));
+            turn *= half;
+            let felt = turn * block.force;
+            let turning = turn.to_rotation_matrix().matrix() * axes * block.step_s;
+            t_s += 0.5 * block.step_s;
+            let phase = 2.0 * t_s / whole_s;
+            let part = usize::from(phase >= 1.0);
+            let w = (std::f64::consts::PI * phase).sin().powi(2) * block.step_s;
+            weights[part] += w;
+            means[part] += felt * w;
+            // A bias turns it too far by ∫ R P b dt.
+            by_bias[part] += felt.cross_matrix() * (turned + 0.5 * turning) * w;
+            turned += turning;
+            turn *= half;
+            turn.renormalize_fast();
+            t_s += 0.5 * block.step_s;
+        }
+        let [a, b] = [0, 1].map(|part| means[part] / weights[part]);
+        Self {
+            moved: b - a,
+            by_bias: by_bias[1] / weights[1] - by_bias[0] / weights[0],
+            length: 0.5 * (a + b).norm(),
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::random::Random;
+    use std::f64::consts::TAU;
+
+    const G: f64 = 9.80665;
+
+    /// A minute of a device that tilts by some degrees to all sides, shaken meanwhile, its gyroscope with a bias.
+    fn tilting(amplitude_rad: f64, shaken_m_per_s2: f64, bias: [f64; 3]) -> Track {
+        let mut random = Random(5);
+        let attitude = |t: f64| {
+            let tilt = |hz: f64, phase: f64| amplitude_rad * (TAU * hz * t + phase).sin();
+            let heading = 1.5 * (TAU * 0.07 * t).sin();
+            UnitQuaternion::from_euler_angles(tilt(0.23, 0.0), tilt(0.31, 1.0), heading)
+        };
+        let mut track = Track::default();
+        for k in 0..6000 {
+            let (t, e) = (0.01 * f64::from(k), 1e-4);
+            let turn = attitude(t - e).inverse() * attitude(t + e);
+            let rate = turn.scaled_axis() / (2.0 * e) + Vector3::from(bias);
+            let shake = |axis: f64| shaken_m_per_s2 * (TAU * 2.0 * t + axis).sin();
+            let felt = Vector3::new(shake(0.0), shake(1.0), G + shake(2.0));
+            let noise = Vector3::from_fn(|_, _| 0.02 * random.normal());
+            track.t_s.push(t);
+            track.gyro_rad_per_s.push((rate + 0.1 * noise).into());
+            track
+                .accel_m_per_s2
+                .push((attitude(t).inverse() * felt + noise).into());
+        }
+        track
+    }
+
+    fn exchanged(track: &Track, axes: &Matrix3<f64>) -> Track {
+        let mut out = track.clone();
+        for rate in &mut out.gyro_rad_per_s {
+            *rate = (axes * Vector3::from(*rate)).into();
+        }
+        out
+    }
+
+    #[test]
+    fn any_exchange_of_axes_is_found_and_named() {
+        for (degrees, bias) in [(6.0, 0.0), (25.0, 0.1)] {
+            let track = tilting(f64::to_radians(degrees), 2.0, [bias, -bias, bias]);
+            assert_eq!(misfit(&track, G), None, "{degrees}");
+            for axes in signed_permutations().filter(|a| *a != Matrix3::identity()) {
+                let found = misfit(&exchanged(&track, &axes), G);
+                let found = found.unwrap_or_else(|| panic!("{degrees}°: {axes} is not found"));
+                // What was done is undone by its inverse.
+                let mut back = Matrix3::zeros();
+                for (row, (of, turned)) in found.read_as.into_iter().enumerate() {
+                    back[(row, of)] = if turned { -1.0 } else { 1.0 };
+                }
+                assert_eq!((back * axes, found.others), (Matrix3::identity(), 0));
+            }
+        }
+    }
+
+    #[test]
+    fn turning_about_one_axis_tells_of_that_axis() {
+        let mut track = tilting(0.0, 1.0, [0.0; 3]);
+        for (k, t) in track.t_s.iter().enumerate() {
+            let roll = 0.4 * (TAU * 1.07 * t).sin();
+            let rate = 0.4 * TAU * 1.07 * (TAU * 1.07 * t).cos();
+            let upright = UnitQuaternion::from_axis_angle(&Vector3::x_axis(), roll);
+            track.gyro_rad_per_s[k] = [rate, 0.0, 0.0];
+            track.accel_m_per_s2[k] = (upright.inverse() * Vector3::new(0.0, 0.0, G)).into();
+        }
+        assert_eq!(misfit(&track, G), None);
+        let mirror = Matrix3::from_diagonal(&Vector3::new(-1.0, 1.0, 1.0));
+        let found = misfit(&exchanged(&track, &mirror), G).unwrap();
+        assert_eq!(found.read_as, [(0, true), (1, false), (2, false)]);
+        assert!(found.others > 0 && found.told().contains("−x, y, z"));
+    }
+
+    #[test]
+    fn what_does_not_tilt_says_nothing() {
+        let mut still = tilting(0.0, 3.0, [0.0; 3]);
+        let mut random = Random(7);
+        for rate in still.gyro_rad_per_s.iter_mut() {
+            *rate = [0.15, -0.35, -0.05].map(|bias| bias + 0.01 * random.normal());
+        }
+        for axes in signed_permutations() {
+            assert_eq!(misfit(&exchanged(&still, &axes), G), None, "{axes}");
+        }
+    }
+}
