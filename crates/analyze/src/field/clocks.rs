@@ -188,7 +188,12 @@ impl Clocks {
     /// A clock beside that of the rath's sensor, in words.
     fn against(&self, clock: &Clock, [ahead_s, fast_ppm]: [f64; 2]) -> String {
         let fast = match clock.drift_sd_ppm {
-            Some(sd_ppm) => format!("{fast_ppm:+.0} ± {:.0} ppm fast", 1.96 * sd_ppm),
+            // A drift that rounds to none has no sign.
+            Some(sd_ppm) => format!(
+                "{:+.0} ± {:.0} ppm fast",
+                fast_ppm.round() + 0.0,
+                1.96 * sd_ppm
+            ),
             None => "too short to tell how fast".to_owned(),
         };
         format!(
