@@ -7,6 +7,7 @@ use crate::mechanism::spline_derivatives;
 use crate::peaks::SpectrumSummary;
 use crate::phase;
 use crate::spectrum::{Mode, Options, spectrogram};
+use crate::summary::rounding;
 use recording::{text::counted, topics};
 use std::ops::Range;
 
@@ -175,7 +176,7 @@ pub fn plots(a: &Analysis) -> Vec<Plot> {
     let i = &a.inputs;
     let mut out = Vec::new();
     let mut panel = |p: Panel| {
-        if !p.series.is_empty() {
+        if p.series.iter().any(|s| !s.x.is_empty()) {
             out.push(Plot::Panel(p));
         }
     };
@@ -294,7 +295,16 @@ pub fn plots(a: &Analysis) -> Vec<Plot> {
     let traces = (a.traces.iter()).filter(|t| !t.topic.starts_with(topics::ENERGY));
     let last = traces.clone().count().saturating_sub(1);
     for (k, trace) in traces.enumerate() {
-        let mut p = Panel::over_time("signals", &trace.topic, &unit(&trace.label), a);
+        // One signal alone says what it is.
+        let (title, label) = match &trace.series[..] {
+            [(name, ..)] => (format!("{}.{name}", trace.topic), name.as_str()),
+            _ => (trace.topic.clone(), "value"),
+        };
+        let label = match trace.unit.as_str() {
+            "" => label.to_owned(),
+            known => unit(known),
+        };
+        let mut p = Panel::over_time("signals", &title, &label, a);
         // That beats are counted is no curve.
         let counts = |name: &str| trace.topic == topics::BEAT && name == "number";
         for (name, t_s, x) in trace.series.iter().filter(|(name, ..)| !counts(name)) {
@@ -476,6 +486,17 @@ fn inside(t_s: &[f64], window: Window) -> Range<usize> {
     window.range(t_s)
 }
 
+/// Whether a column's finite values differ by more than [`rounding`].
+fn moves(x: &[f64]) -> bool {
+    let known: Vec<f64> = x.iter().copied().filter(|x| x.is_finite()).collect();
+    let (low, high) = known
+        .iter()
+        .fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), x| {
+            (l.min(*x), h.max(*x))
+        });
+    high - low > rounding(&known)
+}
+
 /// Roll against its rate in the window.
 fn portrait(a: &Analysis) -> Option<Panel> {
     let i = &a.inputs;
@@ -485,6 +506,10 @@ fn portrait(a: &Analysis) -> Option<Panel> {
     let range = inside(&i.t_s, a.window);
     let (t_s, roll) = (&i.t_s[range.clone()], &i.roll_rad[range]);
     let step_s = mean_step_s(t_s)?;
+    // A rath that does not roll has no portrait.
+    if !moves(roll) {
+        return None;
+    }
     let mut rate = vec![f64::NAN; roll.len()];
     for stretch in stretches(t_s, 0.0) {
         if let Some((first, _)) = spline_derivatives(&roll[stretch.clone()], step_s) {
@@ -520,6 +545,9 @@ fn force_plane(a: &Analysis) -> Option<Panel> {
         return None;
     };
     let range = inside(i.force_times(), a.window);
+    if !moves(&first[range.clone()]) && !moves(&second[range.clone()]) {
+        return None;
+    }
     let mut p = Panel::new(
         "force_plane",
         "One handle against the other",
@@ -559,6 +587,9 @@ fn roll_spectrogram(a: &Analysis) -> Option<Image> {
     }
     // Dark where nothing was measured; not at all where that is most of it.
     let (roll, step_s) = about_mean(&i.t_s, &i.roll_rad)?;
+    if !moves(&i.roll_rad) {
+        return None;
+    }
     let fs_hz = 1.0 / step_s;
     let nperseg = (SPECTROGRAM_SEGMENT_S * fs_hz).round() as usize;
     if roll.len() < i.roll_rad.len() || roll.len() < 2 * nperseg {
