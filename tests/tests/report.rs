@@ -248,14 +248,31 @@ fn a_rath_at_rest_shows_no_rounding() {
             .any(|m| t.contains(m))
     };
     assert_eq!(titles.iter().find(moving), None);
-    // Levels that lie close together have names that do not.
-    let held = made_of("strict-contact");
-    let phone = Look {
-        width: 400,
-        ..SCREEN
-    };
-    let mut page = browser.open(&held.page, phone);
-    nothing(&mut page, OVERLAPPING, "unreadable on a phone");
+    // One sample is seen, is one sample, and has no table of metrics without metrics.
+    let folder = still.folder.path();
+    let short = [
+        "record",
+        "stand-still",
+        "--duration",
+        "0.001",
+        "--out",
+        "one.mcap",
+    ];
+    good(run_in(folder, "sim", &short));
+    good(run_in(
+        folder,
+        "analyze",
+        &["one.mcap", "--report", "one.html"],
+    ));
+    let mut page = browser.open(&folder.join("one.html"), SCREEN);
+    nothing(&mut page, SAYS_NOTHING, "says nothing");
+    let header = page.evaluate("document.querySelector('header').textContent");
+    assert!(
+        header.as_str().is_some_and(|h| h.contains(" 1 sample;")),
+        "{header}"
+    );
+    let dot = page.evaluate("getComputedStyle(document.querySelector('.curve')).strokeWidth");
+    assert_eq!(dot, json!("6px"));
 }
 
 #[test]

@@ -43,6 +43,8 @@ const MAP: [[u8; 3]; 9] = [
 
 /// Events listed; more are counted.
 const MOST_EVENTS: usize = 400;
+/// Signals listed.
+const MOST_SIGNALS: usize = 2000;
 
 /// The page for one recording. `command` is the command line that makes it again.
 pub fn html(a: &Analysis, command: &str) -> String {
@@ -107,9 +109,9 @@ fn head(out: &mut String, a: &Analysis, title: &str) {
     );
     let _ = write!(
         out,
-        "{:.3} s, {} samples; analysed from {:.3} to {:.3} s",
+        "{:.3} s, {}; analysed from {:.3} to {:.3} s",
         a.duration_s,
-        thousands(a.samples),
+        several(a.samples, "sample"),
         a.window.start_s,
         a.window.end_s
     );
@@ -130,6 +132,22 @@ fn head(out: &mut String, a: &Analysis, title: &str) {
         );
     }
     out.push_str("</header>\n");
+}
+
+/// So many of something.
+fn several(count: u64, what: &str) -> String {
+    let s = if count == 1 { "" } else { "s" };
+    format!("{} {what}{s}", thousands(count))
+}
+
+/// That a list is not whole, where it is not.
+fn first(count: usize, most: usize) -> String {
+    match count > most {
+        true => format!(
+            "<p class=\"faint\">The first {most} are listed; <code>--format json</code> has all.</p>\n"
+        ),
+        false => String::new(),
+    }
 }
 
 /// With a capital.
@@ -196,6 +214,7 @@ fn tiles(out: &mut String, a: &Analysis) {
 
 fn figures_section(out: &mut String, plots: &[Plot]) {
     if plots.is_empty() {
+        out.push_str("<p class=\"faint\">Nothing is drawn: no signal changes.</p>\n");
         return;
     }
     out.push_str(
@@ -219,52 +238,55 @@ fn figures_section(out: &mut String, plots: &[Plot]) {
 }
 
 fn metrics_section(out: &mut String, a: &Analysis) {
-    let _ = writeln!(
-        out,
-        "<h2 id=\"metrics\">Metrics</h2>\n<p class=\"faint\">Each opens to its definition, where W is the stretch that is analysed, from {:.3} to {:.3} s.</p>",
-        a.window.start_s, a.window.end_s
-    );
-    out.push_str("<div class=\"scroll\"><table class=\"metrics\"><thead><tr><th>metric</th><th class=\"n\">value</th><th>unit</th><th>from</th></tr></thead><tbody>\n");
+    out.push_str("<h2 id=\"metrics\">Metrics</h2>\n");
     let known = |missing: bool| {
         let all = a.metrics.iter();
         all.filter(move |(_, value)| (value.datum == Datum::Missing) == missing)
             .filter_map(|(name, value)| Some((name, value, metrics::find(name)?)))
     };
-    for (name, value, metric) in known(false) {
-        let unit = if matches!(value.unit, "1" | "bool" | "-") {
-            ""
-        } else {
-            value.unit
-        };
-        let mut more = definition(name, metric);
-        if let Some(reason) = &value.reason {
-            let _ = write!(more, "<p>{}</p>", escaped(reason));
-        }
-        if !value.per.is_empty() {
-            let per: Vec<String> = value.per.iter().take(64).map(|x| figures(*x)).collect();
-            let _ = write!(
-                more,
-                "<p class=\"faint\"><code>per</code>: {}</p>",
-                per.join(", ")
-            );
-        }
-        if let Some([low, high]) = value.ci95 {
-            let _ = write!(
-                more,
-                "<p class=\"faint\">95 % interval: {} … {}</p>",
-                figures(low),
-                figures(high)
-            );
-        }
+    if known(false).count() > 0 {
         let _ = writeln!(
             out,
-            "<tr><td><details><summary>{}</summary>{more}</details></td><td class=\"n\">{}</td><td>{unit}</td><td>{}</td></tr>",
-            escaped(metric.label),
-            shown(&value.datum),
-            escaped(&value.source)
+            "<p class=\"faint\">Each opens to its definition, where W is the stretch that is analysed, from {:.3} to {:.3} s.</p>",
+            a.window.start_s, a.window.end_s
         );
+        out.push_str("<div class=\"scroll\"><table class=\"metrics\"><thead><tr><th>metric</th><th class=\"n\">value</th><th>unit</th><th>from</th></tr></thead><tbody>\n");
+        for (name, value, metric) in known(false) {
+            let unit = if matches!(value.unit, "1" | "bool" | "-") {
+                ""
+            } else {
+                value.unit
+            };
+            let mut more = definition(name, metric);
+            if let Some(reason) = &value.reason {
+                let _ = write!(more, "<p>{}</p>", escaped(reason));
+            }
+            if !value.per.is_empty() {
+                let per: Vec<String> = value.per.iter().take(64).map(|x| figures(*x)).collect();
+                let _ = write!(
+                    more,
+                    "<p class=\"faint\"><code>per</code>: {}</p>",
+                    per.join(", ")
+                );
+            }
+            if let Some([low, high]) = value.ci95 {
+                let _ = write!(
+                    more,
+                    "<p class=\"faint\">95 % interval: {} … {}</p>",
+                    figures(low),
+                    figures(high)
+                );
+            }
+            let _ = writeln!(
+                out,
+                "<tr><td><details><summary>{}</summary>{more}</details></td><td class=\"n\">{}</td><td>{unit}</td><td>{}</td></tr>",
+                escaped(metric.label),
+                shown(&value.datum),
+                escaped(&value.source)
+            );
+        }
+        out.push_str("</tbody></table></div>\n");
     }
-    out.push_str("</tbody></table></div>\n");
     let missing = known(true).count() as u64;
     if missing == 0 {
         return;
@@ -345,17 +367,12 @@ fn events_section(out: &mut String, a: &Analysis) {
         .collect();
     let _ = write!(
         out,
-        "<h2 id=\"events\">Events</h2>\n<details{}><summary>{} in all: {}</summary>\n",
+        "<h2 id=\"events\">Events</h2>\n<details{}><summary>{}: {}</summary>\n",
         if a.events.len() <= 20 { " open" } else { "" },
-        thousands(a.events.len() as u64),
+        several(a.events.len() as u64, "event"),
         kinds.join(", ")
     );
-    if a.events.len() > MOST_EVENTS {
-        let _ = writeln!(
-            out,
-            "<p class=\"faint\">The first {MOST_EVENTS} are listed; <code>--format json</code> has all.</p>"
-        );
-    }
+    out.push_str(&first(a.events.len(), MOST_EVENTS));
     out.push_str("<div class=\"scroll\"><table><thead><tr><th class=\"n\">time, s</th><th>kind</th><th>what</th></tr></thead><tbody>\n");
     for e in a.events.iter().take(MOST_EVENTS) {
         let _ = writeln!(
@@ -396,9 +413,9 @@ fn recording_section(out: &mut String, a: &Analysis) {
     };
     let _ = write!(
         out,
-        "<h2 id=\"recording\">Recording</h2>\n<p><code>{}</code>: {} messages{}{}{}.</p>\n",
+        "<h2 id=\"recording\">Recording</h2>\n<p><code>{}</code>: {}{}{}{}.</p>\n",
         escaped(&a.file),
-        thousands(a.messages),
+        several(a.messages, "message"),
         said("profile", &a.profile),
         said("written by", &a.library),
         if a.salvaged {
@@ -452,10 +469,11 @@ fn signals_section(out: &mut String, a: &Analysis) {
     }
     let _ = write!(
         out,
-        "<h2 id=\"signals\">Signals</h2>\n<details><summary>{} numeric signals</summary><div class=\"scroll\"><table><thead><tr><th>signal</th><th>unit</th><th class=\"n\">count</th><th class=\"n\">Hz</th><th class=\"n\">min</th><th class=\"n\">mean</th><th class=\"n\">max</th><th class=\"n\">SD</th><th class=\"n\">peak, Hz</th></tr></thead><tbody>\n",
-        a.signals.len()
+        "<h2 id=\"signals\">Signals</h2>\n<details><summary>{}</summary>{}<div class=\"scroll\"><table><thead><tr><th>signal</th><th>unit</th><th class=\"n\">count</th><th class=\"n\">Hz</th><th class=\"n\">min</th><th class=\"n\">mean</th><th class=\"n\">max</th><th class=\"n\">SD</th><th class=\"n\">peak, Hz</th></tr></thead><tbody>\n",
+        several(a.signals.len() as u64, "numeric signal"),
+        first(a.signals.len(), MOST_SIGNALS)
     );
-    for (path, s) in a.signals.iter().take(2000) {
+    for (path, s) in a.signals.iter().take(MOST_SIGNALS) {
         let cell =
             |x: Option<f64>| format!("<td class=\"n\">{}</td>", x.map_or("–".into(), figures));
         let _ = writeln!(
@@ -543,7 +561,7 @@ fn rounded(x: &[f64], digits: usize) -> Value {
 }
 
 /// Text that is safe between tags and in attributes.
-fn escaped(text: &str) -> String {
+pub(super) fn escaped(text: &str) -> String {
     text.replace('&', "&amp;")
         .replace('<', "&lt;")
         .replace('>', "&gt;")

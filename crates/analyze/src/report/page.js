@@ -166,7 +166,8 @@
         if (pen === "M" && !isFinite(this.sy(s.y[i + 1]))) d += "h0";
         pen = "L";
       }
-      el(parent, "path", { class: "curve", d, style: `stroke:${colour}`, "data-points": to - from, "data-name": s.name });
+      const size = to - from === 1 ? "stroke-width:6;" : ""; // a sample alone is to be seen
+      el(parent, "path", { class: "curve", d, style: `${size}stroke:${colour}`, "data-points": to - from, "data-name": s.name });
     }
 
     paint() { // the spectrogram, cell by cell, under the axes

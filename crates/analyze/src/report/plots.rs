@@ -64,8 +64,8 @@ pub struct Panel {
     pub points: bool,
     /// The abscissa is the recording's time: such panels are zoomed together.
     pub time: bool,
-    /// Where nobody can zoom, only the last so many seconds are drawn: all of them would be one patch of colour.
-    pub last_s: Option<f64>,
+    /// Where nobody can zoom, only so many seconds are drawn, of the middle of the window: all of them would be one patch of colour.
+    pub shown_s: Option<f64>,
 }
 
 impl Panel {
@@ -85,7 +85,7 @@ impl Panel {
             x_range: None,
             points: false,
             time: false,
-            last_s: None,
+            shown_s: None,
         }
     }
 
@@ -165,7 +165,7 @@ pub enum Plot {
 }
 
 /// Seconds of quick curves in a picture that nobody can zoom.
-const LAST_S: f64 = 10.0;
+const SHOWN_S: f64 = 10.0;
 /// Events marked in plots over time: kinds of which there are at most this many.
 const MOST_MARKS: usize = 12;
 /// Highest frequency shown in spectra, as a multiple of f.
@@ -208,7 +208,7 @@ pub fn plots(a: &Analysis) -> Vec<Plot> {
     panel(height);
 
     let mut forces = Panel::over_time("forces", "Normal forces of the handles", "force, N", a);
-    forces.last_s = Some(LAST_S);
+    forces.shown_s = Some(SHOWN_S);
     if i.normal_n.len() <= COLOURS.len() {
         for (k, n) in i.normal_n.iter().enumerate() {
             forces.line(format!("handle {}", k + 1), i.force_times(), n);
@@ -235,7 +235,7 @@ pub fn plots(a: &Analysis) -> Vec<Plot> {
         }
         _ => support.line("specific force", &i.t_s, &i.support_ratio),
     }
-    support.last_s = Some(LAST_S);
+    support.shown_s = Some(SHOWN_S);
     support.levels = vec![
         (crate::metrics::FLOAT_SHARE, "0.05".into()),
         (1.0, "at rest".into()),
@@ -359,7 +359,7 @@ fn marks(a: &Analysis) -> Vec<(f64, String)> {
         .collect()
 }
 
-/// A plot of energies: id, title, note, the fields of the ledger with their names, and what [`Panel::last_s`] says.
+/// A plot of energies: id, title, note, the fields of the ledger with their names, and what [`Panel::shown_s`] says.
 type Energies = (
     &'static str,
     &'static str,
@@ -379,7 +379,7 @@ const ENERGIES: [Energies; 2] = [
             ("potential_j", "potential"),
             ("elastic_j", "elastic"),
         ],
-        Some(LAST_S),
+        Some(SHOWN_S),
     ),
     (
         "ledger",
@@ -394,11 +394,11 @@ const ENERGIES: [Energies; 2] = [
     ),
 ];
 
-fn energies(a: &Analysis, &(id, title, note, fields, last_s): &Energies) -> Option<Panel> {
+fn energies(a: &Analysis, &(id, title, note, fields, shown_s): &Energies) -> Option<Panel> {
     let trace = a.traces.iter().find(|t| t.topic == topics::ENERGY)?;
     let mut p = Panel::over_time(id, title, "energy, J", a);
     p.note = note.into();
-    p.last_s = last_s;
+    p.shown_s = shown_s;
     for (field, name) in fields {
         let Some((_, t_s, j)) = trace.series.iter().find(|(known, ..)| *known == field) else {
             continue;
