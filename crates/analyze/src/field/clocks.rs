@@ -256,6 +256,25 @@ mod tests {
     }
 
     #[test]
+    fn a_drift_that_rounds_to_none_has_no_sign() {
+        let clock = Clock {
+            offset_s: 0.0,
+            offset_sd_s: 0.0015,
+            drift_ppm: 0.0,
+            drift_sd_ppm: Some(10.7),
+            at_s: 0.0,
+            points: 9,
+        };
+        let said = |fast_ppm| Clocks::default().against(&clock, [-3.0638, fast_ppm]);
+        assert!(
+            said(-0.2).ends_with(" and +0 ± 21 ppm fast"),
+            "{}",
+            said(-0.2)
+        );
+        assert!(said(-17.4).ends_with(" and -17 ± 21 ppm fast"));
+    }
+
+    #[test]
     fn taps_are_no_beats() {
         let left = |tap_s: &[f64]| {
             let clocks = Clocks {
