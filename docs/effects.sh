@@ -55,11 +55,13 @@ workspace() { # [EFFECT]...: a workspace in which these are not: their files, th
     sed -i '/^pub mod replay;/d; /^pub mod cases;/d' "$sim/src/lib.rs"
     sed -i -z 's/\[\[bin\]\]\nname = "sim"\npath = "src\/main.rs"\n//' "$sim/Cargo.toml"
     effects=$sim/src/effects
+    # Why an effect does nothing is for `sim explain` alone.
+    sed -i '/^fn .*(e: &Effects) -> Option/,/^}/{/^fn/b; s/^}/    None\n}/; t; d}' "$effects/mod.rs"
     for e in "$@"; do
         rm "$effects/$e.rs"
         sed -i "/^pub mod $e;/d; /^    pub $e: Option</d" "$effects/mod.rs"
-        sed -i -z "s/    entry!(\s*$e,\s*\"[^\"]*\"\s*),\n//" "$effects/mod.rs"
-        sed -i "s/scene\.effects\.$e\.is_some()/false/; s/scene\.effects\.$e\.is_none()/true/" "$effects"/*.rs
+        sed -i -z -E "s/    entry!\((\n        )?$e,([^\n]*\),\n|\n(        [^\n]*\n)*    \),\n)//" "$effects/mod.rs"
+        sed -i -E "s/\b(scene\.effects|e)\.$e\.is_some\(\)/false/; s/\b(scene\.effects|e)\.$e\.is_none\(\)/true/" "$effects"/*.rs
     done
     (cd "$COPY" && cargo build --quiet --release -p sim --example cost --target-dir ../target 2>"$TMP/build.log") ||
         { cat "$TMP/build.log" >&2; return 1; }

@@ -203,7 +203,7 @@ def hold(axis):
     for damping, colour in ((0.0, GREY), (30.0, GREEN), (150.0, BLUE)):
         t, y = state(text, f"effects.hold.damping_n_s_per_m={damping}", of=lambda m: m.position_m.y)
         axis.plot(t, 1e3 * y, color=colour, lw=1, label=f"$c_t$ = {damping:g} N·s/m")
-    axis.set(xlabel="time (s)", ylabel="body sideways (mm)", xlim=(0, 3))
+    axis.set(xlabel="time (s)", ylabel="body sideways (mm)", xlim=(0, 3), ylim=(-56, 88))
 
 
 def sling(axis):
@@ -271,7 +271,7 @@ def imu(axis):
         late = t > 20
         axis.plot(t[late], z[late], color=colour, lw=1, label=topic)
     axis.axhline(9.81, color=RED, lw=0.8)
-    axis.set(xlabel="time (s)", ylabel="specific force, sensor's z (m/s²)")
+    axis.set(xlabel="time (s)", ylabel="specific force, sensor's z (m/s²)", ylim=(-7, 36))
 
 
 def drum(axis):
@@ -283,7 +283,7 @@ def drum(axis):
     for beat, _ in sound["/beat"]:
         if 6.0 < beat < 7.6:
             axis.axvline(beat, color=RED, lw=1)
-    axis.set(xlabel="time (s); red: /beat", ylabel="sound, full scale is 1")
+    axis.set(xlabel="time (s); vermilion: /beat", ylabel="sound, full scale is 1")
 
 
 sheet(2, 3, "phases", [frequency_spread, coupling, music, noise, feedback])

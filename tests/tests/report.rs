@@ -14,7 +14,7 @@ const SCREEN: Look = Look {
     scheme: "light",
 };
 
-/// A run of `music`, its report, and the numbers that `analyze` prints of it.
+/// A run of a scene, its report, and the numbers that `analyze` prints of it.
 struct Made {
     folder: tempfile::TempDir,
     page: PathBuf,
@@ -22,12 +22,17 @@ struct Made {
 }
 
 fn made() -> Made {
+    made_of("music")
+}
+
+fn made_of(scene: &str) -> Made {
     let folder = tempfile::tempdir().expect("a folder");
     let command = |name: &str, args: &[&str]| good(run_in(folder.path(), name, args));
-    command("sim", &["record", "music", "--out", "music.mcap"]);
-    let args = ["music.mcap", "--report", "music.html", "--format", "json"];
+    let [recording, page] = ["mcap", "html"].map(|e| format!("{scene}.{e}"));
+    command("sim", &["record", scene, "--out", &recording]);
+    let args = [&recording, "--report", &page, "--format", "json"];
     let numbers = tests::json(&command("analyze", &args));
-    let page = folder.path().join("music.html");
+    let page = folder.path().join(page);
     Made {
         folder,
         page,
@@ -58,6 +63,25 @@ const OVERLAPPING: &str = r#"[...document.querySelectorAll("figure[data-plot] sv
     Math.min(p.right, q.right) - Math.max(p.left, q.left) > 2 && Math.min(p.bottom, q.bottom) - Math.max(p.top, q.top) > 4)
     .map(([b]) => svg.getAttribute("aria-label") + ": " + a + " / " + b));
 })"#;
+
+/// Plots in which nothing is drawn, and those of which two ticks of an axis say the same.
+const SAYS_NOTHING: &str = r#"[...document.querySelectorAll("figure[data-plot] svg")].flatMap(svg => {
+  const drawn = svg.querySelector("image") || [...svg.querySelectorAll(".curve")].some(c => c.getAttribute("d"));
+  const up = [...svg.querySelectorAll('text[text-anchor="end"]:not(.note)')].map(t => t.textContent);
+  return drawn && up.length > 1 && new Set(up).size === up.length ? [] : [svg.getAttribute("aria-label") + ": " + up];
+})"#;
+
+/// Curves in planes that leave their drawing, or lie on its frame.
+const ON_THE_FRAME: &str = r#"[...document.querySelectorAll("figure:not(.wide) svg")].filter(svg => svg.getAttribute("aria-label").match(/portrait|against/)).filter(svg => {
+  const [curve, frame] = [svg.querySelector(".curve").getBBox(), svg.querySelector("clipPath rect").getBBox()];
+  return curve.x < frame.x + 5 || curve.x + curve.width > frame.x + frame.width - 5;
+}).map(svg => svg.getAttribute("aria-label"))"#;
+
+/// Levels that a curve covers.
+const COVERED: &str = r#"[...document.querySelectorAll("figure[data-plot] svg")].filter(svg => {
+  const [curve, level] = [[...svg.querySelectorAll(".curve")].pop(), svg.querySelector(".level")];
+  return level && !(curve.compareDocumentPosition(level) & Node.DOCUMENT_POSITION_FOLLOWING);
+}).map(svg => svg.getAttribute("aria-label"))"#;
 
 /// Lightness of a computed colour, 0 to 1: `rgb(r, g, b)`.
 fn lightness(page: &mut Page<'_>, selector: &str, property: &str) -> f64 {
@@ -159,7 +183,10 @@ fn the_report_fits_phones_screens_paper_and_the_dark() {
         nothing(&mut page, OVERLAPPING, &format!("unreadable at {width} px"));
         assert!(lightness(&mut page, "body", "backgroundColor") > 0.9);
         assert!(lightness(&mut page, "svg text", "fill") < 0.2);
+        nothing(&mut page, ON_THE_FRAME, &format!("cut at {width} px"));
+        nothing(&mut page, COVERED, "levels under curves");
     }
+    let blue = lightness(&mut page, ".curve", "stroke");
     let dark = Look {
         scheme: "dark",
         ..SCREEN
@@ -168,6 +195,8 @@ fn the_report_fits_phones_screens_paper_and_the_dark() {
     assert!(lightness(&mut page, "body", "backgroundColor") < 0.15);
     assert!(lightness(&mut page, "body", "color") > 0.7);
     assert!(lightness(&mut page, "svg text", "fill") > 0.7);
+    // The first colour, a deep blue, would not be seen on dark paper.
+    assert!(lightness(&mut page, ".curve", "stroke") > blue + 0.1);
     // Paper is white whatever the screen is, and shows the definitions that a click opens elsewhere, and no buttons.
     page.look(Look {
         width: 720,
@@ -175,6 +204,7 @@ fn the_report_fits_phones_screens_paper_and_the_dark() {
         ..dark
     });
     assert!(lightness(&mut page, "body", "color") < 0.2);
+    assert_eq!(lightness(&mut page, ".curve", "stroke"), blue);
     nothing(&mut page, CLIPPED, "clipped in print");
     let hidden = "getComputedStyle(document.querySelector('button')).display";
     assert_eq!(page.evaluate(hidden), json!("none"));
@@ -200,6 +230,92 @@ fn the_report_fits_phones_screens_paper_and_the_dark() {
     let swatch = "getComputedStyle(document.querySelector('.legend i')).printColorAdjust";
     assert_eq!(page.evaluate(swatch), json!("exact"));
     drop(made.folder);
+}
+
+#[test]
+fn a_rath_at_rest_shows_no_rounding() {
+    let Some(mut browser) = Browser::start() else {
+        return;
+    };
+    let still = made_of("stand-still");
+    let mut page = browser.open(&still.page, SCREEN);
+    nothing(&mut page, OVERLAPPING, "unreadable");
+    nothing(&mut page, SAYS_NOTHING, "says nothing");
+    let titles: Vec<String> = drawn(&mut page).into_iter().map(|(t, ..)| t).collect();
+    let moving = |t: &&String| {
+        ["Spectr", "portrait", "against"]
+            .iter()
+            .any(|m| t.contains(m))
+    };
+    assert_eq!(titles.iter().find(moving), None);
+    // One sample is seen, is one sample, and has no table of metrics without metrics.
+    let folder = still.folder.path();
+    let short = [
+        "record",
+        "stand-still",
+        "--duration",
+        "0.001",
+        "--out",
+        "one.mcap",
+    ];
+    good(run_in(folder, "sim", &short));
+    good(run_in(
+        folder,
+        "analyze",
+        &["one.mcap", "--report", "one.html"],
+    ));
+    let mut page = browser.open(&folder.join("one.html"), SCREEN);
+    nothing(&mut page, SAYS_NOTHING, "says nothing");
+    let header = page.evaluate("document.querySelector('header').textContent");
+    assert!(
+        header.as_str().is_some_and(|h| h.contains(" 1 sample;")),
+        "{header}"
+    );
+    let dot = page.evaluate("getComputedStyle(document.querySelector('.curve')).strokeWidth");
+    assert_eq!(dot, json!("6px"));
+}
+
+#[test]
+fn a_report_says_first_what_it_knows_and_why_it_knows_no_more() {
+    let Some(mut browser) = Browser::start() else {
+        return;
+    };
+    let made = made();
+    let whole = std::fs::read(made.folder.path().join("music.mcap")).expect("a file");
+    let half = made.folder.path().join("half.mcap");
+    std::fs::write(&half, &whole[..whole.len() / 2]).expect("written");
+    let args = ["half.mcap", "--report", "half.html"];
+    let done = run_in(made.folder.path(), "analyze", &args);
+    assert_eq!(done.status.code(), Some(3));
+    let mut page = browser.open(&made.folder.path().join("half.html"), SCREEN);
+    let warned =
+        page.evaluate("[...document.querySelectorAll('header .warn')].map(p => p.textContent)");
+    let warned: Vec<String> = serde_json::from_value(warned).expect("texts");
+    assert!(
+        matches!(&warned[..], [only] if only.starts_with("The file is damaged; its end is missing")),
+        "{warned:?}"
+    );
+
+    let mut page = browser.open(&made.page, SCREEN);
+    let mut text = |selector: &str| {
+        let text = page.evaluate(&format!("document.querySelector({selector:?}).textContent"));
+        text.as_str().expect("text").to_owned()
+    };
+    let large = made.numbers["metrics"]["rms_roll_deg"]["value"].as_f64();
+    let large = format!("{:.1}", large.expect("a number"));
+    assert_eq!(text(".tile:nth-child(2) b"), large);
+    assert!(
+        !text(".metrics tbody").contains('–'),
+        "no value, unsaid why"
+    );
+    assert!(text("#missing").contains("no carrier's steps in the recording"));
+    let events = text("#events + details > summary");
+    assert!(
+        events.contains(" × contact lost") && events.contains("1 × onset"),
+        "{events}"
+    );
+    // The header of what `sim` writes has no profile.
+    assert!(!text("#recording + p").contains("“”"));
 }
 
 #[test]

@@ -2,6 +2,7 @@
 
 use crate::inputs::about_mean;
 use crate::spectrum::{Taper, rfft, rfft_hz, rfft_magnitude};
+use crate::summary::rounding;
 
 /// Half-width of "near a line", as a share of f.
 pub const NEAR: f64 = 0.1;
@@ -35,7 +36,7 @@ impl Line {
                 best
             }
         })?;
-        let rounding = 1e-12 * x.iter().fold(0.0f64, |m, x| m.max(x.abs())) * x.len() as f64;
+        let rounding = rounding(x) * x.len() as f64;
         (bin > 0 && magnitude[bin] > rounding).then(|| Line {
             hz: hz_grid[bin],
             bin,

@@ -289,6 +289,11 @@ pub(crate) fn squares(low: f64, high: f64) -> bool {
     low.abs().max(high.abs()) < LARGE && (spread == 0.0 || spread > 1.0 / LARGE)
 }
 
+/// A motion up to this is what is left of sums and differences of numbers as large as these: none.
+pub(crate) fn rounding(x: &[f64]) -> f64 {
+    1e-12 * x.iter().fold(0.0f64, |most, x| most.max(x.abs()))
+}
+
 /// One signal's moments and spectrum while the recording streams by.
 pub struct Stream {
     moments: Moments,

@@ -102,6 +102,9 @@ fn there_may_be_any_number_of_carriers() {
             assert_eq!(has(&format!("/{entity}")), crowd, "{carriers}: {entity}");
         }
         assert!(has("/world/legs"), "{carriers}");
+        // One is in step with nobody, but may be with the beat.
+        assert_eq!(has("/plots/synchrony/r"), carriers > 1, "{carriers}");
+        assert!(has("/phases/order"), "{carriers}");
         assert!(!rows.contains_key(&format!("/world/carrier_{}", carriers + 1)));
     }
 }

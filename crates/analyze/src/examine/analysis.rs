@@ -74,8 +74,8 @@ pub struct Analysis {
 pub struct Trace {
     /// Topic and the part of the path that the signals share.
     pub topic: String,
-    /// What the ordinate shows, with its unit.
-    pub label: String,
+    /// Their unit, where it is known.
+    pub unit: String,
     /// Name, times and values.
     pub series: Vec<(String, Vec<f64>, Vec<f64>)>,
 }
@@ -83,6 +83,11 @@ pub struct Trace {
 impl Analysis {
     /// What is lost, where something is: one sentence; the exit code is 3 then.
     pub fn damage(&self) -> Option<String> {
+        self.lost().map(|lost| format!("{}: {lost}", self.file))
+    }
+
+    /// The same without the file's name.
+    pub(crate) fn lost(&self) -> Option<String> {
         let losses = self.quality.iter().filter(|q| q.loss);
         let told: Vec<String> = losses.map(Quality::told).collect();
         (self.skipped_messages > 0 || !told.is_empty()).then(|| {
@@ -95,8 +100,7 @@ impl Analysis {
                 n => format!("{n} messages are lost"),
             };
             format!(
-                "{}: the file is damaged; {lost}, the rest was used: {}",
-                self.file,
+                "the file is damaged; {lost}, the rest was used: {}",
                 told.join("; ")
             )
         })

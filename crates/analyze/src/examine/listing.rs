@@ -92,22 +92,17 @@ impl Pass<'_> {
                 continue;
             }
             let (shared, last) = entry.path.rsplit_once('.').unwrap_or(("", &entry.path));
-            let label = if entry.unit.is_empty() {
-                "value".to_owned()
-            } else {
-                entry.unit.to_owned()
-            };
             let fits = |t: &Trace| {
                 let seen = &t.series[0].2;
                 let alike = !entry.unit.is_empty() || are_alike_large(seen, &x);
-                t.topic == shared && t.label == label && alike && t.series.len() < MOST_SERIES
+                t.topic == shared && t.unit == entry.unit && alike && t.series.len() < MOST_SERIES
             };
             match traces.iter().position(fits) {
                 Some(k) => traces[k].series.push((last.to_owned(), t_s, x)),
                 None if traces.len() < MOST_TRACES => {
                     traces.push(Trace {
                         topic: shared.to_owned(),
-                        label,
+                        unit: entry.unit.to_owned(),
                         series: vec![(last.to_owned(), t_s, x)],
                     });
                 }

@@ -188,7 +188,12 @@ impl Clocks {
     /// A clock beside that of the rath's sensor, in words.
     fn against(&self, clock: &Clock, [ahead_s, fast_ppm]: [f64; 2]) -> String {
         let fast = match clock.drift_sd_ppm {
-            Some(sd_ppm) => format!("{fast_ppm:+.0} ± {:.0} ppm fast", 1.96 * sd_ppm),
+            // A drift that rounds to none has no sign.
+            Some(sd_ppm) => format!(
+                "{:+.0} ± {:.0} ppm fast",
+                fast_ppm.round() + 0.0,
+                1.96 * sd_ppm
+            ),
             None => "too short to tell how fast".to_owned(),
         };
         format!(
@@ -248,6 +253,25 @@ mod tests {
             track.accel_m_per_s2.push([0.0, 0.0, 9.8]);
         }
         track
+    }
+
+    #[test]
+    fn a_drift_that_rounds_to_none_has_no_sign() {
+        let clock = Clock {
+            offset_s: 0.0,
+            offset_sd_s: 0.0015,
+            drift_ppm: 0.0,
+            drift_sd_ppm: Some(10.7),
+            at_s: 0.0,
+            points: 9,
+        };
+        let said = |fast_ppm| Clocks::default().against(&clock, [-3.0638, fast_ppm]);
+        assert!(
+            said(-0.2).ends_with(" and +0 ± 21 ppm fast"),
+            "{}",
+            said(-0.2)
+        );
+        assert!(said(-17.4).ends_with(" and -17 ± 21 ppm fast"));
     }
 
     #[test]

@@ -2,6 +2,7 @@
 
 use super::{Context, Value};
 use crate::pairs::products;
+use crate::summary::rounding;
 use nalgebra::DMatrix;
 
 /// The share ε of the weight below which the support counts as gone (paper: 0.05).
@@ -75,7 +76,7 @@ pub fn force_correlation(c: &Context) -> Value {
     // Off the mean, over √n σ; what remains of a constant is rounding.
     let scaled = columns.iter().flat_map(|x| {
         let (m, v) = (mean(x), variance(x));
-        let still = v.sqrt() <= 1e-12 * m.abs();
+        let still = v.sqrt() <= rounding(x);
         let size = if still {
             f64::NAN
         } else {
@@ -92,8 +93,12 @@ pub fn mean(x: &[f64]) -> f64 {
     x.iter().sum::<f64>() / x.len() as f64
 }
 
-/// Population variance.
+/// Population variance, less what the mean's own rounding adds to it (Chan, Golub and LeVeque 1983).
 pub fn variance(x: &[f64]) -> f64 {
-    let m = mean(x);
-    x.iter().map(|x| (x - m) * (x - m)).sum::<f64>() / x.len() as f64
+    let (m, n) = (mean(x), x.len() as f64);
+    let off = x.iter().map(|x| x - m);
+    let (sum, squares) = off.fold((0.0, 0.0), |(s, q), d| (s + d, q + d * d));
+    let v = (squares - sum * sum / n) / n;
+    // What is no number stays none.
+    if v < 0.0 { 0.0 } else { v }
 }

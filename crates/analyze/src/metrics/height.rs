@@ -2,6 +2,7 @@
 
 use super::contact::{mean, variance};
 use super::{Context, Value};
+use crate::summary::rounding;
 
 pub fn dz_pp_m(c: &Context) -> Value {
     let z = &c.height().x;
@@ -32,7 +33,7 @@ pub fn growth_ratio(c: &Context) -> Value {
         (z.iter().map(|z| (z - middle) * (z - middle)).sum::<f64>() / third as f64).sqrt()
     };
     let (first, last) = (rms(&z[..third]), rms(&z[z.len() - third..]));
-    if first == 0.0 {
+    if first <= rounding(z) {
         return Value::missing("the height does not move in the first third of the window");
     }
     Value::number(last / first)

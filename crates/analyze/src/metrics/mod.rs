@@ -589,6 +589,26 @@ mod tests {
     }
 
     #[test]
+    fn what_rounding_leaves_of_standing_still_is_no_motion() {
+        // A height of 0.8019 m whose last bit flickers.
+        let still = |k: usize| 0.8019 + if k % 7 < 3 { 1.2e-16 } else { 0.0 };
+        let inputs = Inputs {
+            t_s: (0..1801).map(|k| k as f64 / 30.0).collect(),
+            height_m: (0..1801).map(still).collect(),
+            ..Inputs::default()
+        };
+        let found = metrics(&inputs, Window::ALL);
+        let (sd, span) = (found.number("rms_z_m"), found.number("dz_pp_m"));
+        assert!(span > Some(0.0) && sd <= span, "{sd:?} of {span:?}");
+        for name in ["growth_ratio", "peak_hz"] {
+            assert_eq!(found.number(name), None, "{name}");
+        }
+        let (t_s, z) = (&inputs.t_s, &inputs.height_m);
+        let s = crate::peaks::SpectrumSummary::of(t_s, z, Window::ALL, None, "m");
+        assert!(s.is_some_and(|s| s.peaks.is_empty() && s.peak_hz.is_none()));
+    }
+
+    #[test]
     fn one_sample_or_nan_never_makes_a_nan() {
         for n in [1usize, 2, 3, 59, 61] {
             for bad in [0.0, f64::NAN, f64::INFINITY] {

@@ -80,12 +80,14 @@ fn distribution(
         &label,
         "share of runs up to the value",
     );
+    let mut without = Vec::new();
     for (k, (group, members)) in groups.iter().enumerate() {
         let mut values: Vec<f64> = members
             .iter()
             .filter_map(|a| a.metrics.number(name))
             .collect();
         if values.is_empty() {
+            without.push(group.as_str());
             continue;
         }
         values.sort_by(f64::total_cmp);
@@ -103,6 +105,8 @@ fn distribution(
             ..Series::default()
         });
     }
+    let drawn: Vec<&str> = p.series.iter().map(|s| s.name.as_str()).collect();
+    p.title += &partly(&drawn, &without);
     p.note = "Each step is one run.".into();
     let all = p.series.iter().flat_map(|s| s.x.iter().copied());
     let (low, high) = all.fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), x| {
@@ -111,6 +115,14 @@ fn distribution(
     let room = 0.05 * (high - low);
     p.x_range = (room > 0.0).then_some((low - room, high + room));
     (!p.series.is_empty()).then_some(p)
+}
+
+/// Who is drawn and who has nothing to draw, behind a title; nothing where all are drawn.
+fn partly(drawn: &[&str], without: &[&str]) -> String {
+    match without {
+        [] => String::new(),
+        without => format!(", {}; none in {}", drawn.join(", "), without.join(", ")),
+    }
 }
 
 /// Mean of the runs' densities and their standard deviation, both in decibels: densities differ by factors.
@@ -170,4 +182,16 @@ fn mean_psd(
         panel.series.push(line);
     }
     p
+}
+
+#[cfg(test)]
+mod tests {
+    #[test]
+    fn a_condition_without_values_is_named() {
+        assert_eq!(super::partly(&["baseline (4)", "music (4)"], &[]), "");
+        assert_eq!(
+            super::partly(&["music (4)"], &["baseline"]),
+            ", music (4); none in baseline"
+        );
+    }
 }

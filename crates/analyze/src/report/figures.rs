@@ -11,6 +11,7 @@ use kuva::render::layout::Layout;
 use kuva::render::plots::Plot as Mark;
 use kuva::render::render::{Scene, render_multiple};
 
+use super::html::escaped;
 use super::plots::{COLOURS, Image, Panel, Plot};
 
 /// Width of a figure, in the units of its SVG.
@@ -55,9 +56,9 @@ pub fn figures(plots: &[Plot], folder: &Path) -> Result<Vec<PathBuf>, FigureErro
     std::fs::create_dir_all(folder).map_err(io(folder))?;
     let mut written = Vec::new();
     for (k, plot) in plots.iter().enumerate() {
-        let (id, scene) = match plot {
-            Plot::Panel(p) => (p.id, panel(p)),
-            Plot::Image(i) => (i.id, image(i)),
+        let (id, title, scene) = match plot {
+            Plot::Panel(p) => (p.id, &p.title, panel(p)),
+            Plot::Image(i) => (i.id, &i.title, image(i)),
         };
         let stem = format!("{:02}-{id}", k + 1);
         let png = RasterBackend::new()
@@ -67,7 +68,10 @@ pub fn figures(plots: &[Plot], folder: &Path) -> Result<Vec<PathBuf>, FigureErro
                 name: stem.clone(),
                 problem,
             })?;
+        // Who cannot see it hears at least what it is.
+        let named = format!(" role=\"img\"><title>{}</title>", escaped(title));
         let svg = SvgBackend::default().render_scene(&scene);
+        let svg = svg.replacen('>', &named, 1);
         for (extension, bytes) in [("svg", svg.as_bytes()), ("png", &png[..])] {
             let path = folder.join(format!("{stem}.{extension}"));
             recording::whole::write_whole(&path, |file| std::io::Write::write_all(file, bytes))
@@ -78,21 +82,24 @@ pub fn figures(plots: &[Plot], folder: &Path) -> Result<Vec<PathBuf>, FigureErro
     Ok(written)
 }
 
-/// The panel as it stands still: quick curves near their end only, densities in decibels (the library's logarithmic axis ends at
+/// The panel as it stands still: of quick curves what lies in the middle of the window, densities in decibels (the library's logarithmic axis ends at
 /// 1e-10, where densities do not).
 fn still(p: &Panel) -> Panel {
     let mut p = p.clone();
-    if let Some(last_s) = p.last_s {
-        let ends = p.series.iter().filter_map(|s| s.x.last());
-        let end_s = ends.copied().fold(f64::NEG_INFINITY, f64::max);
-        let from_s = end_s - last_s;
-        for s in &mut p.series {
-            let from = s.x.partition_point(|x| *x < from_s);
-            s.x.drain(..from);
-            s.y.drain(..from);
-        }
-        if p.series.iter().any(|s| !s.x.is_empty()) {
-            p.title += &format!(", last {last_s} s");
+    if let Some(shown_s) = p.shown_s {
+        // A field log ends at rest, and starts so.
+        let ends = p.series.iter().flat_map(|s| &s.x).fold(NOTHING, reach);
+        let (start_s, end_s) = p.window.unwrap_or(ends);
+        let middle_s = 0.5 * (start_s.max(ends.0) + end_s.min(ends.1));
+        let [from_s, to_s] = [-0.5, 0.5].map(|half| middle_s + half * shown_s);
+        if ends.1 - ends.0 > shown_s {
+            for s in &mut p.series {
+                let inside =
+                    s.x.partition_point(|x| *x < from_s)..s.x.partition_point(|x| *x <= to_s);
+                s.x = s.x[inside.clone()].to_vec();
+                s.y = s.y[inside].to_vec();
+            }
+            p.title += &format!(", {shown_s} s in the middle");
         }
     }
     if p.log_y {
@@ -130,12 +137,7 @@ fn panel(p: &Panel) -> Scene {
     if let Some((a, b)) = p.x_range {
         (x0, x1) = (a, b);
     }
-    if y1 <= y0 {
-        (y0, y1) = (y0 - 1.0, y0 + 1.0);
-    }
-    if x1 <= x0 {
-        (x0, x1) = (x0 - 1.0, x0 + 1.0);
-    }
+    ((x0, x1), (y0, y1)) = (wide((x0, x1)), wide((y0, y1)));
     let several = p.series.len() > 1;
     let names = names(&p.marks, (x0, x1), several);
     // The names of marks stand above all curves.
@@ -279,6 +281,19 @@ fn reach((low, high): (f64, f64), x: &f64) -> (f64, f64) {
     (low.min(*x), high.max(*x))
 }
 
+/// A range that shows something: what rounding leaves of a constant is none.
+fn wide((low, high): (f64, f64)) -> (f64, f64) {
+    let size = low.abs().max(high.abs());
+    if high - low > 1e-9 * size {
+        return (low, high);
+    }
+    let middle = match size.is_finite() {
+        true => 0.5 * (low + high),
+        false => 0.0,
+    };
+    (middle - 1.0, middle + 1.0)
+}
+
 fn note(text: &str, x: f64, y: f64) -> TextAnnotation {
     TextAnnotation::new(text, x, y)
         .with_color(GREY)
@@ -331,4 +346,62 @@ fn look(layout: Layout) -> Layout {
         .with_title_size(16)
         .with_label_size(13)
         .with_tick_size(11)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::report::plots::Series;
+
+    #[test]
+    fn a_quick_curve_is_shown_in_the_middle_of_the_window() {
+        let curve = |seconds: usize| Panel {
+            series: vec![Series {
+                x: (0..=seconds).map(|k| k as f64).collect(),
+                y: vec![0.0; seconds + 1],
+                ..Series::default()
+            }],
+            window: Some((15.0, f64::INFINITY)),
+            shown_s: Some(10.0),
+            ..Panel::new("forces", "Forces", "time, s", "force, N")
+        };
+        let drawn = still(&curve(65));
+        assert_eq!(drawn.title, "Forces, 10 s in the middle");
+        let (first, last) = (drawn.series[0].x[0], drawn.series[0].x.last());
+        assert_eq!(
+            (first, last, drawn.series[0].y.len()),
+            (35.0, Some(&45.0), 11)
+        );
+        let whole = still(&curve(9));
+        assert_eq!(
+            (whole.title.as_str(), whole.series[0].x.len()),
+            ("Forces", 10)
+        );
+    }
+
+    #[test]
+    fn ticks_of_a_constant_differ() {
+        let (low, high) = wide((0.8019, 0.801_900_000_000_000_3));
+        assert!((high - low - 2.0).abs() < 1e-12, "{low} to {high}");
+        assert_eq!(wide((0.8019, 0.802)), (0.8019, 0.802));
+        assert_eq!(wide(NOTHING), (-1.0, 1.0));
+    }
+
+    #[test]
+    fn figures_have_names_for_who_cannot_see_them() {
+        let folder = tempfile::tempdir().expect("a folder");
+        let mut p = Panel::new("roll", "Roll < tilt", "time, s", "angle, deg");
+        p.series.push(Series {
+            x: vec![0.0, 1.0],
+            y: vec![0.0, 1.0],
+            ..Series::default()
+        });
+        let written = figures(&[Plot::Panel(p)], folder.path()).expect("drawn");
+        let svg = std::fs::read_to_string(&written[0]).expect("read");
+        assert!(
+            svg.contains(" role=\"img\"><title>Roll &lt; tilt</title>"),
+            "{}",
+            &svg[..300]
+        );
+    }
 }

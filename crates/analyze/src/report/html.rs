@@ -8,9 +8,10 @@ use super::plots::{COLOURS, Image, Panel, Plot, plots};
 use super::table::{figures, thousands};
 use crate::examine::Analysis;
 use crate::metrics::{self, Datum};
+use recording::text::counted;
 
-/// Metrics shown large at the top, with what is said beside them.
-const TILES: [(&str, &str); 8] = [
+/// Metrics shown large at the top, with what is said beside them: of those that have a value the first eight.
+const TILES: [(&str, &str); 9] = [
     ("mechanism", "what drives the roll"),
     ("rms_roll_deg", "RMS roll, deg"),
     ("contact_loss_mean", "contact loss, mean"),
@@ -19,6 +20,12 @@ const TILES: [(&str, &str); 8] = [
     ("dz_pp_m", "height, peak to peak, m"),
     ("t_float", "unloaded time, T_float"),
     ("peak_hz", "strongest line, Hz"),
+    ("step_rate_hz", "steps per second"),
+];
+
+/// [`COLOURS`] for dark paper: the same hues, each light enough to be seen on it and on what is shaded there.
+const DARK: [&str; COLOURS.len()] = [
+    "#3A9AE8", "#F07F2E", "#22BD8C", "#DD8FBA", "#F0B429", "#A6DAFA", "#A6A6A6",
 ];
 
 /// Cividis, sampled: rises evenly in lightness, the same to every kind of colour vision (Nuñez et al. 2018).
@@ -36,6 +43,8 @@ const MAP: [[u8; 3]; 9] = [
 
 /// Events listed; more are counted.
 const MOST_EVENTS: usize = 400;
+/// Signals listed.
+const MOST_SIGNALS: usize = 2000;
 
 /// The page for one recording. `command` is the command line that makes it again.
 pub fn html(a: &Analysis, command: &str) -> String {
@@ -48,8 +57,9 @@ pub fn html(a: &Analysis, command: &str) -> String {
     let _ = write!(
         out,
         "<!doctype html>\n<html lang=\"en\">\n<head>\n<meta charset=\"utf-8\">\n<meta name=\"viewport\" content=\"width=device-width, initial-scale=1\">\n\
-         <title>{}</title>\n<link rel=\"icon\" href=\"data:,\">\n<style>\n{}</style>\n</head>\n<body>\n",
+         <title>{}</title>\n<link rel=\"icon\" href=\"data:,\">\n<style>\n{}{}</style>\n</head>\n<body>\n",
         escaped(title),
+        colours(),
         include_str!("page.css")
     );
     head(&mut out, a, title);
@@ -77,6 +87,20 @@ pub fn html(a: &Analysis, command: &str) -> String {
     out
 }
 
+/// The colours of curves as the style sheet's variables `--c0` …; paper that is printed is white.
+fn colours() -> String {
+    let all = |colours: &[&str]| {
+        let each = colours.iter().enumerate();
+        each.map(|(k, c)| format!("--c{k}:{c};"))
+            .collect::<String>()
+    };
+    format!(
+        ":root{{{}}}\n@media screen and (prefers-color-scheme:dark){{:root{{{}}}}}\n",
+        all(&COLOURS),
+        all(&DARK)
+    )
+}
+
 fn head(out: &mut String, a: &Analysis, title: &str) {
     let _ = write!(
         out,
@@ -85,9 +109,9 @@ fn head(out: &mut String, a: &Analysis, title: &str) {
     );
     let _ = write!(
         out,
-        "{:.3} s, {} samples; analysed from {:.3} to {:.3} s",
+        "{:.3} s, {}; analysed from {:.3} to {:.3} s",
         a.duration_s,
-        thousands(a.samples),
+        several(a.samples, "sample"),
         a.window.start_s,
         a.window.end_s
     );
@@ -97,17 +121,40 @@ fn head(out: &mut String, a: &Analysis, title: &str) {
         }
     }
     out.push_str("</p>\n");
-    for warning in &a.warnings {
-        let _ = writeln!(out, "<p class=\"warn\">{}</p>", escaped(warning));
-    }
-    if a.skipped_messages > 0 {
+    let lost = a.lost();
+    let told = |text: &str| lost.as_ref().is_some_and(|lost| lost.contains(text));
+    let warnings = a.warnings.iter().filter(|w| !told(w));
+    for warning in lost.iter().chain(warnings) {
         let _ = writeln!(
             out,
-            "<p class=\"warn\">{} messages are lost.</p>",
-            thousands(a.skipped_messages)
+            "<p class=\"warn\">{}.</p>",
+            escaped(&sentence(warning))
         );
     }
     out.push_str("</header>\n");
+}
+
+/// So many of something.
+fn several(count: u64, what: &str) -> String {
+    let s = if count == 1 { "" } else { "s" };
+    format!("{} {what}{s}", thousands(count))
+}
+
+/// That a list is not whole, where it is not.
+fn first(count: usize, most: usize) -> String {
+    match count > most {
+        true => format!(
+            "<p class=\"faint\">The first {most} are listed; <code>--format json</code> has all.</p>\n"
+        ),
+        false => String::new(),
+    }
+}
+
+/// With a capital.
+fn sentence(text: &str) -> String {
+    let mut letters = text.chars();
+    let first = letters.next().into_iter().flat_map(char::to_uppercase);
+    first.chain(letters).collect()
 }
 
 fn shown(datum: &Datum) -> String {
@@ -119,11 +166,23 @@ fn shown(datum: &Datum) -> String {
     }
 }
 
+/// Three digits: what a glance takes in; the table of metrics has more.
+fn coarse(x: f64) -> String {
+    let size = x.abs().log10().floor();
+    match x {
+        0.0 => "0".into(),
+        // OK because the logarithm of a double is below 400.
+        _ if (-4.0..6.0).contains(&size) => format!("{x:.*}", (2.0 - size).max(0.0) as usize),
+        _ => format!("{x:.2e}"),
+    }
+}
+
 fn tiles(out: &mut String, a: &Analysis) {
     let known: Vec<_> = TILES
         .iter()
         .filter_map(|(name, label)| Some((*name, label, a.metrics.get(name)?)))
         .filter(|(_, _, v)| v.datum != Datum::Missing)
+        .take(8)
         .collect();
     if known.is_empty() {
         return;
@@ -135,15 +194,19 @@ fn tiles(out: &mut String, a: &Analysis) {
             .flatten();
         let mut beside = String::new();
         if let Some([low, high]) = value.ci95 {
-            let _ = write!(beside, " ({} … {})", figures(low), figures(high));
+            let _ = write!(beside, " ({} … {})", coarse(low), coarse(high));
         }
         if let Some(chance) = chance {
-            let _ = write!(beside, ", {} by chance", figures(chance));
+            let _ = write!(beside, ", {} by chance", coarse(chance));
         }
+        let large = match value.datum {
+            Datum::Number(x) => coarse(x),
+            ref other => shown(other),
+        };
         let _ = writeln!(
             out,
-            "<div class=\"tile\"><b>{}</b><span>{label}{beside}</span></div>",
-            shown(&value.datum)
+            "<div class=\"tile\"><b>{large}</b><span>{}{beside}</span></div>",
+            label.replace(", ", ",\u{a0}")
         );
     }
     out.push_str("</div>\n");
@@ -151,6 +214,7 @@ fn tiles(out: &mut String, a: &Analysis) {
 
 fn figures_section(out: &mut String, plots: &[Plot]) {
     if plots.is_empty() {
+        out.push_str("<p class=\"faint\">Nothing is drawn: no signal changes.</p>\n");
         return;
     }
     out.push_str(
@@ -174,45 +238,87 @@ fn figures_section(out: &mut String, plots: &[Plot]) {
 }
 
 fn metrics_section(out: &mut String, a: &Analysis) {
-    out.push_str("<h2 id=\"metrics\">Metrics</h2>\n<div class=\"scroll\"><table class=\"metrics\"><thead><tr><th>metric</th><th class=\"n\">value</th><th>unit</th><th>from</th></tr></thead><tbody>\n");
-    for (name, value) in a.metrics.iter() {
-        let Some(metric) = metrics::find(name) else {
-            continue;
-        };
-        let unit = if matches!(value.unit, "1" | "bool" | "-") {
-            ""
-        } else {
-            value.unit
-        };
-        let mut more = format!(
-            "<p>{}</p><p class=\"faint\">Definition from: {}. Name: <code>{name}</code>.</p>",
-            with_code(metric.definition),
-            escaped(metric.origin)
-        );
-        if let Some(reason) = &value.reason {
-            let _ = write!(more, "<p>{}</p>", escaped(reason));
-        }
-        if !value.per.is_empty() {
-            let per: Vec<String> = value.per.iter().take(64).map(|x| figures(*x)).collect();
-            let _ = write!(more, "<p class=\"faint\">In detail: {}</p>", per.join(", "));
-        }
-        if let Some([low, high]) = value.ci95 {
-            let _ = write!(
-                more,
-                "<p class=\"faint\">95 % interval: {} … {}</p>",
-                figures(low),
-                figures(high)
-            );
-        }
+    out.push_str("<h2 id=\"metrics\">Metrics</h2>\n");
+    let known = |missing: bool| {
+        let all = a.metrics.iter();
+        all.filter(move |(_, value)| (value.datum == Datum::Missing) == missing)
+            .filter_map(|(name, value)| Some((name, value, metrics::find(name)?)))
+    };
+    if known(false).count() > 0 {
         let _ = writeln!(
             out,
-            "<tr><td><details><summary>{}</summary>{more}</details></td><td class=\"n\">{}</td><td>{unit}</td><td>{}</td></tr>",
+            "<p class=\"faint\">Each opens to its definition, where W is the stretch that is analysed, from {:.3} to {:.3} s.</p>",
+            a.window.start_s, a.window.end_s
+        );
+        out.push_str("<div class=\"scroll\"><table class=\"metrics\"><thead><tr><th>metric</th><th class=\"n\">value</th><th>unit</th><th>from</th></tr></thead><tbody>\n");
+        for (name, value, metric) in known(false) {
+            let unit = if matches!(value.unit, "1" | "bool" | "-") {
+                ""
+            } else {
+                value.unit
+            };
+            let mut more = definition(name, metric);
+            if let Some(reason) = &value.reason {
+                let _ = write!(more, "<p>{}</p>", escaped(reason));
+            }
+            if !value.per.is_empty() {
+                let per: Vec<String> = value.per.iter().take(64).map(|x| figures(*x)).collect();
+                let _ = write!(
+                    more,
+                    "<p class=\"faint\"><code>per</code>: {}</p>",
+                    per.join(", ")
+                );
+            }
+            if let Some([low, high]) = value.ci95 {
+                let _ = write!(
+                    more,
+                    "<p class=\"faint\">95 % interval: {} … {}</p>",
+                    figures(low),
+                    figures(high)
+                );
+            }
+            let _ = writeln!(
+                out,
+                "<tr><td><details><summary>{}</summary>{more}</details></td><td class=\"n\">{}</td><td>{unit}</td><td>{}</td></tr>",
+                escaped(metric.label),
+                shown(&value.datum),
+                escaped(&value.source)
+            );
+        }
+        out.push_str("</tbody></table></div>\n");
+    }
+    let missing = known(true).count() as u64;
+    if missing == 0 {
+        return;
+    }
+    let _ = write!(
+        out,
+        "<details id=\"missing\"><summary>{}, and why</summary>\n<div class=\"scroll\"><table><tbody>\n",
+        counted(
+            missing,
+            "metric has no value here",
+            "metrics have no value here"
+        )
+    );
+    for (name, value, metric) in known(true) {
+        let _ = writeln!(
+            out,
+            "<tr><td><details><summary>{}</summary>{}</details></td><td>{}</td></tr>",
             escaped(metric.label),
-            shown(&value.datum),
-            escaped(&value.source)
+            definition(name, metric),
+            escaped(value.reason.as_deref().unwrap_or(""))
         );
     }
-    out.push_str("</tbody></table></div>\n");
+    out.push_str("</tbody></table></div></details>\n");
+}
+
+/// What a metric is and whose.
+fn definition(name: &str, metric: &metrics::Metric) -> String {
+    format!(
+        "<p>{}</p><p class=\"faint\">Definition from: {}. Name: <code>{name}</code>.</p>",
+        with_code(metric.definition),
+        escaped(metric.origin)
+    )
 }
 
 fn lines_section(out: &mut String, a: &Analysis) {
@@ -247,12 +353,27 @@ fn events_section(out: &mut String, a: &Analysis) {
     if a.events.is_empty() {
         return;
     }
+    // Kinds by their first time.
+    let mut kinds: Vec<(&str, u64)> = Vec::new();
+    for e in &a.events {
+        match kinds.iter_mut().find(|(kind, _)| *kind == e.kind) {
+            Some((_, n)) => *n += 1,
+            None => kinds.push((e.kind, 1)),
+        }
+    }
+    let kinds: Vec<String> = kinds
+        .iter()
+        .map(|(kind, n)| format!("{} × {}", thousands(*n), kind.replace('_', " ")))
+        .collect();
     let _ = write!(
         out,
-        "<h2 id=\"events\">Events</h2>\n<details{}><summary>{} events</summary>\n<div class=\"scroll\"><table><thead><tr><th class=\"n\">time, s</th><th>kind</th><th>what</th></tr></thead><tbody>\n",
+        "<h2 id=\"events\">Events</h2>\n<details{}><summary>{}: {}</summary>\n",
         if a.events.len() <= 20 { " open" } else { "" },
-        thousands(a.events.len() as u64)
+        several(a.events.len() as u64, "event"),
+        kinds.join(", ")
     );
+    out.push_str(&first(a.events.len(), MOST_EVENTS));
+    out.push_str("<div class=\"scroll\"><table><thead><tr><th class=\"n\">time, s</th><th>kind</th><th>what</th></tr></thead><tbody>\n");
     for e in a.events.iter().take(MOST_EVENTS) {
         let _ = writeln!(
             out,
@@ -263,12 +384,6 @@ fn events_section(out: &mut String, a: &Analysis) {
         );
     }
     out.push_str("</tbody></table></div></details>\n");
-    if a.events.len() > MOST_EVENTS {
-        let _ = writeln!(
-            out,
-            "<p class=\"faint\">The first {MOST_EVENTS} are listed.</p>"
-        );
-    }
 }
 
 fn quality_section(out: &mut String, a: &Analysis) {
@@ -291,13 +406,18 @@ fn quality_section(out: &mut String, a: &Analysis) {
 }
 
 fn recording_section(out: &mut String, a: &Analysis) {
+    // A header may leave both out.
+    let said = |what: &str, text: &str| match text {
+        "" => String::new(),
+        text => format!(", {what} “{}”", escaped(text)),
+    };
     let _ = write!(
         out,
-        "<h2 id=\"recording\">Recording</h2>\n<p><code>{}</code>: {} messages, profile “{}”, written by “{}”{}.</p>\n",
+        "<h2 id=\"recording\">Recording</h2>\n<p><code>{}</code>: {}{}{}{}.</p>\n",
         escaped(&a.file),
-        thousands(a.messages),
-        escaped(&a.profile),
-        escaped(&a.library),
+        several(a.messages, "message"),
+        said("profile", &a.profile),
+        said("written by", &a.library),
         if a.salvaged {
             "; its summary is missing or wrong, it was searched from end to end"
         } else {
@@ -349,10 +469,11 @@ fn signals_section(out: &mut String, a: &Analysis) {
     }
     let _ = write!(
         out,
-        "<h2 id=\"signals\">Signals</h2>\n<details><summary>{} numeric signals</summary><div class=\"scroll\"><table><thead><tr><th>signal</th><th>unit</th><th class=\"n\">count</th><th class=\"n\">Hz</th><th class=\"n\">min</th><th class=\"n\">mean</th><th class=\"n\">max</th><th class=\"n\">SD</th><th class=\"n\">peak, Hz</th></tr></thead><tbody>\n",
-        a.signals.len()
+        "<h2 id=\"signals\">Signals</h2>\n<details><summary>{}</summary>{}<div class=\"scroll\"><table><thead><tr><th>signal</th><th>unit</th><th class=\"n\">count</th><th class=\"n\">Hz</th><th class=\"n\">min</th><th class=\"n\">mean</th><th class=\"n\">max</th><th class=\"n\">SD</th><th class=\"n\">peak, Hz</th></tr></thead><tbody>\n",
+        several(a.signals.len() as u64, "numeric signal"),
+        first(a.signals.len(), MOST_SIGNALS)
     );
-    for (path, s) in a.signals.iter().take(2000) {
+    for (path, s) in a.signals.iter().take(MOST_SIGNALS) {
         let cell =
             |x: Option<f64>| format!("<td class=\"n\">{}</td>", x.map_or("–".into(), figures));
         let _ = writeln!(
@@ -381,7 +502,7 @@ fn data(plots: &[Plot]) -> Value {
             Plot::Image(i) => image(i),
         })
         .collect();
-    json!({ "colours": COLOURS, "map": MAP, "plots": all })
+    json!({ "colours": COLOURS.len(), "map": MAP, "plots": all })
 }
 
 fn panel(p: &Panel) -> Value {
@@ -440,7 +561,7 @@ fn rounded(x: &[f64], digits: usize) -> Value {
 }
 
 /// Text that is safe between tags and in attributes.
-fn escaped(text: &str) -> String {
+pub(super) fn escaped(text: &str) -> String {
     text.replace('&', "&amp;")
         .replace('<', "&lt;")
         .replace('>', "&gt;")
@@ -463,6 +584,21 @@ fn with_code(text: &str) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn tiles_show_three_digits() {
+        for (x, shown) in [
+            (19.195, "19.2"),
+            (0.25, "0.250"),
+            (19.0, "19.0"),
+            (-0.00098765, "-0.000988"),
+            (3.3307e-16, "3.33e-16"),
+            (1819.4, "1819"),
+            (0.0, "0"),
+        ] {
+            assert_eq!(coarse(x), shown);
+        }
+    }
 
     #[test]
     fn backticks_become_code() {

@@ -50,6 +50,14 @@
     for (const l of lists) for (const v of l) { const w = f(v); if (w < lo) lo = w; if (w > hi) hi = w; }
     return [lo, hi];
   };
+  const shade = s => `var(--c${s.colour % data.colours})`;
+  // A range that shows something: what rounding leaves of a constant is none.
+  const wide = ([lo, hi]) => {
+    const size = Math.max(Math.abs(lo), Math.abs(hi));
+    if (hi - lo > 1e-9 * size) return [lo, hi];
+    const c = isFinite(size) ? (lo + hi) / 2 : 0;
+    return [c - 1, c + 1];
+  };
 
   class Plot {
     constructor(figure, spec) {
@@ -59,8 +67,9 @@
       this.legend = figure.querySelector(".legend");
       this.canvas = figure.querySelector("canvas");
       this.full = spec.x_range || extent(spec.series.map(s => s.x), v => v);
-      // A recording of one moment still has an axis.
-      if (!(this.full[0] < this.full[1])) { const c = isFinite(this.full[0]) ? this.full[0] : 0; this.full = [c - 0.5, c + 0.5]; }
+      // A recording of one moment still has an axis; what lies in a plane keeps off its frame.
+      this.full = wide(this.full);
+      if (!spec.x_range) { const room = (this.full[1] - this.full[0]) * 0.05; this.full = [this.full[0] - room, this.full[1] + room]; }
       this.range = null;
       this.hidden = new Set();
       this.listen();
@@ -78,7 +87,7 @@
       });
       for (const [v] of this.spec.levels) { const w = f(v); if (w < lo) lo = w; if (w > hi) hi = w; }
       if (this.spec.band) { lo = Math.min(lo, f(this.spec.band[0])); hi = Math.max(hi, f(this.spec.band[1])); }
-      if (!(lo < hi)) { const c = lo === hi ? lo : 0; lo = c - 1; hi = c + 1; }
+      [lo, hi] = wide([lo, hi]);
       const room = (hi - lo) * 0.05;
       return [lo - room, hi + room];
     }
@@ -112,15 +121,19 @@
       if (spec.image) this.paint(); else svg.appendChild(inside);
       el(svg, "text", { x: (left + right) / 2, y: h - 5, "text-anchor": "middle" }, spec.x_label);
       el(svg, "text", { x: 0, y: 0, "text-anchor": "middle", transform: `translate(12 ${(top + bottom) / 2}) rotate(-90)` }, spec.y_label);
-      for (const [v] of spec.levels) {
-        el(inside, "line", { class: "level", x1: left, x2: right, y1: sy(v), y2: sy(v) });
-      }
       spec.series.forEach((s, k) => { if (!this.hidden.has(k)) this.curve(inside, s, k, x0, x1); });
-      for (const [v, name] of spec.levels) el(inside, "text", { class: "note", x: right - 4, y: sy(v) - 4, "text-anchor": "end" }, name);
+      // Over the curves, of which quick ones are a patch.
+      for (const [v] of spec.levels) el(inside, "line", { class: "level", x1: left, x2: right, y1: sy(v), y2: sy(v) });
+      let next = Infinity; // where a name may stand at the lowest: not on the one of the level below
+      for (const [v, name] of [...spec.levels].sort((a, b) => a[0] - b[0])) {
+        const y = Math.min(sy(v) - 4, next);
+        next = y - 13;
+        el(svg, "text", { class: "note", x: right - 4, y, "text-anchor": "end" }, name);
+      }
       let free = -1e9, row = 0; // where the last name ends
-      for (const [v, name] of spec.marks) {
-        if (v < x0 || v > x1) continue;
-        el(inside, "line", { class: "mark", x1: sx(v), x2: sx(v), y1: top, y2: bottom });
+      const marks = spec.marks.filter(([v]) => v >= x0 && v <= x1);
+      for (const [v] of marks) el(inside, "line", { class: "mark", x1: sx(v), x2: sx(v), y1: top, y2: bottom });
+      for (const [v, name] of marks) {
         // Names that would touch go one line down.
         const end = sx(v) + 7 * name.length > right;
         row = sx(v) - (end ? 7 * name.length : 0) < free ? (row + 1) % 4 : 0;
@@ -134,11 +147,11 @@
     }
 
     curve(parent, s, k, x0, x1) {
-      const colour = data.colours[s.colour % data.colours.length];
+      const colour = shade(s);
       if (this.spec.points) {
         let d = "";
         for (let i = 0; i < s.x.length; i++) d += `M${this.sx(s.x[i]).toFixed(1)} ${this.sy(s.y[i]).toFixed(1)}h0`;
-        el(parent, "path", { class: "curve", d, stroke: colour, "data-points": s.x.length, style: "stroke-width:3;stroke-linecap:round;opacity:.5" });
+        el(parent, "path", { class: "curve", d, "data-points": s.x.length, style: `stroke:${colour};stroke-width:3;stroke-linecap:round;opacity:.5` });
         return;
       }
       // Only what is in sight, and one sample beyond each end; a plane's curve has no order to search.
@@ -153,7 +166,8 @@
         if (pen === "M" && !isFinite(this.sy(s.y[i + 1]))) d += "h0";
         pen = "L";
       }
-      el(parent, "path", { class: "curve", d, stroke: colour, "data-points": to - from, "data-name": s.name });
+      const size = to - from === 1 ? "stroke-width:6;" : ""; // a sample alone is to be seen
+      el(parent, "path", { class: "curve", d, style: `${size}stroke:${colour}`, "data-points": to - from, "data-name": s.name });
     }
 
     paint() { // the spectrogram, cell by cell, under the axes
@@ -185,7 +199,7 @@
       }
       this.spec.series.forEach((s, k) => {
         const item = document.createElement("span"), swatch = document.createElement("i");
-        swatch.style.background = data.colours[s.colour % data.colours.length];
+        swatch.style.background = shade(s);
         if (this.hidden.has(k)) item.style.opacity = 0.4;
         item.append(swatch, s.name);
         if (at !== null && !this.spec.points && this.spec.id !== "portrait") {

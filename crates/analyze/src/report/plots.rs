@@ -7,6 +7,7 @@ use crate::mechanism::spline_derivatives;
 use crate::peaks::SpectrumSummary;
 use crate::phase;
 use crate::spectrum::{Mode, Options, spectrogram};
+use crate::summary::rounding;
 use recording::{text::counted, topics};
 use std::ops::Range;
 
@@ -63,8 +64,8 @@ pub struct Panel {
     pub points: bool,
     /// The abscissa is the recording's time: such panels are zoomed together.
     pub time: bool,
-    /// Where nobody can zoom, only the last so many seconds are drawn: all of them would be one patch of colour.
-    pub last_s: Option<f64>,
+    /// Where nobody can zoom, only so many seconds are drawn, of the middle of the window: all of them would be one patch of colour.
+    pub shown_s: Option<f64>,
 }
 
 impl Panel {
@@ -84,7 +85,7 @@ impl Panel {
             x_range: None,
             points: false,
             time: false,
-            last_s: None,
+            shown_s: None,
         }
     }
 
@@ -164,7 +165,7 @@ pub enum Plot {
 }
 
 /// Seconds of quick curves in a picture that nobody can zoom.
-const LAST_S: f64 = 10.0;
+const SHOWN_S: f64 = 10.0;
 /// Events marked in plots over time: kinds of which there are at most this many.
 const MOST_MARKS: usize = 12;
 /// Highest frequency shown in spectra, as a multiple of f.
@@ -175,7 +176,7 @@ pub fn plots(a: &Analysis) -> Vec<Plot> {
     let i = &a.inputs;
     let mut out = Vec::new();
     let mut panel = |p: Panel| {
-        if !p.series.is_empty() {
+        if p.series.iter().any(|s| !s.x.is_empty()) {
             out.push(Plot::Panel(p));
         }
     };
@@ -207,7 +208,7 @@ pub fn plots(a: &Analysis) -> Vec<Plot> {
     panel(height);
 
     let mut forces = Panel::over_time("forces", "Normal forces of the handles", "force, N", a);
-    forces.last_s = Some(LAST_S);
+    forces.shown_s = Some(SHOWN_S);
     if i.normal_n.len() <= COLOURS.len() {
         for (k, n) in i.normal_n.iter().enumerate() {
             forces.line(format!("handle {}", k + 1), i.force_times(), n);
@@ -234,7 +235,7 @@ pub fn plots(a: &Analysis) -> Vec<Plot> {
         }
         _ => support.line("specific force", &i.t_s, &i.support_ratio),
     }
-    support.last_s = Some(LAST_S);
+    support.shown_s = Some(SHOWN_S);
     support.levels = vec![
         (crate::metrics::FLOAT_SHARE, "0.05".into()),
         (1.0, "at rest".into()),
@@ -294,7 +295,16 @@ pub fn plots(a: &Analysis) -> Vec<Plot> {
     let traces = (a.traces.iter()).filter(|t| !t.topic.starts_with(topics::ENERGY));
     let last = traces.clone().count().saturating_sub(1);
     for (k, trace) in traces.enumerate() {
-        let mut p = Panel::over_time("signals", &trace.topic, &unit(&trace.label), a);
+        // One signal alone says what it is.
+        let (title, label) = match &trace.series[..] {
+            [(name, ..)] => (format!("{}.{name}", trace.topic), name.as_str()),
+            _ => (trace.topic.clone(), "value"),
+        };
+        let label = match trace.unit.as_str() {
+            "" => label.to_owned(),
+            known => unit(known),
+        };
+        let mut p = Panel::over_time("signals", &title, &label, a);
         // That beats are counted is no curve.
         let counts = |name: &str| trace.topic == topics::BEAT && name == "number";
         for (name, t_s, x) in trace.series.iter().filter(|(name, ..)| !counts(name)) {
@@ -349,7 +359,7 @@ fn marks(a: &Analysis) -> Vec<(f64, String)> {
         .collect()
 }
 
-/// A plot of energies: id, title, note, the fields of the ledger with their names, and what [`Panel::last_s`] says.
+/// A plot of energies: id, title, note, the fields of the ledger with their names, and what [`Panel::shown_s`] says.
 type Energies = (
     &'static str,
     &'static str,
@@ -369,7 +379,7 @@ const ENERGIES: [Energies; 2] = [
             ("potential_j", "potential"),
             ("elastic_j", "elastic"),
         ],
-        Some(LAST_S),
+        Some(SHOWN_S),
     ),
     (
         "ledger",
@@ -384,11 +394,11 @@ const ENERGIES: [Energies; 2] = [
     ),
 ];
 
-fn energies(a: &Analysis, &(id, title, note, fields, last_s): &Energies) -> Option<Panel> {
+fn energies(a: &Analysis, &(id, title, note, fields, shown_s): &Energies) -> Option<Panel> {
     let trace = a.traces.iter().find(|t| t.topic == topics::ENERGY)?;
     let mut p = Panel::over_time(id, title, "energy, J", a);
     p.note = note.into();
-    p.last_s = last_s;
+    p.shown_s = shown_s;
     for (field, name) in fields {
         let Some((_, t_s, j)) = trace.series.iter().find(|(known, ..)| *known == field) else {
             continue;
@@ -476,6 +486,17 @@ fn inside(t_s: &[f64], window: Window) -> Range<usize> {
     window.range(t_s)
 }
 
+/// Whether a column's finite values differ by more than [`rounding`].
+fn moves(x: &[f64]) -> bool {
+    let known: Vec<f64> = x.iter().copied().filter(|x| x.is_finite()).collect();
+    let (low, high) = known
+        .iter()
+        .fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), x| {
+            (l.min(*x), h.max(*x))
+        });
+    high - low > rounding(&known)
+}
+
 /// Roll against its rate in the window.
 fn portrait(a: &Analysis) -> Option<Panel> {
     let i = &a.inputs;
@@ -485,6 +506,10 @@ fn portrait(a: &Analysis) -> Option<Panel> {
     let range = inside(&i.t_s, a.window);
     let (t_s, roll) = (&i.t_s[range.clone()], &i.roll_rad[range]);
     let step_s = mean_step_s(t_s)?;
+    // A rath that does not roll has no portrait.
+    if !moves(roll) {
+        return None;
+    }
     let mut rate = vec![f64::NAN; roll.len()];
     for stretch in stretches(t_s, 0.0) {
         if let Some((first, _)) = spline_derivatives(&roll[stretch.clone()], step_s) {
@@ -520,6 +545,9 @@ fn force_plane(a: &Analysis) -> Option<Panel> {
         return None;
     };
     let range = inside(i.force_times(), a.window);
+    if !moves(&first[range.clone()]) && !moves(&second[range.clone()]) {
+        return None;
+    }
     let mut p = Panel::new(
         "force_plane",
         "One handle against the other",
@@ -559,6 +587,9 @@ fn roll_spectrogram(a: &Analysis) -> Option<Image> {
     }
     // Dark where nothing was measured; not at all where that is most of it.
     let (roll, step_s) = about_mean(&i.t_s, &i.roll_rad)?;
+    if !moves(&i.roll_rad) {
+        return None;
+    }
     let fs_hz = 1.0 / step_s;
     let nperseg = (SPECTROGRAM_SEGMENT_S * fs_hz).round() as usize;
     if roll.len() < i.roll_rad.len() || roll.len() < 2 * nperseg {

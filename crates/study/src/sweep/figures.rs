@@ -7,7 +7,7 @@ use super::summary::Spread;
 use super::table::{Cell, Kind, Reader};
 use crate::draw::{Figure, Layer};
 use crate::statistics::{about_their_mean, nearest};
-use analyze::metrics::turn_of;
+use analyze::metrics::{find, turn_of};
 use std::path::Path;
 
 /// What is drawn of a metric.
@@ -65,11 +65,7 @@ pub fn draw(plan: &Plan, store: &Store, folder: &Path) -> Result<usize, String> 
                 }
             }
         }
-        let unit = match reader.columns[place].unit.as_str() {
-            "" | "1" => String::new(),
-            unit => format!(", {unit}"),
-        };
-        let label = format!("{name}{unit}");
+        let label = label(name, &reader.columns[place].unit);
         let turn = turn_of(name);
         let figure = match kind {
             Kinds::Band => band(plan, &label, &points, turn),
@@ -85,6 +81,15 @@ pub fn draw(plan: &Plan, store: &Store, folder: &Path) -> Result<usize, String> 
         }
     }
     Ok(drawn)
+}
+
+/// A metric as people call it, with its unit.
+fn label(name: &str, unit: &str) -> String {
+    let called = find(name).map_or(name, |m| m.label);
+    match unit {
+        "" | "1" => called.to_owned(),
+        unit => format!("{called}, {unit}"),
+    }
 }
 
 /// What a figure leaves out, behind its title.
@@ -239,6 +244,13 @@ mod tests {
     fn axes(text: &str) -> Vec<Axis> {
         let text = format!("scene = \"music\"\naxes = [{text}]");
         super::super::spec::parse("test", &text).unwrap().axes
+    }
+
+    #[test]
+    fn figures_call_metrics_as_people_do() {
+        assert_eq!(label("rms_roll_deg", "deg"), "RMS roll, deg");
+        assert_eq!(label("h2_ratio", "1"), "height, second harmonic");
+        assert_eq!(label("a truth", "N"), "a truth, N");
     }
 
     #[test]

@@ -20,11 +20,14 @@ const APART_RAD: f64 = 0.3;
 /// The viewer writes below the place: so far above it the place has to be.
 const ABOVE: f32 = 0.15;
 
-/// Draws the circle where there are phases.
+/// Draws the circle where there are phases that have another, or the beat, to compare with.
 pub fn draw(store: &mut Store<'_>, take: &Take) -> anyhow::Result<Option<View>> {
     let phases = &take.inputs.phase_rad;
     let (rows, carriers) = (take.phase_ns.len(), phases.len());
-    if rows == 0 || carriers == 0 || phases.iter().any(|p| p.len() != rows) {
+    let beat = &take.inputs.beat_phase_rad;
+    let heard = beat.len() == rows && beat.iter().any(|psi| psi.is_finite());
+    let compared = carriers > 1 || (carriers == 1 && heard);
+    if rows == 0 || !compared || phases.iter().any(|p| p.len() != rows) {
         return Ok(None);
     }
     let ring: Vec<[f32; 2]> = (0..=128)
@@ -81,8 +84,6 @@ pub fn draw(store: &mut Store<'_>, take: &Take) -> anyhow::Result<Option<View>> 
         store.fixed("/phases/numbers", &style)?;
     }
 
-    let beat = &take.inputs.beat_phase_rad;
-    let heard = beat.len() == rows && beat.iter().any(|psi| psi.is_finite());
     if heard {
         // Where the beat falls silent an empty row takes its mark away: the viewer keeps the latest.
         let sounds = |k: usize| beat[k].is_finite();
@@ -147,6 +148,21 @@ mod tests {
         });
         let marks = sent.lengths("/phases/beat", "Points2D:positions");
         assert_eq!(marks, [1, 1, 0, 1]);
+    }
+
+    #[test]
+    fn one_phase_without_a_beat_is_compared_with_nothing() {
+        let mut take = Take {
+            phase_ns: vec![0, 1],
+            ..Take::default()
+        };
+        take.inputs.phase_rad = vec![vec![0.0; 2]];
+        for (beat, drawn) in [(vec![], false), (vec![0.1, 0.2], true)] {
+            take.inputs.beat_phase_rad = beat;
+            sent::by(|store| {
+                assert_eq!(draw(store, &take).unwrap().is_some(), drawn);
+            });
+        }
     }
 
     #[test]

@@ -544,7 +544,8 @@ fn support(take: &Take) -> Option<(String, Vec<Line<'_>>)> {
 
 fn synchrony(take: &Take) -> Option<(String, Vec<Line<'_>>)> {
     let phases: Vec<&[f64]> = take.inputs.phase_rad.iter().map(|p| &p[..]).collect();
-    if phases.is_empty() {
+    // One carrier is in step with nobody.
+    if phases.len() < 2 {
         return None;
     }
     let r = phase::order_parameter(&phases);
