@@ -701,6 +701,30 @@ mod tests {
         }
     }
 
+    /// Also where roll and yaw are hardly told apart, and where the pole is not quite vertical.
+    #[test]
+    fn the_roll_alone_is_that_of_all_three_and_within_half_a_turn() {
+        for k in 0..4000_u32 {
+            let [a, b, c] = [1.1, 2.3, 3.7].map(|f| (f * f64::from(k)).sin());
+            let upright = std::f64::consts::FRAC_PI_2 * b.signum();
+            let pitch = match k % 4 {
+                0 => upright * b.abs(),
+                n => upright * (1.0 - 10f64.powi(-5 * n as i32 + 3) * b.abs()),
+            };
+            let q = UnitQuaternion::from_euler_angles(3.1 * a, pitch, 3.1 * c);
+            let pose = pose([q.i, q.j, q.k, q.w]);
+            let angles = pose.roll_pitch_yaw_rad();
+            assert_eq!(pose.roll_rad(), angles[0], "{pitch}");
+            for angle in angles {
+                assert!(angle.abs() <= std::f64::consts::PI + 1e-15, "{angles:?}");
+            }
+            let back = UnitQuaternion::from_euler_angles(angles[0], angles[1], angles[2]);
+            // Angles are those of numbers as small as the cosine of the pitch, each with the rounding of one.
+            let rounding = 1e-15 / angles[1].cos().max(1e-9);
+            assert!(q.angle_to(&back) < 3e-8 + rounding, "{angles:?}");
+        }
+    }
+
     #[test]
     fn a_vertical_pole_still_has_angles_of_the_same_rotation() {
         for pitch in [std::f64::consts::FRAC_PI_2, -std::f64::consts::FRAC_PI_2] {

@@ -107,6 +107,18 @@ mod tests {
                 "{at}"
             );
         }
+        // At a sample the later piece; beyond the ends the nearest.
+        for (at, piece) in [
+            (-1.0, 0),
+            (0.0, 0),
+            (0.1, 1),
+            (0.25, 2),
+            (0.29, 2),
+            (1.0, 5),
+            (2.0, 5),
+        ] {
+            assert_eq!(s.piece(at), piece, "{at}");
+        }
         let (h, w) = (1.0 / 30.0, 4.0 * std::f64::consts::PI);
         let t: Vec<f64> = (0..300).map(|k| f64::from(k) * h).collect();
         let s = Spline::new(&t, &t.iter().map(|t| (w * t).sin()).collect::<Vec<_>>()).unwrap();

@@ -86,6 +86,34 @@ fn what_a_contact_dissipates_never_falls() {
     }
 }
 
+/// The energy of springs is that of contacts that are pressed, and of none that a handle has left.
+#[test]
+fn springs_store_what_their_compression_says() {
+    let set = ["sling", "pole_friction"].map(|e| format!("effects.{e}=false"));
+    let scene = load("music", &set).unwrap();
+    let contact = scene.effects.contact.as_ref().unwrap();
+    let (mut slack, mut pressed) = (0, 0);
+    run(&scene, &mut |s: &Sample| {
+        let each = s.compression_m.iter().enumerate();
+        let stored_j: f64 = each
+            .map(|(i, d)| 0.5 * contact.stiffness_n_per_m.get(i) * d.max(0.0).powi(2))
+            .sum();
+        let told_j = s.energy.unwrap().elastic_j;
+        assert!(
+            (told_j - stored_j).abs() <= 1e-9 * (1.0 + stored_j),
+            "{} s: {told_j} J told, {stored_j} J stored",
+            s.t_s
+        );
+        slack += s.compression_m.iter().filter(|d| **d < 0.0).count();
+        let pulls = s.compression_m.iter().zip(&s.normal_n);
+        pressed += pulls.filter(|(d, n)| **d > 0.0 && **n == 0.0).count();
+        true
+    })
+    .unwrap();
+    // Handles that have left their shoulders, and those let go while they were pressed.
+    assert!(slack > 100 && pressed > 10, "{slack} {pressed}");
+}
+
 /// Straps that hardly damp are fed by a load that bounces, without bound: such a run ends with its cause; one that merely swings goes on.
 #[test]
 fn a_law_that_feeds_a_run_ends_it() {

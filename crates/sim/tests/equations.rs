@@ -701,6 +701,12 @@ fn every_rate_is_that_of_the_equations() {
             1.7,
         );
     }
+    // So much damping that handles which part fast are let go while they are still pressed.
+    let fast = CONTACT.replace("[450.0, 300.0, 410.0, 350.0, 390.0]", "9000.0");
+    check(
+        &format!("{FIVE}{fast}law = \"hunt-crossley\"\n{HOLD}{GAIT}"),
+        1.7,
+    );
     let draws = "[effects.frequency_spread]\nsd_hz = 0.2\n[effects.noise]\nphase_rad_per_sqrt_s = 0.3\ngrid_hz = 7.0\n";
     for graph in [
         "\"all\"",

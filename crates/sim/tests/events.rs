@@ -193,3 +193,34 @@ fn hours_of_music_end() {
         assert!(times.iter().enumerate().all(tick), "{name}");
     }
 }
+
+/// Every moment at which a law jumps or bends, and no other, ends a step: without it a method would have to find out.
+#[test]
+fn a_step_ends_wherever_a_law_jumps_or_bends() {
+    let scene = scene(
+        r#"
+        name = "turns"
+        duration_s = 60.0
+        [effects.contact]
+        [effects.sling]
+        [effects.gait]
+        [effects.lift]
+        onset_s = 7.0
+        build_up_s = 4.0
+        [effects.path]
+        turn_deg = 90.0
+        turn_start_s = 11.0
+        turn_time_s = 2.5
+        [effects.music]
+        onset_s = 5.0
+        build_up_s = 4.0
+        tempo_changes = [{ at_s = 20.0, over_s = 1.5, beat_hz = 2.5 }, { at_s = 30.0, beat_hz = 2.0 }]
+        pauses = [{ from_s = 40.0, to_s = 42.0 }]
+        "#,
+    );
+    let model = Model::new(&scene);
+    let next = |after: &f64| Some(model.next_switch_s(*after)).filter(|t| t.is_finite());
+    let found: Vec<f64> = std::iter::successors(next(&0.0), next).collect();
+    let expected = [5.0, 7.0, 11.0, 13.5, 20.0, 21.5, 30.0, 40.0, 42.0];
+    assert_eq!(found, expected);
+}

@@ -169,6 +169,31 @@ mod tests {
     }
 
     #[test]
+    fn soft_springs_let_the_load_sink_far_and_bilateral_ones_pull_by_their_own_law() {
+        let springs = |level_m, stiffness, exponent, pull| Springs {
+            level_m,
+            stiffness,
+            exponent,
+            pull,
+            weight_n: 600.0,
+            bends: &[],
+        };
+        // k d^p = W: 60 m, and 30^(2/3) m.
+        let deep = springs(vec![1.0], &[10.0], 1.0 + 1e-12, false).rest().0;
+        assert!((deep - (1.0 - 60.0)).abs() < 1e-6, "{deep}");
+        let deep = springs(vec![1.0], &[20.0], 1.5, false).rest().0;
+        assert!(
+            (deep - (1.0 - 30f64.powf(2.0 / 3.0))).abs() < 1e-9,
+            "{deep}"
+        );
+        // Two press by d^2, one 1 m lower pulls by (1 − d)^2: 2 k d² − k (1 − d)² = W.
+        let (k, w) = (1000.0, 600.0_f64);
+        let d = -1.0 + f64::sqrt(2.0 + w / k);
+        let held = springs(vec![1.0, 1.0, 0.0], &[k; 3], 2.0, true).rest().0;
+        assert!((held - (1.0 - d)).abs() < 1e-9, "{held}");
+    }
+
+    #[test]
     fn one_shape_of_bending_under_many_handles_is_a_linear_system() {
         // K q = Σ s k (d − s q), Σ k (d − s q) = W, d the body's sinking.
         let shape = vec![1.0, 0.4, 0.4, 1.0];

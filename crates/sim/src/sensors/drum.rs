@@ -178,6 +178,69 @@ mod tests {
         assert_eq!(track.block(3).unwrap().stamp_s, -0.5 + 0.3);
     }
 
+    /// The formula at the head, stroke after stroke, each to its end; of noise what a click leaves out.
+    #[test]
+    fn the_sound_is_that_of_the_formula() {
+        let quiet = Track {
+            strokes: vec![
+                Stroke {
+                    t_s: 0.25,
+                    tempo_hz: 2.0,
+                },
+                Stroke {
+                    t_s: 0.4,
+                    tempo_hz: 2.0,
+                },
+            ],
+            ..track()
+        };
+        let (d, p, rate) = (quiet.decay_s, quiet.pitch_hz, 8000.0 * 1.001);
+        for k in 0..16001_u64 {
+            let t = k as f64 / rate;
+            let mut expected = 0.0;
+            let mut clicks = 0.0;
+            for struck in [0.25, 0.4] {
+                let s = t - struck;
+                if s < 0.0 {
+                    continue;
+                }
+                let fade = (-s / d).exp();
+                expected += 0.7 * fade * (TAU * p * (s + 0.6 * d * (1.0 - fade))).sin();
+                // A normal number beyond six is one in a billion.
+                clicks += 6.0 * 0.7 * fade * 0.3 * (-s / 0.004).exp();
+            }
+            let apart = (quiet.sample(k) - expected).abs();
+            assert!(apart <= clicks + 1e-4, "{t} s: {apart}");
+        }
+        let block = quiet.block(2).unwrap();
+        assert_eq!(
+            (block.sound.len(), quiet.block(20).unwrap().sound.len()),
+            (800, 1)
+        );
+        assert_eq!(block.end_s, 2399.0 / rate);
+        assert_eq!(quiet.block(20).unwrap().end_s, 16000.0 / rate);
+        assert_eq!(quiet.block(21), None);
+    }
+
+    #[test]
+    fn noise_of_the_place_is_white_and_of_the_strength_asked_for() {
+        let noisy = Track {
+            noise: 0.1,
+            strokes: Vec::new(),
+            ..track()
+        };
+        let x: Vec<f64> = (0..16000).map(|k| noisy.sample(k)).collect();
+        let mean_of = |lag: usize| {
+            let pairs = x.iter().zip(&x[lag..]);
+            pairs.map(|(a, b)| a * b).sum::<f64>() / (x.len() - lag) as f64
+        };
+        // Four standard errors: σ²√(2/n), and σ²/√n.
+        assert!((mean_of(0) - 0.01).abs() < 0.01 * 4.0 * (2.0 / 16e3f64).sqrt());
+        for lag in 1..5 {
+            assert!(mean_of(lag).abs() < 0.01 * 4.0 / 16e3f64.sqrt(), "{lag}");
+        }
+    }
+
     #[test]
     fn a_wav_file_says_how_long_it_is() {
         let wav = track().wav().unwrap();
