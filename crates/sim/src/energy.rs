@@ -168,3 +168,107 @@ fn stretched_j(w: &Workspace) -> f64 {
     let twice = pairs.map(|p| sum(p.tangential[0] * p.gap[0] + p.tangential[1] * p.gap[1]).abs());
     0.5 * twice.sum::<f64>()
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::scene::load;
+    use crate::solve::method;
+
+    const UNIT_J: f64 = 60.0 * (1.0 + 9.81);
+
+    fn balance(kinetic_j: f64, potential_j: f64, work_in_j: f64, unexplained_j: f64) -> Energy {
+        Energy {
+            kinetic_j,
+            potential_j,
+            elastic_j: 0.0,
+            work_in_j,
+            dissipated_j: 0.0,
+            unexplained_j,
+        }
+    }
+
+    /// Whether the last of some balances is doubted, and none before it.
+    fn doubted(method_name: &str, tolerance: f64, all: &[Energy]) -> Option<Doubt> {
+        let scene = load("music", &[]).unwrap();
+        let (model, settings) = (
+            Model::new(&scene),
+            Settings {
+                tolerance,
+                step_s: 1e-3,
+                most_evaluations: 1,
+            },
+        );
+        let mut belief = Belief::new(&scene, method(method_name).unwrap(), &settings);
+        let w = model.workspace();
+        let (last, before) = all.split_last().unwrap();
+        for e in before {
+            assert_eq!(belief.doubt(e, &w), None);
+        }
+        belief.doubt(last, &w)
+    }
+
+    #[test]
+    fn what_was_supplied_is_what_a_rest_is_held_against() {
+        // 100 J at the start, 60 J fallen, 40 J of work at most, some of it taken back: 200 J.
+        let story = |rest_j: f64| {
+            [
+                balance(100.0, 50.0, 0.0, 0.0),
+                balance(120.0, 20.0, -40.0, 0.0),
+                balance(90.0, -10.0, 5.0, rest_j),
+            ]
+        };
+        for (name, tolerance, part) in [
+            ("semi-implicit-euler", 1e-6, 1.0),
+            ("dop853", 1e-6, 1e-3),
+            ("dop853", 1e-4, 1e-2),
+        ] {
+            // Beside it a millionth of 200 + 90 + 10 + 50 J, and ten tolerances of 60 kg at 1.4 m/s and 1 m up.
+            let allowed = if name == "dop853" {
+                10.0 * tolerance
+            } else {
+                0.0
+            };
+            let most_j = part * 200.0 + 350e-6 + allowed * UNIT_J;
+            for sign in [1.0, -1.0] {
+                let doubt = |rest_j: f64| doubted(name, tolerance, &story(sign * rest_j));
+                assert_eq!(doubt(0.9999 * most_j), None, "{name} {tolerance}");
+                let supplied_j = 200.0;
+                let nowhere_j = 1.0001 * most_j;
+                assert_eq!(
+                    doubt(nowhere_j),
+                    Some(Doubt::Unexplained {
+                        nowhere_j,
+                        supplied_j
+                    })
+                );
+            }
+        }
+    }
+
+    #[test]
+    fn laws_that_give_more_than_was_supplied_are_doubted() {
+        let given = |elastic_j: f64, dissipated_j: f64| {
+            let start = Energy {
+                elastic_j: 30.0,
+                ..balance(100.0, 0.0, 0.0, 0.0)
+            };
+            let now = Energy {
+                elastic_j,
+                dissipated_j,
+                ..balance(100.0, 0.0, 0.0, 0.0)
+            };
+            matches!(
+                doubted("dop853", 1e-6, &[start, now]),
+                Some(Doubt::Given {
+                    supplied_j: 130.0,
+                    ..
+                })
+            )
+        };
+        // As much as was supplied, 130 J, and the unit of the body's energy may be given, and what springs gave counts.
+        let most_j = 130.0 + UNIT_J;
+        assert!(!given(0.0, 30.0 - 0.999 * most_j) && given(0.0, 30.0 - 1.001 * most_j));
+        assert!(!given(30.0 - 0.999 * most_j, 0.0) && given(30.0 - 1.001 * most_j, 0.0));
+    }
+}

@@ -454,3 +454,88 @@ fn the_field_scene_is_the_music_scene_with_instruments() {
     (field.name, field.about) = (music.name.clone(), music.about.clone());
     assert_eq!(field, music);
 }
+
+/// What lies on the edge of a range, or beyond it in one of several ways, is refused under its key; what lies just inside is not.
+#[test]
+fn edges_of_ranges_are_where_they_are_said_to_be() {
+    let base = "name = \"a\"\nduration_s = 10.0\n[effects.hold]\n";
+    let music = |more: &str| format!("[effects.gait]\n[effects.music]\n{more}");
+    let changes = |list: &str| music(&format!("tempo_changes = [{list}]\n"));
+    let pauses = |list: &str| music(&format!("pauses = [{list}]\n"));
+    let measured = |times: &str, phases: &str| {
+        format!("[effects.gait]\n[effects.measured]\nt_s = {times}\nphase_rad = {phases}\n")
+    };
+    let (two, times) = (
+        "[[0.0, 1.0, 2.0, 3.0], [0.0, 1.0, 2.0, 3.0]]",
+        "[0.0, 3.0, 6.0, 10.0]",
+    );
+    let sensor = |more: &str| format!("[[effects.imu.sensors]]\n{more}\n");
+    let drum = |more: &str| music(&format!("[effects.drum]\n{more}\n"));
+    let body = |zz: &str| format!("[body]\ninertia_kg_m2 = {{ xx = 1.0, yy = 1.0, zz = {zz} }}\n");
+    for (text, key) in [
+        (
+            changes("{ at_s = 0.0, beat_hz = 2.0 }"),
+            "tempo_changes.0.at_s",
+        ),
+        (
+            changes("{ at_s = nan, beat_hz = 2.0 }"),
+            "tempo_changes.0.at_s",
+        ),
+        (
+            changes("{ at_s = 1.0, over_s = 3.0, beat_hz = 2.0 }, { at_s = 3.9, beat_hz = 2.0 }"),
+            "tempo_changes.1.at_s",
+        ),
+        (pauses("{ from_s = nan, to_s = 2.0 }"), "pauses.0.from_s"),
+        (pauses("{ from_s = 2.0, to_s = 2.0 }"), "pauses.0.to_s"),
+        (
+            pauses("{ from_s = 1.0, to_s = 2.0 }, { from_s = 1.9, to_s = 3.0 }"),
+            "pauses.1.from_s",
+        ),
+        (
+            "[effects.path]\nslope_deg = 60.0\n".into(),
+            "path.slope_deg",
+        ),
+        ("[effects.path]\nbank_deg = -60.0\n".into(), "path.bank_deg"),
+        ("[effects.path]\nbank_deg = nan\n".into(), "path.bank_deg"),
+        (
+            measured("[0.0, 5.0, 10.0]", "[[0.0, 1.0, 2.0], [0.0, 1.0, 2.0]]"),
+            "measured.t_s",
+        ),
+        (measured("[0.0, 3.0, 3.0, 10.0]", two), "measured.t_s"),
+        (measured("[0.0, 3.0, 6.0, 9.9]", two), "measured.t_s"),
+        (measured("[0.1, 3.0, 6.0, 10.0]", two), "measured.t_s"),
+        (
+            measured(times, "[[0.0, 1.0, 2.0, 3.0]]"),
+            "measured.phase_rad",
+        ),
+        (
+            measured(times, "[[0.0, 1.0, 2.0, 3.0], [0.0, 1.0, 2.0]]"),
+            "measured.phase_rad",
+        ),
+        (sensor("clock_offset_s = -2e9"), "sensors.0.clock_offset_s"),
+        (sensor("name = \"\""), "sensors.0.name"),
+        (sensor("name = \"left/hand\""), "sensors.0.name"),
+        (
+            drum("sample_rate_hz = 8000\npitch_hz = 4000.0"),
+            "drum.pitch_hz",
+        ),
+        (body("0.0"), "inertia_kg_m2"),
+        (body("-0.1"), "inertia_kg_m2"),
+        (body("1e-15"), "inertia_kg_m2"),
+    ] {
+        let said = message(&format!("{base}{text}"));
+        assert!(said.contains(key), "`{key}` is not in: {said}");
+    }
+    for text in [
+        changes("{ at_s = 1.0, over_s = 3.0, beat_hz = 2.0 }, { at_s = 4.0, beat_hz = 2.0 }"),
+        pauses("{ from_s = 0.0, to_s = 2.0 }, { from_s = 2.0, to_s = 3.0 }"),
+        "[effects.path]\nslope_deg = 59.9\nbank_deg = -59.9\n".into(),
+        measured(times, two),
+        sensor("name = \"left_hand2\""),
+        drum("sample_rate_hz = 8000\npitch_hz = 3999.0"),
+        body("1e-6"),
+    ] {
+        let scene = parse("scene.toml", &format!("{base}{text}"), &[]);
+        assert!(scene.is_ok(), "{text}: {:?}", scene.err());
+    }
+}

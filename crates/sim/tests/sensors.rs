@@ -6,8 +6,9 @@ use common::{readings, samples, scene};
 use nalgebra::Vector3;
 use sim::beat::Stroke;
 use sim::effects::imu::Imu;
+use sim::model::Model;
 use sim::run::Sample;
-use sim::scene::parse;
+use sim::scene::{load, parse};
 use sim::sensors::drum::Track;
 use sim::solve::METHODS;
 use std::f64::consts::TAU;
@@ -405,4 +406,22 @@ fn val_a_drum_is_a_gliding_tone_and_a_click() {
     let power = clicks.iter().map(|x| x * x).sum::<f64>() / clicks.len() as f64;
     let within = 4.0 * (2.0 / clicks.len() as f64).sqrt();
     assert!((power - 1.0).abs() < within, "{power} of {}", clicks.len());
+}
+
+/// A recorder whose clock is fast writes more samples of the same minute.
+#[test]
+fn a_drum_track_lasts_as_long_as_the_scene() {
+    for (drift_ppm, samples) in [(0.0, 80_001), (1005.0, 80_081), (-1005.0, 79_920)] {
+        let set = [
+            "duration_s=10".to_owned(),
+            "effects.drum.sample_rate_hz=8000".to_owned(),
+            format!("effects.drum.clock_drift_ppm={drift_ppm:?}"),
+        ];
+        let model = Model::new(&load("music", &set).unwrap());
+        assert_eq!(
+            model.track().map(|t| t.samples),
+            Some(samples),
+            "{drift_ppm}"
+        );
+    }
 }

@@ -253,5 +253,8 @@ mod tests {
             u32::from_le_bytes(wav[40..44].try_into().unwrap()),
             2 * 16001
         );
+        // Samples and bytes of them in a second.
+        let rates = [24, 28].map(|at| u32::from_le_bytes(wav[at..at + 4].try_into().unwrap()));
+        assert_eq!(rates, [8000, 16_000]);
     }
 }
