@@ -1,8 +1,11 @@
 //! Every metric that docs/metrics.md defines by a formula, against NumPy's and SciPy's answers (tests/data/metrics.json, made from that page by
 //! tests/data/make_metrics.py); and what lies exactly on a definition's edge.
 
+mod noise;
+
 use analyze::metrics::{Context, METRICS, mechanism_evidence};
 use analyze::{Inputs, Window, metrics};
+use noise::noise;
 use serde_json::Value;
 use std::f64::consts::TAU;
 
@@ -16,18 +19,6 @@ const OTHERWISE: &[&str] = &[
     "captured",
     "unstable",
 ];
-
-/// The same numbers as `noise` in make_metrics.py.
-fn noise(n: usize, seed: u64) -> Vec<f64> {
-    let mut state = seed;
-    let mut next = || {
-        state = state
-            .wrapping_mul(6364136223846793005)
-            .wrapping_add(1442695040888963407);
-        (state >> 11) as f64 / (1u64 << 53) as f64 - 0.5
-    };
-    (0..n).map(|_| next()).collect()
-}
 
 /// A minute of a rath under three handles at 30 Hz, the beat from 25 s on.
 fn walk() -> Inputs {

@@ -1,11 +1,14 @@
 //! SciPy's answers (tests/data/scipy.json, made by tests/data/make_scipy.py) against ours, to 1e-10.
 
+mod noise;
+
 use analyze::filter::{Band, butter, sosfiltfilt};
 use analyze::phase::hilbert;
 use analyze::spectrum::{
     Average, Detrend, Mode, Options, Scaling, Taper, chi_square_quantile, coherence, csd, rfft_hz,
     rfft_magnitude, spectrogram, stream::WelchStream, welch,
 };
+use noise::noise;
 use serde_json::Value;
 
 /// The largest difference allowed, relative to the largest value of the vector. Measured: 2e-15 (filters 3e-13).
@@ -13,18 +16,6 @@ const AGREEMENT: f64 = 1e-10;
 
 fn vectors() -> Value {
     serde_json::from_str(include_str!("data/scipy.json")).unwrap()
-}
-
-/// The same numbers as `noise` in make_scipy.py.
-fn noise(n: usize, seed: u64) -> Vec<f64> {
-    let mut state = seed;
-    let mut next = || {
-        state = state
-            .wrapping_mul(6364136223846793005)
-            .wrapping_add(1442695040888963407);
-        (state >> 11) as f64 / (1u64 << 53) as f64 - 0.5
-    };
-    (0..n).map(|_| next()).collect()
 }
 
 fn signals() -> (Vec<f64>, Vec<f64>) {

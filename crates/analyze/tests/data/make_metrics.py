@@ -15,7 +15,7 @@ from scipy import integrate, interpolate, optimize, signal
 
 
 def noise(n, seed):
-    """The same numbers as `noise` in metrics.rs."""
+    """The same numbers as in tests/noise/mod.rs."""
     state, out = seed, []
     for _ in range(n):
         state = (state * 6364136223846793005 + 1442695040888963407) % 2**64

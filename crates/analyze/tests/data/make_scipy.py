@@ -14,7 +14,7 @@ from scipy import signal
 
 
 def noise(n, seed):
-    """The same numbers as `noise` in scipy.rs."""
+    """The same numbers as in tests/noise/mod.rs."""
     state, out = seed, []
     for _ in range(n):
         state = (state * 6364136223846793005 + 1442695040888963407) % 2**64
