@@ -5,7 +5,7 @@ use serde::Serialize;
 use crate::inputs::{Window, mean_step_s, stretches};
 use crate::median::median;
 use crate::spectrum::{DEFAULT_SEGMENT_S, Options, Spectrum, welch};
-use crate::summary::{rounding, squares};
+use crate::summary::{moves, squares};
 
 /// A line of a spectrum.
 #[derive(Clone, Debug, PartialEq, Serialize)]
@@ -111,10 +111,7 @@ impl SpectrumSummary {
         }
         let fs_hz = 1.0 / mean_step_s(t_s)?;
         let still = vec![0.0; x.len()];
-        let x = match ends.1 - ends.0 <= rounding(x) {
-            true => &still,
-            false => x,
-        };
+        let x = if moves(x) { x } else { &still };
         let spectrum = welch(x, fs_hz, &Options::seconds(DEFAULT_SEGMENT_S, fs_hz)).ok()?;
         Some(SpectrumSummary::new(spectrum, f_hz, unit))
     }

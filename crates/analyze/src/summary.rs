@@ -294,6 +294,15 @@ pub(crate) fn rounding(x: &[f64]) -> f64 {
     1e-12 * x.iter().fold(0.0f64, |most, x| most.max(x.abs()))
 }
 
+/// Whether finite values differ by more than [`rounding`].
+pub(crate) fn moves(x: &[f64]) -> bool {
+    let known = x.iter().copied().filter(|x| x.is_finite());
+    let (low, high) = known.fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), x| {
+        (low.min(x), high.max(x))
+    });
+    high - low > rounding(&[low, high])
+}
+
 /// One signal's moments and spectrum while the recording streams by.
 pub struct Stream {
     moments: Moments,

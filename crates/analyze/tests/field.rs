@@ -6,8 +6,9 @@
 use analyze::examine::{Analysis, Request, examine};
 use analyze::field::DeviceClocks;
 use analyze::imu::Track;
-use analyze::imu::axes::misfit;
+use analyze::imu::axes::{misfit, signed_permutations};
 use analyze::quality::Quality;
+use nalgebra::{Matrix3, Vector3};
 use recording::import::{ImportOptions, ingest};
 use recording::read::{ReadOptions, Recording};
 use recording::write::{RecordingWriter, WriterOptions};
@@ -120,40 +121,19 @@ fn track(recording: &Recording, topic: &str) -> Track {
 
 /// Of the 47 ways to exchange or turn the gyroscope's axes how many are found out; those that one way alone fits have to be named.
 fn found_out(track: &Track) -> usize {
-    let orders = [
-        [0, 1, 2],
-        [0, 2, 1],
-        [1, 0, 2],
-        [1, 2, 0],
-        [2, 0, 1],
-        [2, 1, 0],
-    ];
     let mut count = 0;
-    for (order, signs) in orders.into_iter().flat_map(|o| (0..8).map(move |s| (o, s))) {
+    for axes in signed_permutations() {
         let mut wrong = track.clone();
         for rate in &mut wrong.gyro_rad_per_s {
-            let read = order.map(|axis| rate[axis]);
-            *rate = std::array::from_fn(|i| {
-                if signs >> i & 1 == 0 {
-                    read[i]
-                } else {
-                    -read[i]
-                }
-            });
+            *rate = (axes * Vector3::from(*rate)).into();
         }
         let found = misfit(&wrong, 9.80665);
-        let as_it_is = order == orders[0] && signs == 0;
+        let as_it_is = axes == Matrix3::identity();
         assert!(!(as_it_is && found.is_some()), "{found:?}");
         let Some(found) = found else { continue };
         count += 1;
         if found.others == 0 {
-            for (axis, (of, turned)) in found.read_as.into_iter().enumerate() {
-                assert_eq!(
-                    (order[of], signs >> of & 1 == 1),
-                    (axis, turned),
-                    "{found:?}"
-                );
-            }
+            assert_eq!(found.axes * axes, Matrix3::identity(), "{found:?}");
         }
     }
     count

@@ -35,8 +35,8 @@ const ROUNDS: usize = 3;
 /// Axes that do not agree.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Misfit {
-    /// The gyroscope's axes as they would fit, x, y, z: which of those read, and whether with the other sign.
-    pub read_as: [(usize, bool); 3],
+    /// P that fits: rows x, y, z of the gyroscope as they would, of those read.
+    pub axes: Matrix3<f64>,
     /// How many other ways fit as well.
     pub others: usize,
     /// By how much gravity wanders as it was read, m/s² RMS.
@@ -48,8 +48,10 @@ pub struct Misfit {
 impl Misfit {
     /// One line for people.
     pub fn told(&self) -> String {
-        let axis = |(axis, turned): (usize, bool)| {
-            format!("{}{}", if turned { "−" } else { "" }, ["x", "y", "z"][axis])
+        let axis = |row: usize| {
+            let row = self.axes.row(row).transpose();
+            let sign = if row.sum() < 0.0 { "−" } else { "" };
+            format!("{sign}{}", ["x", "y", "z"][row.iamax()])
         };
         let others = match self.others {
             0 => String::new(),
@@ -59,7 +61,7 @@ impl Misfit {
             "gyroscope and accelerometer do not stand on the same axes: turned by the gyroscope, gravity wanders by {:.2} m/s² within seconds, but by {:.2} with its x, y, z read as {}{others}; or it is the accelerometer's that are exchanged. No interval knows of it: mend the layout",
             self.wanders_m_per_s2,
             self.fits_m_per_s2,
-            self.read_as.map(axis).join(", ")
+            [0, 1, 2].map(axis).join(", ")
         )
     }
 }
@@ -90,29 +92,23 @@ pub fn misfit(track: &Track, gravity_m_per_s2: f64) -> Option<Misfit> {
         let [a, b] = [still, mean].map(|bias| Fit::of(&windows, axes, bias, gravity_m_per_s2));
         if a.rms() < b.rms() { a } else { b }
     };
-    let as_read = fit(&Matrix3::identity());
-    let mut fits: Vec<(Matrix3<f64>, Fit)> = signed_permutations()
+    let fits: Vec<(Matrix3<f64>, Fit)> = signed_permutations()
         .map(|axes| (axes, fit(&axes)))
         .collect();
+    let (_, as_read) = fits.first()?;
     let least = fits.iter().map(|(_, f)| f.rms()).fold(f64::MAX, f64::min);
-    fits.retain(|(_, fit)| fit.rms() <= ALIKE * least);
+    let alike = || (fits.iter()).filter(|(_, fit)| fit.rms() <= ALIKE * least);
     // Axes that stay come first, then signs.
     let kept = |axes: &Matrix3<f64>| 8.0 * axes.trace() + axes.sum();
-    let (axes, fit) = fits
-        .iter()
-        .max_by(|a, b| kept(&a.0).total_cmp(&kept(&b.0)))?;
+    let (axes, fit) = alike().max_by(|a, b| kept(&a.0).total_cmp(&kept(&b.0)))?;
     let each = fit.squares.iter().zip(&as_read.squares);
     let better = each.filter(|(fit, as_read)| fit < as_read).count();
     if as_read.rms() < TIMES * fit.rms() || (better as f64) < MOSTLY * windows.len() as f64 {
         return None;
     }
-    let read_as = [0, 1, 2].map(|row| {
-        let of = (0..3).find(|of| axes[(row, *of)] != 0.0).unwrap_or(row);
-        (of, axes[(row, of)] < 0.0)
-    });
     Some(Misfit {
-        read_as,
-        others: fits.len() - 1,
+        axes: *axes,
+        others: alike().count() - 1,
         wanders_m_per_s2: as_read.rms(),
         fits_m_per_s2: fit.rms(),
     })
@@ -163,8 +159,8 @@ fn windows(track: &Track) -> Vec<Vec<Block>> {
     out
 }
 
-/// All of them, those with a mirror among them.
-fn signed_permutations() -> impl Iterator<Item = Matrix3<f64>> {
+/// The 48 ways to read three axes, those with a mirror among them; first as they are.
+pub fn signed_permutations() -> impl Iterator<Item = Matrix3<f64>> {
     let orders = [
         [0, 1, 2],
         [0, 2, 1],
@@ -323,11 +319,7 @@ mod tests {
                 let found = misfit(&exchanged(&track, &axes), G);
                 let found = found.unwrap_or_else(|| panic!("{degrees}°: {axes} is not found"));
                 // What was done is undone by its inverse.
-                let mut back = Matrix3::zeros();
-                for (row, (of, turned)) in found.read_as.into_iter().enumerate() {
-                    back[(row, of)] = if turned { -1.0 } else { 1.0 };
-                }
-                assert_eq!((back * axes, found.others), (Matrix3::identity(), 0));
+                assert_eq!((found.axes * axes, found.others), (Matrix3::identity(), 0));
             }
         }
     }
@@ -345,7 +337,7 @@ mod tests {
         assert_eq!(misfit(&track, G), None);
         let mirror = Matrix3::from_diagonal(&Vector3::new(-1.0, 1.0, 1.0));
         let found = misfit(&exchanged(&track, &mirror), G).unwrap();
-        assert_eq!(found.read_as, [(0, true), (1, false), (2, false)]);
+        assert_eq!(found.axes, mirror);
         assert!(found.others > 0 && found.told().contains("−x, y, z"));
     }
 

@@ -495,6 +495,14 @@ pub fn find(name: &str) -> Option<&'static Metric> {
     METRICS.iter().find(|m| m.name == name)
 }
 
+/// What stands beside an axis or a number: a name, and its unit where it has one.
+pub fn with_unit(name: &str, unit: &str) -> String {
+    match unit {
+        "" | "1" => name.to_owned(),
+        unit => format!("{name}, {unit}"),
+    }
+}
+
 /// Metrics that are directions (deg): their means and spreads are circular.
 const DIRECTIONS: &[&str] = &["beat_lead_deg"];
 

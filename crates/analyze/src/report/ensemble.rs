@@ -4,7 +4,7 @@ use std::fmt::Write;
 
 use super::table::figures;
 use crate::examine::Analysis;
-use crate::metrics::METRICS;
+use crate::metrics::{METRICS, with_unit};
 
 /// The columns of the line per file.
 const COLUMNS: [(&str, &str); 7] = [
@@ -79,11 +79,7 @@ pub fn ensemble(analyses: &[Analysis]) -> String {
         } else {
             "–".into()
         };
-        let label = if metric.unit == "1" {
-            metric.label.to_owned()
-        } else {
-            format!("{}, {}", metric.label, metric.unit)
-        };
+        let label = with_unit(metric.label, metric.unit);
         let _ = writeln!(
             out,
             "{label:<32} {:>10} {:>10} {:>10} {:>10} {:>5}  {}",

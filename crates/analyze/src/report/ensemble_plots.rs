@@ -68,12 +68,7 @@ fn distribution(
     id: &'static str,
 ) -> Option<Panel> {
     let metric = metrics::find(name)?;
-    let unit = if metric.unit == "1" {
-        String::new()
-    } else {
-        format!(", {}", metric.unit)
-    };
-    let label = format!("{}{unit}", metric.label);
+    let label = metrics::with_unit(metric.label, metric.unit);
     let mut p = Panel::new(
         id,
         &format!("Distribution: {}", metric.label),

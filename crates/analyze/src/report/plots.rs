@@ -7,7 +7,7 @@ use crate::mechanism::spline_derivatives;
 use crate::peaks::SpectrumSummary;
 use crate::phase;
 use crate::spectrum::{Mode, Options, spectrogram};
-use crate::summary::rounding;
+use crate::summary::moves;
 use recording::{text::counted, topics};
 use std::ops::Range;
 
@@ -484,17 +484,6 @@ pub(super) fn unit(text: &str) -> String {
 
 fn inside(t_s: &[f64], window: Window) -> Range<usize> {
     window.range(t_s)
-}
-
-/// Whether a column's finite values differ by more than [`rounding`].
-fn moves(x: &[f64]) -> bool {
-    let known: Vec<f64> = x.iter().copied().filter(|x| x.is_finite()).collect();
-    let (low, high) = known
-        .iter()
-        .fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), x| {
-            (l.min(*x), h.max(*x))
-        });
-    high - low > rounding(&known)
 }
 
 /// Roll against its rate in the window.

@@ -11,16 +11,8 @@ import sys
 
 import numpy as np
 import scipy
+from noise import noise
 from scipy import integrate, interpolate, optimize, signal
-
-
-def noise(n, seed):
-    """The same numbers as in tests/noise/mod.rs."""
-    state, out = seed, []
-    for _ in range(n):
-        state = (state * 6364136223846793005 + 1442695040888963407) % 2**64
-        out.append((state >> 11) / 2**53 - 0.5)
-    return np.array(out)
 
 
 TAU = 2 * np.pi

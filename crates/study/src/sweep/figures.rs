@@ -7,7 +7,7 @@ use super::summary::Spread;
 use super::table::{Cell, Kind, Reader};
 use crate::draw::{Figure, Layer};
 use crate::statistics::{about_their_mean, nearest};
-use analyze::metrics::{find, turn_of};
+use analyze::metrics::{find, turn_of, with_unit};
 use std::path::Path;
 
 /// What is drawn of a metric.
@@ -85,11 +85,7 @@ pub fn draw(plan: &Plan, store: &Store, folder: &Path) -> Result<usize, String> 
 
 /// A metric as people call it, with its unit.
 fn label(name: &str, unit: &str) -> String {
-    let called = find(name).map_or(name, |m| m.label);
-    match unit {
-        "" | "1" => called.to_owned(),
-        unit => format!("{called}, {unit}"),
-    }
+    with_unit(find(name).map_or(name, |m| m.label), unit)
 }
 
 /// What a figure leaves out, behind its title.
