@@ -137,6 +137,7 @@ pub const ROWS: &[Row] = &[
     row("growth_ratio", "growth", 4, Bound::Free),
     row("roll_peak_hz", "roll peak, Hz", 4, Bound::Free),
     row("onset_time_s", "onset, s", 2, Bound::Within(0.5, 0.0)),
+    row("roll_excess_s", "beyond 15°, s", 2, Bound::Free),
     row("unstable", "unstable", 0, Bound::Same),
     row("mechanism", "mechanism", 0, Bound::Same),
 ];

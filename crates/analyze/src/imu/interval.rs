@@ -143,6 +143,11 @@ pub fn metrics(motion: &Motion, window: Window) -> Metrics {
         let half =
             1.96 * (variance(&drawn) + beyond_the_budget(name, motion, window).powi(2)).sqrt();
         value.datum = Datum::Number(x);
+        if *name == "roll_excess_s" {
+            // Swings that keep step with the samples are all counted in one way or all in the other: no standard deviation tells of that.
+            value.ci95 = Some(extremes(x, &drawn));
+            continue;
+        }
         // None of them is below nothing, and a share is one at most.
         let most = if *name == "t_float" {
             1.0
@@ -230,8 +235,9 @@ const OF_PLACE: &[&str] = &["dz_pp_m", "rms_z_m", "t_float"];
 const OF_EDGES: &[&str] = &["dz_pp_m", "t_float"];
 const ENOUGH_HZ: f64 = 90.0;
 
-/// Samples as they might have been are this far apart or farther, s: enough for what is rated by them.
-const DRAWN_S: f64 = 0.033;
+/// The definitions count samples so far apart, s: what is counted hangs on where the samples fall, the more so the closer a period of the motion comes
+/// to a whole number of them. Draws are sampled so, or as slowly as the sensor.
+const COUNTED_S: f64 = 1.0 / 30.0;
 
 /// Of the samples, Hz; infinite where nothing tells.
 fn rate_hz(inputs: &Inputs) -> f64 {
@@ -292,18 +298,24 @@ fn tilted(root: f64, [low, high]: [f64; 2], mean: f64, most: f64) -> [f64; 2] {
     [low.max(0.0).sqrt(), high.sqrt()]
 }
 
-/// What the definition counts in, s.
-const ONSET_STEP_S: f64 = 1.0 / 30.0;
-
 /// From the earliest to the latest onset that equally good sensors find, of which one in forty may find none. The roll's mean square climbs by stairs, two
 /// to each of its periods: where the threshold lies near a landing, onsets fall on both sides of it, and no standard deviation tells of that.
 fn onset_between(found_s: f64, drawn_s: &[f64], end_s: f64) -> [f64; 2] {
-    let all = || drawn_s.iter().copied().chain([found_s]);
+    let [earliest_s, latest_s] = extremes(found_s, drawn_s);
     let latest_s = match drawn_s.len() + 1 < DRAWS {
         true => end_s,
-        false => all().fold(f64::MIN, f64::max) + ONSET_STEP_S,
+        false => latest_s + COUNTED_S,
     };
-    [all().fold(f64::MAX, f64::min) - ONSET_STEP_S, latest_s]
+    [earliest_s - COUNTED_S, latest_s]
+}
+
+/// The least and the most of an estimate and what is drawn about it: of 40 draws, what holds 95 of a hundred.
+fn extremes(found: f64, drawn: &[f64]) -> [f64; 2] {
+    let all = || drawn.iter().copied().chain([found]);
+    [
+        all().fold(f64::MAX, f64::min),
+        all().fold(f64::MIN, f64::max),
+    ]
 }
 
 /// Said where more than one in forty equally good sensors would find an onset, or none, against the one that did not.
@@ -521,7 +533,7 @@ fn varied(motion: &Motion, window: Window, draw: u64, tilt_rad: f64) -> Inputs {
             ..Inputs::default()
         };
     };
-    let step_s = super::track::period_s(&inputs.t_s).map_or(DRAWN_S, |s| s.max(DRAWN_S));
+    let step_s = super::track::period_s(&inputs.t_s).map_or(COUNTED_S, |s| s.max(COUNTED_S));
     let begin = first + random.uniform() * step_s;
     let at = |k: usize| (inputs.t_s[k] - begin) / step_s;
     // Every stretch to its end, and none of what lies between them.
@@ -715,6 +727,29 @@ mod tests {
             assert!((low..=high).contains(&truth), "{k}: {low} {truth} {high}");
             assert!(high - low < 1.5, "{k}: {low} {high}");
         }
+    }
+
+    /// A roll of 28 samples to a period: each of its swings beyond the threshold is counted alike, one sample more or less.
+    #[test]
+    fn what_is_counted_of_samples_that_keep_step_is_in_its_interval() {
+        let roll = |t: f64| 16.5f64.to_radians() * (TAU * 30.0 / 28.0 * t).sin();
+        let found = felt(roll, |_| 1.0, 1.0, [0.0; 3], AS_IT_SITS, Some(0.0));
+        let found = metrics(&found, MOST);
+        let [low, high] = found.get("roll_excess_s").unwrap().ci95.unwrap();
+        let counted = |phase: f64| {
+            let t_s: Vec<f64> = (150..1050).map(|k| (f64::from(k) + phase) / 30.0).collect();
+            let inputs = Inputs {
+                roll_rad: t_s.iter().map(|t| roll(*t)).collect(),
+                t_s,
+                ..Inputs::default()
+            };
+            let counted = metrics_of(&inputs, Window::ALL, |n| n == "roll_excess_s");
+            counted.number("roll_excess_s").unwrap()
+        };
+        let counts: Vec<f64> = (0..50).map(|k| counted(0.02 * f64::from(k))).collect();
+        let kept = counts.iter().filter(|c| (low..=high).contains(c)).count();
+        assert!(kept >= 47, "{kept} of 50 in {low} {high}: {counts:?}");
+        assert!(high - low < 4.0, "{low} {high}");
     }
 
     /// Whether a roll has an onset whose 2 s, at most √(1 + |sin 4πf s| / 4πf s) times the mean, just reach the threshold, nobody knows.
