@@ -5,7 +5,7 @@ use serde::Serialize;
 use crate::inputs::{Window, mean_step_s, stretches};
 use crate::median::median;
 use crate::spectrum::{DEFAULT_SEGMENT_S, Options, Spectrum, welch};
-use crate::summary::{moves, squares};
+use crate::summary::{ends, moves, squares};
 
 /// A line of a spectrum.
 #[derive(Clone, Debug, PartialEq, Serialize)]
@@ -101,12 +101,8 @@ impl SpectrumSummary {
         let parts = stretches(&t_s, 0.0).into_iter();
         let longest = parts.max_by_key(ExactSizeIterator::len)?;
         let (t_s, x) = (&t_s[longest.clone()], &x[longest]);
-        let ends = x
-            .iter()
-            .fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), x| {
-                (low.min(*x), high.max(*x))
-            });
-        if x.len() < 16 || !squares(ends.0, ends.1) {
+        let [low, high] = ends(x);
+        if x.len() < 16 || !squares(low, high) {
             return None;
         }
         let fs_hz = 1.0 / mean_step_s(t_s)?;

@@ -296,11 +296,16 @@ pub(crate) fn rounding(x: &[f64]) -> f64 {
 
 /// Whether finite values differ by more than [`rounding`].
 pub(crate) fn moves(x: &[f64]) -> bool {
-    let known = x.iter().copied().filter(|x| x.is_finite());
-    let (low, high) = known.fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), x| {
-        (low.min(x), high.max(x))
-    });
+    let [low, high] = ends(x);
     high - low > rounding(&[low, high])
+}
+
+/// The least and the most of the finite values.
+pub(crate) fn ends(x: &[f64]) -> [f64; 2] {
+    let known = x.iter().copied().filter(|x| x.is_finite());
+    known.fold([f64::INFINITY, f64::NEG_INFINITY], |[low, high], x| {
+        [low.min(x), high.max(x)]
+    })
 }
 
 /// One signal's moments and spectrum while the recording streams by.

@@ -222,6 +222,19 @@ fn forces_that_do_not_change_have_no_correlation() {
     );
 }
 
+/// Neighbouring doubles are one height, and one force; a nanometre is a motion.
+#[test]
+fn rounding_is_no_motion() {
+    let number = |inputs: &Inputs, name: &str| metrics(inputs, Window::ALL).number(name).unwrap();
+    let between = |step_m: f64| Inputs {
+        height_m: [0.8, 0.8 + step_m].repeat(10),
+        ..stand([&[294.3, 294.3f64.next_up()], &[294.3]])
+    };
+    assert_eq!(number(&between(2e-16), "force_sd_n"), 0.0);
+    let moved = number(&between(1e-9), "dz_pp_m");
+    assert!((moved - 1e-9).abs() < 1e-15, "{moved}");
+}
+
 #[test]
 fn fifteen_degrees_are_no_excess_and_both_ends_of_the_window_count() {
     let limit = 15f64.to_radians();

@@ -59,12 +59,7 @@ pub fn force_mean_n(c: &Context) -> Value {
 }
 
 pub fn force_sd_n(c: &Context) -> Value {
-    let per: Vec<f64> = c
-        .forces()
-        .columns
-        .iter()
-        .map(|n| variance(n).sqrt())
-        .collect();
+    let per: Vec<f64> = c.forces().columns.iter().map(|n| deviation(n)).collect();
     Value::number(mean(&per)).per(per)
 }
 
@@ -73,14 +68,12 @@ pub fn force_correlation(c: &Context) -> Value {
     if columns.len() < 2 {
         return Value::missing("a correlation needs two handles");
     }
-    // Off the mean, over √n σ; what remains of a constant is rounding.
+    // Off the mean, over √n σ.
     let scaled = columns.iter().flat_map(|x| {
-        let (m, v) = (mean(x), variance(x));
-        let still = v.sqrt() <= rounding(x);
-        let size = if still {
-            f64::NAN
-        } else {
-            (v * x.len() as f64).sqrt()
+        let (m, sd) = (mean(x), deviation(x));
+        let size = match sd {
+            0.0 => f64::NAN,
+            _ => sd * (x.len() as f64).sqrt(),
         };
         x.iter().map(move |x| (x - m) / size)
     });
@@ -93,8 +86,14 @@ pub fn mean(x: &[f64]) -> f64 {
     x.iter().sum::<f64>() / x.len() as f64
 }
 
+/// Population standard deviation; what remains of a constant is rounding, and none.
+pub fn deviation(x: &[f64]) -> f64 {
+    let sd = variance(x).sqrt();
+    if sd <= rounding(x) { 0.0 } else { sd }
+}
+
 /// Population variance, less what the mean's own rounding adds to it (Chan, Golub and LeVeque 1983).
-pub fn variance(x: &[f64]) -> f64 {
+fn variance(x: &[f64]) -> f64 {
     let (m, n) = (mean(x), x.len() as f64);
     let off = x.iter().map(|x| x - m);
     let (sum, squares) = off.fold((0.0, 0.0), |(s, q), d| (s + d, q + d * d));

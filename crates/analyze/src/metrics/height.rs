@@ -1,21 +1,17 @@
 //! How high it is thrown.
 
-use super::contact::{mean, variance};
+use super::contact::{deviation, mean};
 use super::{Context, Value};
-use crate::summary::rounding;
+use crate::summary::{ends, moves, rounding};
 
 pub fn dz_pp_m(c: &Context) -> Value {
     let z = &c.height().x;
-    let (low, high) = z
-        .iter()
-        .fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), z| {
-            (l.min(*z), h.max(*z))
-        });
-    Value::number(high - low)
+    let [low, high] = ends(z);
+    Value::number(if moves(z) { high - low } else { 0.0 })
 }
 
 pub fn rms_z_m(c: &Context) -> Value {
-    Value::number(variance(&c.height().x).sqrt())
+    Value::number(deviation(&c.height().x))
 }
 
 pub fn z_mean_m(c: &Context) -> Value {

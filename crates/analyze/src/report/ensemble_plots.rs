@@ -142,9 +142,9 @@ fn mean_psd(
             .filter(|s| s.spectrum.hz == first.spectrum.hz)
             .collect();
         let n = same.len() as f64;
+        let (label, scale) = super::plots::density(first);
         let panel = p.get_or_insert_with(|| {
-            let unit = super::plots::unit(&first.unit);
-            let mut panel = Panel::new(id, title, "frequency, Hz", &format!("density, {unit}"));
+            let mut panel = Panel::new(id, title, "frequency, Hz", &label);
             panel.log_y = true;
             panel.note = "Mean in decibels over the runs of each condition; shaded: one standard deviation above and below.".into();
             let nyquist = first.spectrum.hz.last().copied().unwrap_or(1.0);
@@ -155,7 +155,9 @@ fn mean_psd(
         let bins = (1..first.spectrum.hz.len()).filter(|b| first.spectrum.hz[*b] <= reach);
         let rows: Vec<(f64, f64, f64)> = bins
             .map(|b| {
-                let db = same.iter().map(|s| 10.0 * s.spectrum.power[b].log10());
+                let db = same
+                    .iter()
+                    .map(|s| 10.0 * (scale * s.spectrum.power[b]).log10());
                 let mean = db.clone().sum::<f64>() / n;
                 let variance = db.map(|x| (x - mean).powi(2)).sum::<f64>() / (n - 1.0).max(1.0);
                 (first.spectrum.hz[b], mean, variance.sqrt())

@@ -7,7 +7,7 @@ use crate::mechanism::spline_derivatives;
 use crate::peaks::SpectrumSummary;
 use crate::phase;
 use crate::spectrum::{Mode, Options, spectrogram};
-use crate::summary::moves;
+use crate::summary::{moves, rounding};
 use recording::{text::counted, topics};
 use std::ops::Range;
 
@@ -399,6 +399,8 @@ fn energies(a: &Analysis, &(id, title, note, fields, shown_s): &Energies) -> Opt
     let mut p = Panel::over_time(id, title, "energy, J", a);
     p.note = note.into();
     p.shown_s = shown_s;
+    let rounded_j = (trace.series.iter().map(|(.., j)| rounding(j))).fold(0.0, f64::max);
+    let mut some = false;
     for (field, name) in fields {
         let Some((_, t_s, j)) = trace.series.iter().find(|(known, ..)| *known == field) else {
             continue;
@@ -408,9 +410,10 @@ fn energies(a: &Analysis, &(id, title, note, fields, shown_s): &Energies) -> Opt
             _ => 0.0,
         };
         let about: Vec<f64> = j.iter().map(|j| j - mean_j).collect();
+        some |= about.iter().any(|j| j.abs() > rounded_j);
         p.line(name, t_s, &about);
     }
-    Some(p)
+    some.then_some(p)
 }
 
 /// The spectrum of the signal that plays a role.
@@ -427,17 +430,22 @@ pub(super) fn role_spectrum<'a>(
     a.spectra.iter().find(|(p, _)| p == path || p == role)
 }
 
+/// A density's label, and what it is multiplied by to be drawn: angles are drawn in degrees.
+pub(super) fn density(s: &SpectrumSummary) -> (String, f64) {
+    let (drawn, scale) = match s.unit.as_str() {
+        "(rad)^2/Hz" => ("(deg)^2/Hz", 1f64.to_degrees().powi(2)),
+        other => (other, 1.0),
+    };
+    (format!("density, {}", unit(drawn)), scale)
+}
+
 fn psd(id: &'static str, title: &str, name: &str, s: &SpectrumSummary) -> Panel {
     let nyquist = s.spectrum.hz.last().copied().unwrap_or(1.0);
     let reach = s
         .f_hz
         .map_or(nyquist, |f| (SPECTRUM_REACH * f).min(nyquist));
-    let mut p = Panel::new(
-        id,
-        title,
-        "frequency, Hz",
-        &format!("density, {}", unit(&s.unit)),
-    );
+    let (label, scale) = density(s);
+    let mut p = Panel::new(id, title, "frequency, Hz", &label);
     let plural = if s.segments == 1 { "" } else { "s" };
     p.note = format!(
         "Welch, {} segment{plural} of {:.1} s, bins {:.3} Hz apart, 95 % of the noise within ×{:.2} … ×{:.2}.",
@@ -449,7 +457,7 @@ fn psd(id: &'static str, title: &str, name: &str, s: &SpectrumSummary) -> Panel 
         .iter()
         .zip(&s.spectrum.power)
         .filter(|(f, p)| **f > 0.0 && **f <= reach && **p > 0.0);
-    let (x, y) = shown.map(|(f, p)| (*f, *p)).unzip();
+    let (x, y) = shown.map(|(f, p)| (*f, scale * *p)).unzip();
     p.series.push(Series {
         name: name.into(),
         x,
@@ -470,7 +478,7 @@ fn psd(id: &'static str, title: &str, name: &str, s: &SpectrumSummary) -> Panel 
 }
 
 /// A unit as people write it: `m/s²` for `m/s^2`, `rad²/Hz` for `(rad)^2/Hz`.
-pub(super) fn unit(text: &str) -> String {
+fn unit(text: &str) -> String {
     let mut out = text.replace("^2", "²");
     if let (Some(open), Some(close)) = (out.find('('), out.find(")²")) {
         // Brackets around one word say nothing.
@@ -637,6 +645,8 @@ fn roll_spectrogram(a: &Analysis) -> Option<Image> {
 
 #[cfg(test)]
 mod tests {
+    use super::{SpectrumSummary, Window};
+
     #[test]
     fn many_columns_are_drawn_as_three() {
         let columns = [
@@ -656,6 +666,19 @@ mod tests {
                 "{name}: {found:?}"
             );
         }
+    }
+
+    /// A swing of 10° holds 50 deg², all of it in its line.
+    #[test]
+    fn the_density_of_an_angle_is_in_degrees() {
+        let t_s: Vec<f64> = (0..1800).map(|k| f64::from(k) / 30.0).collect();
+        let swing = |t: &f64| 10f64.to_radians() * (std::f64::consts::TAU * t).sin();
+        let roll: Vec<f64> = t_s.iter().map(swing).collect();
+        let spectrum = SpectrumSummary::of(&t_s, &roll, Window::ALL, None, "rad").unwrap();
+        let drawn = super::psd("roll", "", "", &spectrum);
+        assert_eq!(drawn.y_label, "density, deg²/Hz");
+        let held: f64 = drawn.series[0].y.iter().sum::<f64>() * spectrum.spectrum.hz[1];
+        assert!((held - 50.0).abs() < 1e-3, "{held}");
     }
 
     #[test]
