@@ -167,7 +167,7 @@ pub fn run(lab: &Lab) -> Result<Finding, String> {
     let figure = Figure {
         title: "Growth of roll under carriers in step".into(),
         x_label: format!("drive frequency / natural frequency of roll ({roll:.3} Hz)"),
-        y_label: "load modulation depth m".into(),
+        y_label: "load modulation depth m, in g".into(),
         layers: vec![
             Layer::Map {
                 label: "growth in 1/s, shown within ±1".into(),
@@ -178,7 +178,7 @@ pub fn run(lab: &Lab) -> Result<Finding, String> {
             Layer::dashed("", vec![(x_range.0, 1.0), (x_range.1, 1.0)], WHITE),
             Layer::line("", edge, WHITE),
             Layer::points("", compared.clone(), 1),
-            Layer::points("", vec![here], 4),
+            Layer::points("", vec![here], 0),
         ],
         x_range: Some(x_range),
         y_range: Some(y_range),
@@ -224,7 +224,7 @@ pub fn run(lab: &Lab) -> Result<Finding, String> {
         ],
         pictures: vec![(
             "stability",
-            "Growth rate of roll in the simulator (colour), Floquet's boundary (white), simulated edges (vermilion points), the depth at which contact is lost (broken), and the paper's music condition (orange point).".into(),
+            "Growth rate of roll in the simulator (colour), Floquet's boundary (white), simulated edges (vermilion points), the depth at which contact is lost (broken), and the paper's music condition (blue point).".into(),
             figure,
         )],
     })
