@@ -1,5 +1,6 @@
 //! What the metrics are computed from: plain columns, from a recording or from a run in memory.
 
+use crate::spline::resampled;
 use std::borrow::Cow;
 use std::ops::Range;
 
@@ -239,6 +240,25 @@ pub fn placed(t_s: &[f64], x: &[f64], step_s: f64, elsewhere: f64) -> Vec<f64> {
     out
 }
 
+/// Steps that differ from their mean by more than this part of it are not even.
+const UNEVEN: f64 = 0.1;
+
+/// `x` at its times, which have no hole, or on an even axis of `step_s` from the first of them by a cubic spline, where steps are not even: samples
+/// are lost, or were taken unevenly.
+pub fn evened<'a>(t_s: &'a [f64], x: &'a [f64], step_s: f64) -> [Cow<'a, [f64]>; 2] {
+    let off = |t: &[f64]| ((t[1] - t[0]) / step_s - 1.0).abs();
+    if t_s.windows(2).all(|t| off(t) <= UNEVEN) {
+        return [t_s.into(), x.into()];
+    }
+    let (first, last) = (t_s[0], t_s[t_s.len() - 1]);
+    let steps = ((last - first) / step_s + 1e-6).floor();
+    let at_s: Vec<f64> = (0..=steps as usize)
+        .map(|k| first + k as f64 * step_s)
+        .collect();
+    let x = resampled(t_s, x, &at_s).unwrap_or_else(|| interpolate(t_s, x, &at_s));
+    [at_s.into(), x.into()]
+}
+
 /// `x` about its mean on an even axis, 0 in the holes of `t_s`, and the step (s): a transform of it has its lines where they are, though
 /// samples are missing. Where more is missing than is there, of the longest part without a hole. `None` as [`mean_step_s`].
 pub fn about_mean(t_s: &[f64], x: &[f64]) -> Option<(Vec<f64>, f64)> {
@@ -248,11 +268,17 @@ pub fn about_mean(t_s: &[f64], x: &[f64]) -> Option<(Vec<f64>, f64)> {
         let longest = parts.into_iter().max_by_key(ExactSizeIterator::len)?;
         return about_mean(&t_s[longest.clone()], &x[longest]);
     }
-    let mean = x.iter().sum::<f64>() / x.len() as f64;
-    let about: Vec<f64> = x.iter().map(|x| x - mean).collect();
+    let (mut even_s, mut even) = (Vec::new(), Vec::new());
+    for part in &parts {
+        let [t_s, x] = evened(&t_s[part.clone()], &x[part.clone()], step_s);
+        even_s.extend_from_slice(&t_s);
+        even.extend_from_slice(&x);
+    }
+    let mean = even.iter().sum::<f64>() / even.len() as f64;
+    even.iter_mut().for_each(|x| *x -= mean);
     Some(match parts.len() {
-        1 => (about, step_s),
-        _ => (placed(t_s, &about, step_s, 0.0), step_s),
+        1 => (even, step_s),
+        _ => (placed(&even_s, &even, step_s, 0.0), step_s),
     })
 }
 

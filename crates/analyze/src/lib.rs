@@ -31,6 +31,7 @@ mod random;
 pub mod report;
 pub mod roles;
 pub mod spectrum;
+pub mod spline;
 pub mod steps;
 pub mod summary;
 pub mod table;

@@ -1,6 +1,7 @@
 //! What drives the roll: the support that modulates the pendulum's gravity, or a force at the roll's own frequency.
 
 use crate::line::FEWEST_PERIODS;
+use crate::spline::derivatives;
 use std::fmt;
 use std::ops::Range;
 
@@ -144,13 +145,13 @@ impl fmt::Display for Evidence {
 /// Samples left out of the fit at each end, where the interpolant's derivatives are poor.
 const EDGE: usize = 4;
 
-/// Fits [`RollFit`] to roll and handle forces, evenly sampled within each of the `stretches`; where a force is not finite the sample is left
+/// Fits [`RollFit`] to roll and handle forces at `t_s`, without a hole in each of the `stretches`; where a force is not finite the sample is left
 /// out. `None` without forces, below 20 samples, or where the roll does not move.
 pub fn fit_roll(
+    t_s: &[f64],
     roll_rad: &[f64],
     normal_n: &[Vec<f64>],
     stretches: &[Range<usize>],
-    step_s: f64,
 ) -> Option<RollFit> {
     let n = roll_rad.len();
     if n < 20 || normal_n.is_empty() || normal_n.iter().any(|h| h.len() != n) {
@@ -159,7 +160,7 @@ pub fn fit_roll(
     let (mut rate, mut acceleration) = (vec![0.0; n], vec![0.0; n]);
     let mut rows: Vec<usize> = Vec::with_capacity(n);
     for stretch in stretches.iter().filter(|s| s.len() > 2 * EDGE) {
-        let (first, second) = spline_derivatives(&roll_rad[stretch.clone()], step_s)?;
+        let (first, second) = derivatives(&t_s[stretch.clone()], &roll_rad[stretch.clone()])?;
         rate[stretch.clone()].copy_from_slice(&first);
         acceleration[stretch.clone()].copy_from_slice(&second);
         let inner = stretch.start + EDGE..stretch.end - EDGE;
@@ -266,78 +267,9 @@ fn eliminate(mut m: Vec<Vec<f64>>) -> Option<Vec<f64>> {
     Some((0..n).map(|i| m[i][n] / m[i][i]).collect())
 }
 
-/// First and second derivatives at the knots of the cubic spline through evenly spaced values, with not-a-knot ends
-/// (`scipy.interpolate.CubicSpline`). `None` below four values.
-///
-/// ```text
-/// M_{k−1} + 4 M_k + M_{k+1} = 6 (y_{k−1} − 2y_k + y_{k+1}) / h²,   M₀ = 2M₁ − M₂,   M_{n−1} = 2M_{n−2} − M_{n−3}
-/// y'_k = (y_{k+1} − y_k)/h − h (2M_k + M_{k+1}) / 6
-/// ```
-/// y [unit], h the step (s), M the second derivatives [unit/s²]. Source: de Boor, A Practical Guide to Splines (1978), ch. IV.
-pub fn spline_derivatives(y: &[f64], step_s: f64) -> Option<(Vec<f64>, Vec<f64>)> {
-    let n = y.len();
-    if n < 4 {
-        return None;
-    }
-    let h2 = step_s * step_s;
-    let bend = |k: usize| 6.0 * (y[k - 1] - 2.0 * y[k] + y[k + 1]) / h2;
-    let mut m = vec![0.0; n];
-    // Not-a-knot turns the first and last equation into 6 M = bend.
-    m[1] = bend(1) / 6.0;
-    m[n - 2] = bend(n - 2) / 6.0;
-    // Thomas' algorithm on 2 … n − 3.
-    let inner = 2..n - 2;
-    let mut diagonal = vec![0.0; n];
-    for k in inner.clone() {
-        let mut right = bend(k);
-        if k == 2 {
-            right -= m[1];
-            diagonal[k] = 4.0;
-        } else {
-            diagonal[k] = 4.0 - 1.0 / diagonal[k - 1];
-            right -= m[k - 1] / diagonal[k - 1];
-        }
-        if k == n - 3 {
-            right -= m[n - 2];
-        }
-        m[k] = right;
-    }
-    for k in inner.rev() {
-        let next = if k < n - 3 { m[k + 1] } else { 0.0 };
-        m[k] = (m[k] - next) / diagonal[k];
-    }
-    m[0] = 2.0 * m[1] - m[2];
-    m[n - 1] = 2.0 * m[n - 2] - m[n - 3];
-    let mut slope: Vec<f64> = (0..n - 1)
-        .map(|k| (y[k + 1] - y[k]) / step_s - step_s * (2.0 * m[k] + m[k + 1]) / 6.0)
-        .collect();
-    slope.push((y[n - 1] - y[n - 2]) / step_s + step_s * (m[n - 2] + 2.0 * m[n - 1]) / 6.0);
-    Some((slope, m))
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
-
-    #[test]
-    fn a_cubic_is_its_own_spline() {
-        let h = 0.1;
-        let y: Vec<f64> = (0..30)
-            .map(|k| (k as f64 * h).powi(3) - 2.0 * (k as f64 * h))
-            .collect();
-        let (d1, d2) = spline_derivatives(&y, h).unwrap();
-        for k in 0..30 {
-            let t = k as f64 * h;
-            assert!(
-                (d1[k] - (3.0 * t * t - 2.0)).abs() < 1e-10 && (d2[k] - 6.0 * t).abs() < 1e-9,
-                "{k}"
-            );
-        }
-        for n in 4..8 {
-            let (d1, _) = spline_derivatives(&y[..n], h).unwrap();
-            assert!((d1[0] + 2.0).abs() < 1e-10 && d1.len() == n);
-        }
-    }
 
     /// A pendulum under a modulated support, integrated finely: the fit has to find its two constants.
     #[test]
@@ -367,12 +299,13 @@ mod tests {
         let parts = [0..600, 700..1350];
         let mut spliced = roll.clone();
         spliced[600..700].fill(0.0);
-        let split = fit_roll(&spliced, &[per_mass], &parts, dt).unwrap();
+        let t_s: Vec<f64> = (0..roll.len()).map(|k| k as f64 * dt).collect();
+        let split = fit_roll(&t_s, &spliced, &[per_mass], &parts).unwrap();
         let whole = [Range {
             start: 0,
             end: roll.len(),
         }];
-        let fit = fit_roll(&roll, &[force.clone(), force], &whole, dt).unwrap();
+        let fit = fit_roll(&t_s, &roll, &[force.clone(), force], &whole).unwrap();
         assert!(
             (split.a / (60.0 * fit.a) - 1.0).abs() < 1e-4 && split.r2 > 0.9999,
             "{split:?}"

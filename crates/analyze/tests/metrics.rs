@@ -222,6 +222,53 @@ fn forces_that_do_not_change_have_no_correlation() {
     );
 }
 
+/// A swing and a heave of a minute at 30 Hz, sampled unevenly by up to 6 ms, and with one sample in 23 lost: lines and what drives them stay what they are.
+#[test]
+fn lost_and_uneven_samples_change_no_line() {
+    let at = |t_s: Vec<f64>| Inputs {
+        height_m: (t_s.iter())
+            .map(|t| 1.2 + 0.05 * (TAU * 2.15 * t).sin() + 0.004 * (TAU * 4.3 * t).sin())
+            .collect(),
+        roll_rad: (t_s.iter())
+            .map(|t| 0.2 * (TAU * 1.075 * t).sin() + 0.02 * (TAU * 2.15 * t).cos())
+            .collect(),
+        normal_n: vec![vec![590.0; t_s.len()]],
+        mass_kg: Some(60.0),
+        gravity_m_per_s2: 9.81,
+        t_s,
+        ..Inputs::default()
+    };
+    let even = || (0..1801).map(|k| f64::from(k) / 30.0);
+    let late = noise(1801, 3);
+    let uneven = even().zip(&late).map(|(t, x)| t + 0.006 * x.clamp(-1.0, 1.0));
+    let kept = |(k, _): &(usize, f64)| k % 23 != 11;
+    let lost = even().enumerate().filter(kept).map(|(_, t)| t);
+    let found = |inputs: &Inputs| {
+        let evidence = mechanism_evidence(&Context::new(inputs, Window::ALL)).unwrap();
+        let fit = evidence.fit.unwrap();
+        let all = metrics(inputs, Window::ALL);
+        let word = all.get("mechanism").unwrap().datum.clone();
+        let named = |name| all.number(name).unwrap();
+        let numbers = [
+            ("h2_ratio", named("h2_ratio"), 0.03),
+            ("subharmonic_ratio", named("subharmonic_ratio"), 0.01),
+            ("peak_hz", named("peak_hz"), 1e-3),
+            ("roll_peak_hz", named("roll_peak_hz"), 1e-3),
+            ("a", fit.a, 0.01),
+            ("R²", fit.r2, 0.005),
+        ];
+        (numbers, word)
+    };
+    let (truth, word) = found(&at(even().collect()));
+    for (sampled, what) in [(uneven.collect::<Vec<_>>(), "uneven"), (lost.collect(), "lost")] {
+        let (numbers, said) = found(&at(sampled));
+        assert_eq!(said, word, "{what}");
+        for ((name, x, part), (_, y, _)) in numbers.into_iter().zip(&truth) {
+            assert!((x / y - 1.0).abs() < part, "{what} {name}: {x} for {y}");
+        }
+    }
+}
+
 /// Neighbouring doubles are one height, and one force; a nanometre is a motion.
 #[test]
 fn rounding_is_no_motion() {

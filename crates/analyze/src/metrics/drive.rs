@@ -8,7 +8,7 @@ use crate::mechanism::{self, Evidence, Verdict};
 /// The evidence for this window. `None` where the roll does not move or has no step.
 pub fn evidence(c: &Context) -> Option<Evidence> {
     let roll = c.roll();
-    let step_s = roll.step_s()?;
+    roll.step_s()?;
     let rms_roll_rad = (roll.x.iter().map(|x| x * x).sum::<f64>() / roll.x.len() as f64).sqrt();
     let f_hz = c.height_line().map(|l| l.hz);
     let shares = f_hz.and_then(|f| Shares::of(&roll.t_s, &roll.x, f));
@@ -35,7 +35,7 @@ pub fn evidence(c: &Context) -> Option<Evidence> {
         }
         true => Vec::new(),
     };
-    let fit = mechanism::fit_roll(&roll.x, &handles, &stretches(&roll.t_s, 0.0), step_s);
+    let fit = mechanism::fit_roll(&roll.t_s, &roll.x, &handles, &stretches(&roll.t_s, 0.0));
     Some(Evidence {
         rms_roll_rad,
         f_hz,

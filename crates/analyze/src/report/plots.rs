@@ -2,11 +2,11 @@
 
 use crate::envelope::outline;
 use crate::examine::{Analysis, MOST_SERIES};
-use crate::inputs::{Window, about_mean, mean_step_s, stretches};
-use crate::mechanism::spline_derivatives;
+use crate::inputs::{Window, about_mean, stretches};
 use crate::peaks::SpectrumSummary;
 use crate::phase;
 use crate::spectrum::{Mode, Options, spectrogram};
+use crate::spline::derivatives;
 use crate::summary::{moves, rounding};
 use recording::{text::counted, topics};
 use std::ops::Range;
@@ -502,14 +502,13 @@ fn portrait(a: &Analysis) -> Option<Panel> {
     }
     let range = inside(&i.t_s, a.window);
     let (t_s, roll) = (&i.t_s[range.clone()], &i.roll_rad[range]);
-    let step_s = mean_step_s(t_s)?;
     // A rath that does not roll has no portrait.
     if !moves(roll) {
         return None;
     }
     let mut rate = vec![f64::NAN; roll.len()];
     for stretch in stretches(t_s, 0.0) {
-        if let Some((first, _)) = spline_derivatives(&roll[stretch.clone()], step_s) {
+        if let Some((first, _)) = derivatives(&t_s[stretch.clone()], &roll[stretch.clone()]) {
             rate[stretch].copy_from_slice(&first);
         }
     }

@@ -4,8 +4,8 @@ use super::squares::{Block, bootstrapped, jackknifed, solve, unexplained, whoeve
 use super::{BLOCK_S, CARRIES, EDGE, Field, Outcome, budgeted, even, pair};
 use analyze::imu::budget::Budget;
 use analyze::inputs::{Window, about_mean, mean_step_s};
-use analyze::mechanism::spline_derivatives;
 use analyze::spectrum::{Options, welch};
+use analyze::spline::spline_derivatives;
 use std::ops::Range;
 
 /// Samples before and after one that a rule for its rate takes.
@@ -187,6 +187,7 @@ pub(super) fn contact_from_sensors(field: &Field, window: Window) -> Result<Vec<
     let found = |skip: usize| {
         let at: Vec<usize> = (from..to).step_by(skip).collect();
         let step_s = step_s * skip as f64;
+        let axis: Vec<f64> = (0..at.len()).map(|k| k as f64 * step_s).collect();
         let mut gaps = Vec::new();
         for (heave, [x, y, z]) in i.heave_m.iter().zip(&field.handles_m) {
             let gap: Vec<f64> = at
@@ -196,7 +197,7 @@ pub(super) fn contact_from_sensors(field: &Field, window: Window) -> Result<Vec<
                     heave[k] - i.height_m[k] - (cp * sr * y + cp * cr * z - sp * x)
                 })
                 .collect();
-            let (rate, _) = spline_derivatives(&gap, step_s)?;
+            let (rate, _) = spline_derivatives(&axis, &gap)?;
             gaps.push((gap, rate));
         }
         let total: Vec<f64> = at.iter().map(|&k| i.support_ratio[k] * weight_n).collect();
@@ -297,7 +298,8 @@ pub(super) fn pendulum(field: &Field, window: Window) -> Result<Vec<Outcome>, St
         for part in &parts {
             let at: Vec<usize> = part.clone().step_by(skip).collect();
             let angle: Vec<f64> = at.iter().map(|k| roll[*k]).collect();
-            let Some((rate, _)) = spline_derivatives(&angle, step_s) else {
+            let axis: Vec<f64> = (0..at.len()).map(|k| k as f64 * step_s).collect();
+            let Some((rate, _)) = spline_derivatives(&axis, &angle) else {
                 continue;
             };
             let pull: Vec<f64> = at.iter().map(|k| -total[*k] * roll[*k].sin()).collect();
