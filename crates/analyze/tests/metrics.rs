@@ -240,7 +240,9 @@ fn lost_and_uneven_samples_change_no_line() {
     };
     let even = || (0..1801).map(|k| f64::from(k) / 30.0);
     let late = noise(1801, 3);
-    let uneven = even().zip(&late).map(|(t, x)| t + 0.006 * x.clamp(-1.0, 1.0));
+    let uneven = even()
+        .zip(&late)
+        .map(|(t, x)| t + 0.006 * x.clamp(-1.0, 1.0));
     let kept = |(k, _): &(usize, f64)| k % 23 != 11;
     let lost = even().enumerate().filter(kept).map(|(_, t)| t);
     let found = |inputs: &Inputs| {
@@ -260,7 +262,10 @@ fn lost_and_uneven_samples_change_no_line() {
         (numbers, word)
     };
     let (truth, word) = found(&at(even().collect()));
-    for (sampled, what) in [(uneven.collect::<Vec<_>>(), "uneven"), (lost.collect(), "lost")] {
+    for (sampled, what) in [
+        (uneven.collect::<Vec<_>>(), "uneven"),
+        (lost.collect(), "lost"),
+    ] {
         let (numbers, said) = found(&at(sampled));
         assert_eq!(said, word, "{what}");
         for ((name, x, part), (_, y, _)) in numbers.into_iter().zip(&truth) {
