@@ -587,6 +587,82 @@ mod tests {
         assert_eq!(word.as_f64(), Some(1.0));
     }
 
+    #[test]
+    fn a_difference_of_angles_is_the_shorter_way_and_of_words_yes_or_no() {
+        let deg = |x: f64| Value {
+            unit: "deg",
+            ..Value::number(x)
+        };
+        for (estimate, truth, known) in [
+            (179.0, -178.0, -3.0),
+            (-175.0, 175.0, 10.0),
+            (30.0, 10.0, 20.0),
+        ] {
+            let found = difference(
+                &deg(estimate).ci95(estimate - 1.0, estimate + 2.0),
+                &deg(truth),
+            );
+            assert!((found.as_f64().unwrap() - known).abs() < 1e-9, "{found:?}");
+            let [low, high] = found.ci95.unwrap();
+            assert!((low - known + 1.0).abs() < 1e-9 && (high - known - 2.0).abs() < 1e-9);
+        }
+        let word = |w| Value::word(w, String::new());
+        let same = difference(&word("quiet"), &word("quiet"));
+        assert_eq!(same.as_f64(), Some(0.0));
+        let yes = |a, b| difference(&Value::bool(a), &Value::bool(b)).as_f64();
+        assert_eq!((yes(true, true), yes(true, false)), (Some(0.0), Some(1.0)));
+        let none = || Value::missing("no");
+        assert_eq!(difference(&none(), &none()).as_f64(), Some(0.0));
+        for (a, b) in [(none(), deg(1.0)), (deg(1.0), none())] {
+            assert_eq!(difference(&a, &b).as_f64(), None);
+        }
+    }
+
+    /// Steps at 2 Hz that somebody counted from 10 s to 30 s, and missed one of: what is found before and behind is nobody's fault.
+    #[test]
+    fn steps_are_judged_while_somebody_counted() {
+        let t_s: Vec<f64> = (0..4000).map(|k| 0.01 * f64::from(k)).collect();
+        let up = |t: &f64| 9.81 + 2.0 * (TAU * 2.0 * t).cos();
+        let track = Track {
+            accel_m_per_s2: t_s.iter().map(|t| [0.0, 0.0, up(t)]).collect(),
+            gyro_rad_per_s: vec![[0.0; 3]; t_s.len()],
+            t_s,
+            dropped: 0,
+        };
+        let mut carriers = Carriers::default();
+        carriers.add("/imu/1", &track, Options::default(), 0.0);
+        let judge = Judge {
+            truth: Truth::default(),
+            height: None,
+            sensor: None,
+            of_body: false,
+            spans_s: Vec::new(),
+            step_s: (20..=60)
+                .filter(|k| *k != 31)
+                .map(|k| 0.5 * f64::from(k) - 0.02)
+                .collect(),
+        };
+        let mut metrics = Metrics::default();
+        judge.errors(
+            None,
+            &carriers,
+            &Metrics::default(),
+            &mut metrics,
+            1,
+            Window::ALL,
+        );
+        let f1 = metrics.get("step_f1").unwrap();
+        // 40 of 40 true and 41 found.
+        assert!((f1.as_f64().unwrap() - 80.0 / 81.0).abs() < 1e-12, "{f1:?}");
+        let said = f1.reason.as_deref().unwrap();
+        assert!(
+            said.starts_with("40 of 40 true and 41 found") && said.contains("found +20 ms"),
+            "{said}"
+        );
+        let rate = metrics.number("step_rate_hz_error").unwrap();
+        assert!((rate - (40.0 - 39.0) / 20.0).abs() < 0.002, "{rate}");
+    }
+
     /// A load that heaves until it is unloaded and rolls, its sensor 0.36 m off the centre of mass, and the pose of that sensor: what the errors
     /// are taken against is in closed form.
     #[test]
