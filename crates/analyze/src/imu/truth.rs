@@ -226,6 +226,20 @@ mod tests {
             [&[0.0, nan, 0.0], &[0.0; 3], &[0.0; 3], &[1.0; 3]],
         );
         assert_eq!(truth.t_s, [0.0, 2.0]);
+        // Only as much as the shortest column holds.
+        let column = |n: usize, x: f64| vec![x; n];
+        for short in 0..5 {
+            let n = |k: usize| if k == short { 2 } else { 3 };
+            let t_s = &[0.0, 1.0, 2.0][..n(0)];
+            let [x, y, z, w] = [
+                column(n(1), 0.0),
+                column(n(2), 0.0),
+                column(n(3), 0.0),
+                column(n(4), 1.0),
+            ];
+            let found = Truth::from_columns(t_s, [&x, &y, &z, &w]);
+            assert_eq!(found.t_s, [0.0, 1.0], "{short}");
+        }
         let q = UnitQuaternion::from_axis_angle(&Vector3::y_axis(), 0.02);
         let e = inclination_error_deg(&[0.0, 1.0, 2.0], &[q; 3], &truth, &[]).unwrap();
         assert!((e.to_radians() - 0.02).abs() < 1e-9);
