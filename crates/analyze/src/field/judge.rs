@@ -667,6 +667,12 @@ mod tests {
     /// are taken against is in closed form.
     #[test]
     fn a_true_pose_of_the_sensor_judges_the_motion_of_the_centre_of_mass() {
+        judged(UnitQuaternion::identity());
+        judged(UnitQuaternion::from_euler_angles(0.3, -0.2, 0.9));
+    }
+
+    /// `mount`: body from sensor.
+    fn judged(mount: UnitQuaternion<f64>) {
         const G: f64 = 9.81;
         let lever_m = [0.0, 0.2, 0.3];
         let (roll, heave) = (0.3, 1.4 * G / (TAU * 1.8).powi(2));
@@ -690,10 +696,11 @@ mod tests {
             let pull = about.cross(&r) * turn + about.cross(&about.cross(&r)) * (rate * rate);
             let force = world_from_body.inverse() * (pull + Vector3::z() * (lift + G));
             track.t_s.push(t);
-            track.gyro_rad_per_s.push([rate, 0.0, 0.0]);
-            track.accel_m_per_s2.push(force.into());
+            let turning = mount.inverse() * Vector3::new(rate, 0.0, 0.0);
+            track.gyro_rad_per_s.push(turning.into());
+            track.accel_m_per_s2.push((mount.inverse() * force).into());
             truth.t_s.push(t);
-            truth.world_from_body.push(world_from_body);
+            truth.world_from_body.push(world_from_body * mount);
             height.0.push(t);
             height.1.push(z + r.z);
         }
@@ -703,7 +710,7 @@ mod tests {
                 accel_latency_s: 0.0,
                 ..Options::default()
             },
-            mounting: Mounting::Known(UnitQuaternion::identity()),
+            mounting: Mounting::Known(mount),
             lever_m,
             lever_is_known: true,
             gravity_m_per_s2: G,
@@ -759,5 +766,14 @@ mod tests {
             assert!((low..=high).contains(&0.0), "{name}: {error:?}");
         }
         assert!(metrics.number("inclination_error_batch_deg").unwrap() < 0.05);
+        assert!(metrics.number("inclination_error_deg").unwrap() < 1.0);
+        // What is unloaded falls below a twentieth 54 times in 30 s, by the sensor as by the height.
+        let unloaded = metrics.get("unloading_f1").unwrap();
+        let said = unloaded.reason.as_deref().unwrap();
+        assert!(
+            unloaded.as_f64() == Some(1.0) && said.contains("54 of 54 true and 54 found"),
+            "{said}"
+        );
+        assert!(metrics.number("height_relative_error").unwrap() < 0.01);
     }
 }
