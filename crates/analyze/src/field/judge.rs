@@ -618,6 +618,36 @@ mod tests {
         }
     }
 
+    /// A height of SD 35 mm about 1.3 m with a course of 14 mm at 0.05 Hz, which a corner of 0.2 Hz leaves to 0.4 %; one of 2 mm is not worth a word.
+    #[test]
+    fn a_course_that_a_sensor_does_not_see_is_told() {
+        let mut track = Track::default();
+        for t in (0..6000).map(|k| 0.01 * f64::from(k)) {
+            track.t_s.push(t);
+            track.gyro_rad_per_s.push([0.0; 3]);
+            track.accel_m_per_s2.push([0.0, 0.0, 9.80665]);
+        }
+        let still = motion(&track, &Settings::default()).unwrap();
+        let slow_m = |amplitude_m: f64| {
+            let line = |a: f64, hz: f64, t: f64| a * (TAU * hz * t).sin();
+            let z = |t: &f64| 1.3 + line(0.05, 2.0, *t) + line(amplitude_m, 0.05, *t);
+            let heave = Heave {
+                z_m: track.t_s.iter().map(z).collect(),
+                t_s: track.t_s.clone(),
+                sensor_m: Vec::new(),
+                clock: None,
+            };
+            let window = Window {
+                start_s: 10.0,
+                end_s: 49.99,
+            };
+            heave.slow_m(&still, window)
+        };
+        let found = slow_m(0.02).unwrap();
+        assert!((found - 0.02 / SQRT_2).abs() < 2e-4, "{found}");
+        assert_eq!(slow_m(0.003), None);
+    }
+
     /// Steps at 2 Hz that somebody counted from 10 s to 30 s, and missed one of: what is found before and behind is nobody's fault.
     #[test]
     fn steps_are_judged_while_somebody_counted() {

@@ -899,6 +899,15 @@ mod tests {
         let mut holed = track.part(0..3600);
         holed.append(track.part(3700..8000));
         assert_eq!(unknown(&holed), [0..500, 2800..4400, 7400..7900]);
+        // And so much is said to be left out, whenever it began.
+        let mut later = holed.clone();
+        later.t_s.iter_mut().for_each(|t| *t += 1000.0);
+        let found = motion(&later, &settings).unwrap();
+        assert!(
+            (found.left_out_s - 0.505).abs() < 1e-6,
+            "{}",
+            found.left_out_s
+        );
         // A stretch of 6 s between two holes has none.
         let mut twice = holed.part(0..4700);
         twice.append(holed.part(4800..7900));
