@@ -9,7 +9,7 @@
 //!
 //! Source: gyro-norm alignment as in Faizullin et al., "Twist-n-Sync", Sensors 21 (2021) 68.
 
-use crate::inputs::interpolate;
+use crate::inputs::{Window, interpolate};
 use crate::median::median;
 use crate::spectrum::{Complex64, rfft};
 use realfft::RealFftPlanner;
@@ -182,7 +182,7 @@ pub fn from_signals(
         // Two clocks may part by this much from one end of what they share to the other, unseen.
         let unseen_s = 1e-6 * PRIOR_PPM * 0.5 * found_s.max(0.0);
         return Ok(Clock {
-            offset_s: lag / RATE_HZ,
+            offset_s: shared_lag(&x, &y, &grid, (a, b), lag) / RATE_HZ,
             offset_sd_s: TOP_SD_S.hypot(unseen_s),
             drift_ppm: 0.0,
             drift_sd_ppm: None,
@@ -262,6 +262,31 @@ fn best_lag(x: &[f64], y: &[f64], reach: usize) -> (f64, f64) {
     };
     (best as f64 + shift.clamp(-0.5, 0.5), c)
 }
+
+/// A lag (samples) near `lag`, of all that both share: what only one of them felt, more of it the larger a lag is, draws the maximum of the whole
+/// correlation towards none.
+fn shared_lag(x: &[f64], y: &[f64], grid: &[f64], (a, b): (Ends, Ends), lag: f64) -> f64 {
+    let coarse = lag.round();
+    let (late_s, reach) = (coarse / RATE_HZ, (0.3 * RATE_HZ) as usize);
+    let within = Window {
+        start_s: a.0.max(b.0 - late_s + 0.31),
+        end_s: a.1.min(b.1 - late_s - 0.31),
+    };
+    let part = within.range(grid);
+    let from = part.start as i64 + coarse as i64 - reach as i64;
+    let long = part.len() as f64 > RATE_HZ;
+    let found = usize::try_from(from)
+        .ok()
+        .filter(|_| long)
+        .and_then(|from| {
+            let near = y.get(from..from + part.len() + 2 * reach)?;
+            window_lag(x.get(part)?, near)
+        });
+    found.map_or(lag, |(shift, _)| coarse + shift - reach as f64)
+}
+
+/// First and last moment, s.
+type Ends = (f64, f64);
 
 /// Where in the longer `y` the shorter `x` fits best (samples, refined), and Pearson's correlation there. `None` at the ends of the
 /// search or without motion.
@@ -655,6 +680,109 @@ mod tests {
             for (f, b) in found.iter().zip(began) {
                 assert!((f - b).abs() <= 0.005, "{knock:?}: {f} for {b}");
             }
+        }
+    }
+
+    /// Residuals of 1, −2, 0, 2, −1 ms, at right angles to a constant and to a slope: s² = 10/3 ms², standard errors s/√5 and s/√10. Measured twice
+    /// alike, and so counted, it is no surer.
+    #[test]
+    fn a_line_has_the_standard_errors_of_least_squares() {
+        let of = |k: u32| {
+            let rest = [1.0, -2.0, 0.0, 2.0, -1.0][k as usize];
+            (f64::from(k), 0.1 + 0.01 * f64::from(k) + 1e-3 * rest)
+        };
+        let once: Vec<(f64, f64)> = (0..5).map(of).collect();
+        let twice = [&once[..], &once].concat();
+        for clock in [line(&once, 1.0, 0.0), line(&twice, 2.0, 0.0)] {
+            assert!((clock.at_s - 2.0).abs() < 1e-12 && (clock.offset_s - 0.12).abs() < 1e-12);
+            assert!((clock.drift_ppm - 1e4).abs() < 1e-6, "{clock:?}");
+            assert!((clock.offset_sd_s - 1e-3 * (2.0f64 / 3.0).sqrt()).abs() < 1e-12);
+            assert!((clock.drift_sd_ppm.unwrap() - 1e3 / 3f64.sqrt()).abs() < 1e-6);
+            // 3 ms, and 4 ms of the drift.
+            let sure = Clock {
+                offset_sd_s: 0.003,
+                drift_sd_ppm: Some(40.0),
+                ..clock
+            };
+            assert!((sure.reference_sd_s(sure.at_s + 100.0) - 0.005).abs() < 1e-12);
+        }
+    }
+
+    /// Eight seconds show an offset between samples, and no drift: it is as unsure as quartz.
+    #[test]
+    fn a_short_motion_tells_the_offset_alone() {
+        for (late_s, other_ends_s) in [(0.1234, 8.0), (-0.0377, 8.0), (0.0561, 9.0)] {
+            let at = |n: f64| (0..(n * 200.0) as u32).map(|k| f64::from(k) / 200.0);
+            let t_s: Vec<f64> = at(8.0).collect();
+            let u_s: Vec<f64> = at(other_ends_s).collect();
+            let felt = |t: f64| motion(t + 1.0);
+            let x: Vec<f64> = t_s.iter().map(|t| felt(*t)).collect();
+            let y: Vec<f64> = u_s.iter().map(|t| felt(t - late_s)).collect();
+            let clock = from_signals((&t_s, &x), (&u_s, &y), 1.0).unwrap();
+            assert!(
+                (clock.offset_s - late_s).abs() < TOP_SD_S,
+                "{late_s}: {clock:?}"
+            );
+            let shared_s = t_s[t_s.len() - 1];
+            let unseen_s = 30e-6 * 0.5 * shared_s;
+            assert!((clock.offset_sd_s - TOP_SD_S.hypot(unseen_s)).abs() < 1e-9);
+            assert_eq!((clock.drift_sd_ppm, clock.points), (None, 1));
+            assert!((clock.at_s - 0.5 * shared_s).abs() < 1e-9);
+        }
+    }
+
+    /// One began when the other had ended, by its own clock.
+    #[test]
+    fn clocks_further_apart_than_their_logs_are_long_are_compared() {
+        let t_s: Vec<f64> = (0..1200).map(|k| f64::from(k) / 200.0).collect();
+        let u_s: Vec<f64> = t_s.iter().map(|t| t + 7.0031).collect();
+        let x: Vec<f64> = t_s.iter().map(|t| motion(t + 1.0)).collect();
+        let clock = from_signals((&t_s, &x), (&u_s, &x), 10.0).unwrap();
+        assert!((clock.offset_s - 7.0031).abs() < TOP_SD_S, "{clock:?}");
+    }
+
+    #[test]
+    fn how_little_two_devices_share_is_said() {
+        let on = |from_s: f64, to_s: f64| -> Vec<f64> {
+            let n = ((to_s - from_s) * 50.0) as u32;
+            (0..=n).map(|k| from_s + f64::from(k) / 50.0).collect()
+        };
+        for (a, b, search_s, known) in [
+            ((0.0, 20.0), (18.0, 40.0), 1.0, Some("share 2.0 s")),
+            ((18.0, 40.0), (0.0, 20.0), 1.0, Some("share 2.0 s")),
+            ((0.0, 20.0), (30.0, 60.0), 1.0, Some("share 0.0 s")),
+            ((0.0, 4.0), (0.0, 60.0), 10.0, Some("share 4.0 s")),
+            ((0.0, 60.0), (3.0, 7.0), 10.0, Some("share 4.0 s")),
+            ((0.0, 20.0), (15.0, 40.0), 0.0, None),
+        ] {
+            let (t_s, u_s) = (on(a.0, a.1), on(b.0, b.1));
+            let [x, y] = [&t_s, &u_s].map(|t| t.iter().map(|t| motion(*t)).collect::<Vec<_>>());
+            let found = from_signals((&t_s, &x), (&u_s, &y), search_s);
+            let said = found.err().map(|e| e.to_string()).unwrap_or_default();
+            let short = said.contains("needs at least 5 s");
+            assert_eq!(short, known.is_some(), "{a:?} {b:?}: {said}");
+            assert!(said.contains(known.unwrap_or_default()), "{said}");
+        }
+    }
+
+    /// A tap counts where the half seconds before, about and after it are at rest, whenever the log began.
+    #[test]
+    fn a_tap_beside_a_step_is_none() {
+        for begins_s in [0.0, 777.3] {
+            let t: Vec<f64> = (0..4000).map(|k| begins_s + f64::from(k) * 0.01).collect();
+            let walks = |k: usize| (1000..3000).contains(&k);
+            let mut a: Vec<[f64; 3]> = (0..4000)
+                .map(|k| {
+                    let step = if walks(k) { 3.0 } else { 0.05 };
+                    [0.0, 0.0, 9.8 + step * (0.126 * k as f64).sin()]
+                })
+                .collect();
+            // In the first half second, at rest, right before and behind the walk, and two half seconds from it.
+            for k in [20, 400, 930, 975, 3025, 3080] {
+                a[k][1] += 9.0;
+            }
+            let found = taps(&t, &a);
+            assert_eq!(found, [t[400], t[930], t[3080]]);
         }
     }
 

@@ -437,6 +437,26 @@ fn the_recorder_s_rate_is_not_in_the_pendulum() {
     }
 }
 
+/// Forces of handles and the support ratio of a weighed body are the same load.
+#[test]
+fn a_pendulum_hangs_on_the_support_as_on_the_forces() {
+    let mut field = field_of(&scene_of("music"));
+    let window = analyze::Window::from(15.0);
+    let by_forces = fit(&field, window);
+    let i = &mut field.inputs;
+    let weight_n = i.mass_kg.unwrap() * i.gravity_m_per_s2;
+    i.support_ratio = i.total_force_n().iter().map(|n| n / weight_n).collect();
+    i.normal_n.clear();
+    let by_support = fit(&field, window);
+    for name in ["pendulum", "roll damping"] {
+        let [a, b] = [&by_forces, &by_support].map(|found| find(found, name));
+        let ends = a.interval.iter().zip(&b.interval);
+        for (x, y) in ends.chain([(&a.value, &b.value)]) {
+            assert!((x - y).abs() < 1e-9 * x.abs(), "{a:?} {b:?}");
+        }
+    }
+}
+
 /// Sixty pendulums of known a and b under a load that leaves and lands, each with a noise of its own: intervals are as wide as the errors. The whole
 /// change when every other sample is left out made them two and three times too wide.
 #[test]

@@ -495,4 +495,149 @@ mod tests {
             );
         }
     }
+
+    const WALK_HZ: f64 = 2.0;
+
+    /// A minute of somebody who heaves by 2 m/s² with every step; the gyroscope only feels that there is one.
+    fn walker(late_s: f64) -> Track {
+        let t_s: Vec<f64> = (0..6000).map(|k| 0.01 * f64::from(k)).collect();
+        let up = |t: &f64| 9.81 + 2.0 * (TAU * WALK_HZ * (t - late_s)).cos();
+        Track {
+            accel_m_per_s2: t_s.iter().map(|t| [0.0, 0.0, up(t)]).collect(),
+            gyro_rad_per_s: vec![[0.0, 0.0, 1e-6]; t_s.len()],
+            t_s,
+            dropped: 0,
+        }
+    }
+
+    /// Two who walk in step, the second with a clock 0.1 s ahead.
+    fn pair(clock_sd_s: f64) -> Carriers {
+        let mut carriers = Carriers::default();
+        for (k, late_s) in [0.0, 0.1].into_iter().enumerate() {
+            let options = Options::without_latency();
+            let sd_s = if k == 1 { clock_sd_s } else { 0.0 };
+            carriers.add(&format!("/imu/{k}"), &walker(late_s), options, sd_s);
+        }
+        carriers
+    }
+
+    /// Of two columns by how much the second is behind, rad.
+    fn behind((t_s, phases): &Phases) -> f64 {
+        let [a, b] = &phases[..] else {
+            panic!("{} columns", phases.len())
+        };
+        let middle = t_s.len() / 2;
+        a[middle] - b[middle]
+    }
+
+    #[test]
+    fn clocks_move_steps_phases_and_heaves_alike() {
+        let mut carriers = pair(0.0);
+        let turn = TAU * WALK_HZ;
+        assert!((behind(&carriers.phases().unwrap()) - turn * 0.1).abs() < 0.02);
+        carriers.worn[1].ahead_s = 0.1;
+        let phases = carriers.phases().unwrap();
+        assert!(behind(&phases).abs() < 0.02, "{}", behind(&phases));
+        // From the later beginning to the earlier end of both.
+        let (t_s, _) = &phases;
+        assert!(t_s[0].abs() < 0.011 && (t_s[t_s.len() - 1] - 59.89).abs() < 0.011);
+        for steps in carriers.step_s() {
+            for step in steps.iter().filter(|t| (5.0..55.0).contains(*t)) {
+                let off = step * WALK_HZ - (step * WALK_HZ).round();
+                assert!(off.abs() < 0.005, "{step}");
+            }
+        }
+        let moments: Vec<f64> = carriers.events().iter().map(|e| e.t_s).collect();
+        assert_eq!(moments, carriers.step_s().concat());
+        // z = −(2/ω²) cos ωt where it is known: 2.5 s from either end of what each clock knows, at a corner of 0.2 Hz.
+        let at_s: Vec<f64> = (0..600).map(|k| 0.1 * f64::from(k) + 0.03).collect();
+        let heaves = carriers.heave_m(&at_s, 0.2);
+        for (heave, ahead_s) in heaves.iter().zip([0.0, 0.1]) {
+            for (t, z) in at_s.iter().zip(heave) {
+                let inside = 2.5 - ahead_s < *t && *t < 57.49 - ahead_s;
+                assert_eq!(z.is_finite(), inside, "{t}");
+                let known = -2.0 / (turn * turn) * (turn * t).cos();
+                if (10.0..50.0).contains(t) {
+                    assert!(
+                        (z - known).abs() < 0.01 * 2.0 / (turn * turn),
+                        "{t}: {z} {known}"
+                    );
+                }
+            }
+        }
+        // Who does not tell what is up tells no heave, nor does anybody then.
+        let mut without = walker(0.0);
+        without.gyro_rad_per_s.fill([0.0; 3]);
+        carriers.add("/imu/2", &without, Options::without_latency(), 0.0);
+        assert!(carriers.heave_m(&at_s, 0.2).is_empty() && carriers.step_s().len() == 3);
+    }
+
+    #[test]
+    fn a_clock_that_taps_have_set_may_err_either_way() {
+        let turn = TAU * WALK_HZ;
+        assert_eq!(pair(0.0).phases_by_clocks().count(), 0);
+        let ends: Vec<_> = pair(0.01).phases_by_clocks().collect();
+        let [ends] = &ends[..] else {
+            panic!("{} clocks", ends.len())
+        };
+        for (end, sds) in ends.iter().zip([-1.96, 1.96]) {
+            let found = behind(end.as_ref().unwrap());
+            let known = turn * (0.1 - sds * 0.01);
+            assert!((found - known).abs() < 0.02, "{sds}: {found} {known}");
+        }
+    }
+
+    /// Errors by different causes add by squares; other offsets of the clocks that go with the motion stretch what is there.
+    #[test]
+    fn an_interval_holds_all_that_may_err() {
+        let value = |x: f64| crate::metrics::Value::number(x);
+        let of = |synchrony: f64| {
+            Metrics(vec![
+                ("synchrony", value(synchrony)),
+                ("plv", value(0.9)),
+                ("beat_lead_deg", value(12.0)),
+                ("pull_rad_per_s", value(2.0).ci95(1.0, 4.0)),
+            ])
+        };
+        let detected = Metrics(vec![
+            ("synchrony", value(0.88)),
+            ("pull_rad_per_s", value(1.9)),
+        ]);
+        let mut carriers = pair(0.0);
+        let with = |carriers: &Carriers, synchrony, others: &[f64], by_taps| {
+            let mut metrics = of(synchrony);
+            carriers.interval(&mut metrics, &detected, others, by_taps);
+            metrics
+        };
+        let near = |a: [f64; 2], b: [f64; 2]| (a[0] - b[0]).abs() + (a[1] - b[1]).abs() < 1e-12;
+        let ci95 = |m: &Metrics, name| m.get(name).unwrap().ci95.unwrap();
+        let found = with(&carriers, 0.9, &[], 0.015);
+        let half = (0.002f64.powi(2) + 0.015f64.powi(2) + 0.02f64.powi(2)).sqrt();
+        assert!(near(ci95(&found, "synchrony"), [0.9 - half, 0.9 + half]));
+        assert_eq!(found.number("beat_lead_deg"), Some(12.0));
+        let lost = 0.1f64.hypot(0.015);
+        let pull = [2.0 - 1f64.hypot(lost), 2.0 + 2f64.hypot(lost)];
+        assert!(near(ci95(&found, "pull_rad_per_s"), pull));
+        // A synchrony is between none and all of it.
+        let most = with(&carriers, 0.999, &[], 0.0);
+        assert_eq!(ci95(&most, "synchrony")[1], 1.0);
+        assert_eq!(ci95(&with(&carriers, 0.01, &[], 0.0), "synchrony")[0], 0.0);
+        // Put on each other by motion: 0.013 instead of what taps leave, and no lag to the beat.
+        carriers.worn[1].ahead_s = 0.1;
+        let found = with(&carriers, 0.9, &[0.86, f64::NAN, 0.92], 0.5);
+        let half = (0.002f64.powi(2) + 0.013f64.powi(2) + 0.02f64.powi(2)).sqrt();
+        assert!(near(ci95(&found, "synchrony"), [0.86 - half, 0.92 + half]));
+        assert_eq!(found.number("beat_lead_deg"), None);
+        // Offsets that leave it anywhere within more than a tenth tell none.
+        let vague = with(&carriers, 0.9, &[0.7], 0.0);
+        assert_eq!(vague.number("synchrony"), None);
+        let why = vague.get("plv").unwrap().reason.clone().unwrap();
+        assert!(why.contains("from 0.68 to 0.92"), "{why}");
+        assert!(
+            of_all("synchrony")
+                && !of_all("beat_hz")
+                && !of_all("pull_rad_per_s")
+                && !of_all("t_float")
+        );
+    }
 }

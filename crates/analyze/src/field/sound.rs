@@ -145,3 +145,60 @@ pub fn listen(recording: &Recording) -> Result<Option<Heard>, ReadError> {
         remarks,
     }))
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn heard(rate: u32, channels: u32, samples: &[i16]) -> RawAudio {
+        RawAudio {
+            data: samples.iter().flat_map(|s| s.to_le_bytes()).collect(),
+            format: "pcm-s16".into(),
+            sample_rate: rate,
+            number_of_channels: channels,
+            ..RawAudio::default()
+        }
+    }
+
+    #[test]
+    fn channels_are_averaged_and_fast_sound_is_thinned_across_messages() {
+        let mut stereo = Joined::default();
+        stereo.take(0, &heard(16_000, 2, &[100, 300, -50, 50]));
+        assert_eq!(stereo.sound, [200.0, 0.0]);
+        let mut fast = Joined::default();
+        fast.take(0, &heard(48_000, 1, &[1, 2, 3, 10]));
+        fast.take(83_333, &heard(48_000, 1, &[20, 30, 7]));
+        assert_eq!(fast.sound, [2.0, 20.0]);
+        assert!((fast.length_s() - 2.0 / 16_000.0).abs() < 1e-12);
+        // Less than twice the least rate is kept as it is; no channel said is one.
+        let mut slow = Joined::default();
+        slow.take(0, &heard(31_000, 0, &[5, 6]));
+        assert_eq!((slow.sound.len(), slow.rate_hz()), (2, 31_000.0));
+    }
+
+    #[test]
+    fn what_is_missing_is_silence_and_what_is_no_sound_is_counted() {
+        let second = vec![1000; 8000];
+        let mut joined = Joined::default();
+        // The second message comes 90 ms late, which is no hole, the third behind half a second of nothing.
+        for t_s in [3.0, 4.09, 5.5] {
+            joined.take((t_s * 1e9) as i64, &heard(8000, 1, &second));
+        }
+        assert!((joined.holes_s - 0.5).abs() < 1e-9, "{}", joined.holes_s);
+        assert!((joined.length_s() - 3.5).abs() < 1e-9);
+        assert!(joined.sound[16_000..20_000].iter().all(|s| *s == 0.0));
+        assert!(joined.sound[20_000..].iter().all(|s| *s == 1000.0));
+        let mut other = heard(8000, 1, &second);
+        other.format = "opus".into();
+        joined.take(7_000_000_000, &other);
+        joined.take(7_000_000_000, &heard(0, 1, &second));
+        joined.take(7_000_000_000, &heard(44_100, 1, &second));
+        assert_eq!((joined.refused, joined.sound.len()), (3, 28_000));
+        // A wrong stamp asks for an hour at most, and behind that nobody listens.
+        let mut joined = Joined::default();
+        joined.take(0, &heard(20, 1, &[1; 20]));
+        assert!(!joined.cut);
+        joined.take(i64::MAX, &heard(20, 1, &[1; 20]));
+        assert!(joined.cut && joined.sound.len() == 20 + 3600 * 20);
+    }
+}

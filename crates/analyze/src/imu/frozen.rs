@@ -177,4 +177,15 @@ mod tests {
         }
         assert!(frozen(&track).is_empty());
     }
+
+    /// A second counts, a shorter stop does not, late in a recording too.
+    #[test]
+    fn a_stop_of_less_than_a_second_is_none() {
+        for (samples, is_frozen) in [(60, false), (99, false), (102, true)] {
+            let mut track = swaying(1e-6);
+            let last = track.gyro_rad_per_s[1500];
+            track.gyro_rad_per_s[1500..1500 + samples].fill(last);
+            assert_eq!(!frozen(&track).is_empty(), is_frozen, "{samples}");
+        }
+    }
 }

@@ -30,8 +30,6 @@ pub enum Mounting {
     Levelled,
     /// Body from sensor, known; taken as it is.
     Known(UnitQuaternion<f64>),
-    /// Up as in `Levelled`, forward from the first steps out of standstill.
-    Walking,
 }
 
 /// How a recording is to be read.
@@ -167,7 +165,8 @@ pub fn motion(track: &Track, settings: &Settings) -> Result<Motion, MotionError>
     } else {
         usual_s
     };
-    if period_s > 1.0 / 25.0 {
+    // A clock errs, and stamps are rounded.
+    if period_s > 1.01 / 25.0 {
         return Err(MotionError::TooSlow {
             found_hz: 1.0 / period_s,
         });
@@ -196,14 +195,9 @@ pub fn motion(track: &Track, settings: &Settings) -> Result<Motion, MotionError>
             found_m_per_s2: found,
         });
     }
-    let levelled = || level(&estimate, settings.level_over.range(&track.t_s));
     let body_from_sensor = match settings.mounting {
         Mounting::Known(rotation) => rotation,
-        Mounting::Levelled => levelled(),
-        Mounting::Walking => {
-            let level = levelled();
-            forward(&track, &estimate, &level, g) * level
-        }
+        Mounting::Levelled => level(&estimate, settings.level_over.range(&track.t_s)),
     };
     let sensor_from_body = body_from_sensor.inverse();
     for q in &mut estimate.earth_from_sensor {
@@ -402,36 +396,6 @@ fn level(estimate: &Estimate, over: Range<usize>) -> UnitQuaternion<f64> {
     let axes = [x, up.cross(&x), up].map(|axis| axis.transpose());
     let rows = Rotation3::from_matrix_unchecked(Matrix3::from_rows(&axes));
     UnitQuaternion::from_rotation_matrix(&rows)
-}
-
-/// The turn about z that takes the direction of the first walking to x: the mean horizontal acceleration over the two seconds after the
-/// first rest. Identity when they never stood still or never set off.
-fn forward(
-    track: &Track,
-    estimate: &Estimate,
-    level: &UnitQuaternion<f64>,
-    g: f64,
-) -> UnitQuaternion<f64> {
-    let Some(still) = estimate.rest.iter().position(|r| *r) else {
-        return UnitQuaternion::identity();
-    };
-    let Some(off) = estimate.rest[still..]
-        .iter()
-        .position(|r| !*r)
-        .map(|k| still + k)
-    else {
-        return UnitQuaternion::identity();
-    };
-    let end = track.t_s.partition_point(|t| *t < track.t_s[off] + 2.0);
-    let mut push = Vector3::zeros();
-    for i in off..end {
-        let up = estimate.earth_from_sensor[i].inverse() * Vector3::z();
-        push += level * (Vector3::from(track.accel_m_per_s2[i]) - up * g);
-    }
-    if push.x.hypot(push.y) < 1e-9 {
-        return UnitQuaternion::identity();
-    }
-    UnitQuaternion::from_axis_angle(&Vector3::z_axis(), -push.y.atan2(push.x))
 }
 
 /// Specific force at the centre of mass, in the body's axes, from that at the sensor and the angular velocity over one stretch.
@@ -911,6 +875,144 @@ mod tests {
         }
         let error = motion(&track, &Settings::default()).unwrap_err();
         assert!(matches!(error, MotionError::Turning { .. }), "{error}");
+    }
+
+    /// Height is given away at its ends: half a period of the corner, at most a tenth of all, and 0.8 of it beside a hole; nothing else is.
+    #[test]
+    fn height_is_unknown_for_as_long_as_is_said() {
+        let (track, ..) = twin([0.0; 3], UnitQuaternion::identity());
+        let (settings, _) = most();
+        let unknown = |track: &Track| -> Vec<Range<usize>> {
+            let found = motion(track, &settings).unwrap().inputs.height_m;
+            let mut at = 0;
+            let runs = found.chunk_by(|a, b| a.is_nan() == b.is_nan());
+            let ranges = runs.map(|run| {
+                at += run.len();
+                (run[0].is_nan(), at - run.len()..at)
+            });
+            ranges.filter(|r| r.0).map(|r| r.1).collect()
+        };
+        // 2.5 s of 40 s, a tenth of 12 s.
+        assert_eq!(unknown(&track), [0..500, 7500..8000]);
+        assert_eq!(unknown(&track.part(0..2400)), [0..240, 2160..2400]);
+        // Half a second is lost at 18 s: 4 s on both sides.
+        let mut holed = track.part(0..3600);
+        holed.append(track.part(3700..8000));
+        assert_eq!(unknown(&holed), [0..500, 2800..4400, 7400..7900]);
+        // And so much is said to be left out, whenever it began.
+        let mut later = holed.clone();
+        later.t_s.iter_mut().for_each(|t| *t += 1000.0);
+        let found = motion(&later, &settings).unwrap();
+        assert!(
+            (found.left_out_s - 0.505).abs() < 1e-6,
+            "{}",
+            found.left_out_s
+        );
+        // A stretch of 6 s between two holes has none.
+        let mut twice = holed.part(0..4700);
+        twice.append(holed.part(4800..7900));
+        assert_eq!(unknown(&twice), [0..500, 2800..5500, 7300..7800]);
+    }
+
+    /// 25 Hz are enough, also by a clock that runs 50 ppm slow, and by stamps with a rounding in them.
+    #[test]
+    fn the_least_rate_is_enough() {
+        let at = |hz: f64, begins_s: f64| {
+            let mut track = Track::default();
+            for k in 0..1000 {
+                track.t_s.push(begins_s + f64::from(k) / hz);
+                track.gyro_rad_per_s.push([0.0; 3]);
+                track.accel_m_per_s2.push([0.0, 0.0, 9.80665]);
+            }
+            motion(&track, &Settings::default())
+        };
+        for (hz, begins_s) in [(25.0, 0.0), (25.0, 0.1), (25.0, 1234.5), (24.99875, 0.0)] {
+            assert!(at(hz, begins_s).is_ok(), "{hz} Hz from {begins_s} s on");
+        }
+        let error = at(24.0, 0.0).unwrap_err().to_string();
+        assert!(
+            error.contains("sampled at 24.0 Hz") && error.contains("at least 25 Hz"),
+            "{error}"
+        );
+    }
+
+    /// Pushed to and fro in step with its roll, by an accelerometer that is 20 ms old at its stamps: turned as it lies by then it would feel a support
+    /// 3 % off. The bias upwards is found.
+    #[test]
+    fn an_accelerometer_that_is_late_feels_the_same_support() {
+        let (w, swing) = (TAU * 1.07, 0.35);
+        let roll = |t: f64| swing * (w * t).sin();
+        let mut track = Track::default();
+        let age_s = 0.02;
+        for t in (0..8000).map(|k| 0.005 * f64::from(k)) {
+            let then = t - age_s;
+            let earth_from_body = UnitQuaternion::from_axis_angle(&Vector3::x_axis(), roll(then));
+            let push = Vector3::new(0.0, 4.0 * (w * then).sin(), 9.80665 + 0.2);
+            track.t_s.push(t);
+            track
+                .gyro_rad_per_s
+                .push([swing * w * (w * t).cos(), 0.0, 0.0]);
+            track
+                .accel_m_per_s2
+                .push((earth_from_body.inverse() * push).into());
+        }
+        let settings = Settings {
+            orientation: Options {
+                accel_latency_s: age_s,
+                ..Options::without_latency()
+            },
+            ..Settings::default()
+        };
+        let found = motion(&track, &settings).unwrap();
+        let known = 1.0 + 0.2 / 9.80665;
+        for ratio in &found.inputs.support_ratio[2000..6000] {
+            assert!((ratio - known).abs() < 0.01, "{ratio} {known}");
+        }
+        assert!((found.gravity_off_m_per_s2 - 0.2).abs() < 0.03);
+        let mean = found.accel_up_m_per_s2.iter().sum::<f64>();
+        assert!(mean.abs() < 1e-6, "{mean}");
+    }
+
+    /// A cubic is drawn through four samples about one that is lost, and straight lines everywhere else.
+    #[test]
+    fn what_is_lost_is_drawn_as_a_cubic_where_samples_are_even() {
+        let cube = |t: &f64| t.powi(3);
+        let at = |t_s: &[f64], at_s: f64| {
+            let x: Vec<f64> = t_s.iter().map(cube).collect();
+            drawn(t_s, &x, &[at_s], 1.0)[0]
+        };
+        let straight = |a: f64, b: f64| 0.5 * (cube(&a) + cube(&b));
+        let lost = [10.0, 11.0, 12.0, 14.0, 15.0, 16.0];
+        assert!((at(&lost, 13.0) - cube(&13.0)).abs() < 1e-9);
+        assert_eq!(at(&lost, 11.5), straight(11.0, 12.0));
+        // A little late is even enough, a third is not.
+        let late = |k: f64| at(&[11.0, 12.0, k, 14.0, 16.0, 17.0], 15.0);
+        assert!((late(12.9) - cube(&15.0)).abs() < 1e-9);
+        for k in [12.7, 12.33, 13.6] {
+            assert_eq!(late(k), straight(14.0, 16.0), "{k}");
+        }
+    }
+
+    /// What is faster than people move is taken from a fast sensor, by a gain of 1/(1 + (f/60 Hz)⁴), before it is differentiated.
+    #[test]
+    fn a_fast_sensor_is_smoothed_before_it_is_differentiated() {
+        let sine = |hz: f64, rate_hz: f64| -> Vec<Vector3<f64>> {
+            let at = |k: u32| (TAU * hz * f64::from(k) / rate_hz).sin();
+            (0..4000)
+                .map(|k| Vector3::new(at(k), 0.0, -at(k)))
+                .collect()
+        };
+        let size = |v: &[Vector3<f64>]| rms(v[1000..3000].iter().map(|v| v.x));
+        for (hz, gain) in [
+            (10.0, 1.0 / (1.0 + (1.0f64 / 6.0).powi(4))),
+            (90.0, 1.0 / (1.0 + 1.5f64.powi(4))),
+        ] {
+            let fast = sine(hz, 2000.0);
+            let found = size(&below(&fast, 1.0 / 2000.0)) / size(&fast);
+            assert!((found - gain).abs() < 0.01, "{hz} Hz: {found}");
+            let slow = sine(hz, 250.0);
+            assert_eq!(below(&slow, 1.0 / 250.0), slow);
+        }
     }
 
     #[test]

@@ -126,4 +126,19 @@ mod tests {
             assert_eq!(saturated(&turning(quantum, 100.0)), [], "{quantum}");
         }
     }
+
+    /// A value that comes back, but never three times in a row, is none that anything stayed at.
+    #[test]
+    fn what_only_touches_a_value_does_not_stay_at_it() {
+        let mut track = turning(1e-9, 100.0);
+        for k in (50..4000).step_by(97) {
+            track.gyro_rad_per_s[k][1] = 4.5;
+        }
+        assert_eq!(saturated(&track), []);
+        for k in 1000..1003 {
+            track.gyro_rad_per_s[k][1] = 4.5;
+        }
+        let found = saturated(&track);
+        assert!(found.len() == 1 && found[0].end == 4.5, "{found:?}");
+    }
 }

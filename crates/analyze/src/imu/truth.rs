@@ -32,20 +32,6 @@ impl Truth {
         }
         out
     }
-
-    /// Norm of the angular velocity between neighbours, rad/s, at the middles of their times.
-    pub fn rate_norm(&self) -> (Vec<f64>, Vec<f64>) {
-        self.t_s
-            .windows(2)
-            .zip(self.world_from_body.windows(2))
-            .map(|(t, q)| {
-                (
-                    0.5 * (t[0] + t[1]),
-                    (q[0].inverse() * q[1]).angle() / (t[1] - t[0]),
-                )
-            })
-            .unzip()
-    }
 }
 
 /// Root mean square of the inclination error, deg: the angle by which the two disagree on where up is.
@@ -168,6 +154,70 @@ mod tests {
         );
     }
 
+    /// A roll that grows evenly: between samples of the truth the straight turn is exact, across a hole of it only what lies beside a sample counts,
+    /// and only in the spans asked for, their ends included.
+    #[test]
+    fn a_truth_is_drawn_between_samples_and_not_across_holes() {
+        let roll = |t: f64| UnitQuaternion::from_axis_angle(&Vector3::x_axis(), 0.5 * t);
+        let at = |t_s: &[f64]| t_s.iter().map(|t| roll(*t)).collect::<Vec<_>>();
+        let grid = |hz: f64, keep: &dyn Fn(f64) -> bool| -> Vec<f64> {
+            let all = (0..(4.0 * hz) as u32).map(|k| f64::from(k) / hz);
+            all.filter(|t| keep(*t)).collect()
+        };
+        // A hole from 1 to 2 s; the sensor is off by as many mrad as there are seconds.
+        let u_s = grid(50.0, &|t| !(1.0 < t && t < 2.0));
+        let truth = Truth {
+            world_from_body: at(&u_s),
+            t_s: u_s,
+        };
+        let t_s: Vec<f64> = grid(100.0, &|_| true).iter().map(|t| t + 0.003).collect();
+        let off = |t: &f64| UnitQuaternion::from_axis_angle(&Vector3::y_axis(), 1e-3 * t);
+        let seen: Vec<_> = t_s.iter().map(|t| off(t) * roll(*t)).collect();
+        let error = |spans: &[(f64, f64)]| {
+            inclination_error_deg(&t_s, &seen, &truth, spans).map(|e| 1e3 * e.to_radians())
+        };
+        let rms = |inside: &dyn Fn(f64) -> bool| {
+            let all: Vec<f64> = t_s.iter().copied().filter(|t| inside(*t)).collect();
+            (all.iter().map(|t| t * t).sum::<f64>() / all.len() as f64).sqrt()
+        };
+        for (span, inside) in [((0.103, 0.503), (0.1, 0.51)), ((2.5, 3.5), (2.5, 3.5))] {
+            let known = rms(&|t| (inside.0..inside.1).contains(&t));
+            let found = error(&[span]).unwrap();
+            assert!((found - known).abs() < 1e-6, "{span:?}: {found} {known}");
+        }
+        // In the hole only 1.003 s counts, 3 ms behind the last sample, against which it has turned by 1.5 mrad more.
+        let beside = error(&[(1.001, 1.9)]).unwrap();
+        assert!((beside - 1.003f64.hypot(1.5)).abs() < 1e-3, "{beside}");
+        assert_eq!(error(&[(1.01, 1.999)]), None);
+    }
+
+    /// x = 1.1 y and a clock that is 0.1 s off: a tenth is left where that is known; of what is late by δ, 2 sin(ωδ/2).
+    #[test]
+    fn what_is_left_between_two_courses_is_known_by_hand() {
+        let w = std::f64::consts::TAU * 1.5;
+        let t_s: Vec<f64> = (0..6000).map(|k| f64::from(k) / 100.0).collect();
+        let course = |late_s: f64, gain: f64| -> Vec<f64> {
+            t_s.iter()
+                .map(|t| gain * (w * (t - late_s)).sin())
+                .collect()
+        };
+        // What is not looked at is wrong altogether.
+        let mut seen = course(-0.1, 1.1);
+        seen[..500].fill(9.0);
+        let inner = (15.0, 45.0);
+        let band = [0.3, 10.0];
+        let left = |x: &[f64], clock_s| {
+            relative_error((&t_s, x), (&t_s, &course(0.0, 1.0)), band, clock_s, inner).unwrap()
+        };
+        let known = left(&seen, 0.1);
+        assert!((known - 0.1).abs() < 1e-3, "{known}");
+        let late = left(&course(0.02, 1.0), 0.0);
+        assert!((late - 2.0 * (w * 0.01).sin()).abs() < 1e-3, "{late}");
+        let still = vec![1.0; t_s.len()];
+        let none = relative_error((&t_s, &seen), (&t_s, &still), band, 0.0, inner);
+        assert!(none.is_none_or(|e| e > 1e6), "{none:?}");
+    }
+
     #[test]
     fn missing_truth_does_not_count() {
         let nan = f64::NAN;
@@ -176,6 +226,20 @@ mod tests {
             [&[0.0, nan, 0.0], &[0.0; 3], &[0.0; 3], &[1.0; 3]],
         );
         assert_eq!(truth.t_s, [0.0, 2.0]);
+        // Only as much as the shortest column holds.
+        let column = |n: usize, x: f64| vec![x; n];
+        for short in 0..5 {
+            let n = |k: usize| if k == short { 2 } else { 3 };
+            let t_s = &[0.0, 1.0, 2.0][..n(0)];
+            let [x, y, z, w] = [
+                column(n(1), 0.0),
+                column(n(2), 0.0),
+                column(n(3), 0.0),
+                column(n(4), 1.0),
+            ];
+            let found = Truth::from_columns(t_s, [&x, &y, &z, &w]);
+            assert_eq!(found.t_s, [0.0, 1.0], "{short}");
+        }
         let q = UnitQuaternion::from_axis_angle(&Vector3::y_axis(), 0.02);
         let e = inclination_error_deg(&[0.0, 1.0, 2.0], &[q; 3], &truth, &[]).unwrap();
         assert!((e.to_radians() - 0.02).abs() < 1e-9);

@@ -406,3 +406,99 @@ fn swing(n: usize, long: usize, step_s: f64, omega: f64, phase: f64) -> [f64; 3]
         (p2 - omega * omega * p) * cos - 2.0 * omega * p1 * sin,
     ]
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use analyze::Inputs;
+    use nalgebra::{UnitQuaternion, Vector3};
+    use std::f64::consts::TAU;
+
+    /// What a rule of the sixth order has to be: exact for every power below the seventh, between any samples.
+    #[test]
+    fn leles_rules_are_exact_for_powers_below_the_seventh() {
+        let step_s = 0.5;
+        for power in 0..7 {
+            let at = |k: usize| 0.3 + step_s * k as f64;
+            let n = f64::from(power);
+            let x: Vec<f64> = (0..5).map(|k| at(k).powi(power)).collect();
+            let slope: Vec<f64> = (0..5).map(|k| n * at(k).powi(power - 1)).collect();
+            let bend: Vec<f64> = (0..5)
+                .map(|k| n * (n - 1.0) * at(k).powi(power - 2))
+                .collect();
+            let off = lele_slope(&x, 2, step_s) - lele_mean(&slope, 2);
+            assert!(off.abs() < 1e-9, "{power}: slope off by {off}");
+            let off = lele_bend(&x, 2, step_s) - lele_mean_of_bends(&bend, 2);
+            assert!(off.abs() < 1e-9, "{power}: bend off by {off}");
+        }
+        // A mean is of what it is a mean of.
+        assert!((lele_mean(&[2.0; 5], 2) - 2.0).abs() < 1e-12);
+        assert!((lele_mean_of_bends(&[2.0; 5], 2) - 2.0).abs() < 1e-12);
+    }
+
+    /// Two who carry a body that heaves, rolls and pitches: what its handles do is turned by a rotation, what they push is k δ + c δ̇ of both, in closed
+    /// form. Half of the time nothing is known, as of sensors with holes.
+    #[test]
+    fn sensors_that_do_not_err_give_the_springs_that_are_there() {
+        let (k, c, mass_kg, g) = (3000.0, 400.0, 60.0, 9.81);
+        let handles_m = vec![[1.2, 0.15, -0.25], [-1.1, -0.2, -0.3]];
+        let wave = |a: f64, hz: f64, phase: f64| move |t: f64| a * (TAU * hz * t + phase).sin();
+        let (height, roll, pitch) = (
+            wave(0.02, 2.1, 0.3),
+            wave(0.3, 1.05, 0.0),
+            wave(0.04, 2.1, 1.0),
+        );
+        let heave = [wave(0.025, 2.1, 1.2), wave(0.02, 2.0, 2.9)];
+        let lift = |t: f64, handle: &[f64; 3]| {
+            let turned = UnitQuaternion::from_euler_angles(roll(t), pitch(t), 0.7);
+            height(t) + (turned * Vector3::from(*handle)).z
+        };
+        let rate = |f: &dyn Fn(f64) -> f64, t: f64| (f(t + 1e-5) - f(t - 1e-5)) / 2e-5;
+        let t_s: Vec<f64> = (0..2000).map(|k| 0.01 * f64::from(k)).collect();
+        let support = |t: &f64| {
+            let each = handles_m.iter().zip(&heave).map(|(handle, heave)| {
+                let gap = |t: f64| heave(t) - lift(t, handle);
+                k * gap(*t) + c * rate(&gap, *t)
+            });
+            1.0 + (each.sum::<f64>() - 2.0 * k * 0.275) / (mass_kg * g)
+        };
+        let of = |f: &dyn Fn(f64) -> f64| t_s.iter().map(|t| f(*t)).collect::<Vec<f64>>();
+        let mut height_m = of(&height);
+        height_m[..100].fill(f64::NAN);
+        height_m[1900..].fill(f64::NAN);
+        let field = Field {
+            inputs: Inputs {
+                height_m,
+                roll_rad: of(&roll),
+                pitch_rad: of(&pitch),
+                support_ratio: t_s.iter().map(support).collect(),
+                heave_m: heave.iter().map(|h| of(h)).collect(),
+                mass_kg: Some(mass_kg),
+                gravity_m_per_s2: g,
+                t_s,
+                ..Inputs::default()
+            },
+            handles_m,
+            ..Field::default()
+        };
+        let found = contact_from_sensors(&field, Window::ALL).unwrap();
+        for (e, truth) in found.iter().zip([k, c]) {
+            let e = e.as_ref().unwrap();
+            println!("{e:?}");
+            assert!((e.value / truth - 1.0).abs() < 2e-3, "{e:?}");
+            // What the sensors' scales leave, by which it may be off all the same: 1 % and 0.2 %.
+            let half = 1.96 * 0.01f64.hypot(0.002) * truth;
+            let [low, high] = e.interval;
+            assert!((0.5 * (high - low) / half - 1.0).abs() < 0.05, "{e:?}");
+        }
+        let alone = Field {
+            handles_m: vec![[0.0; 3]],
+            ..field
+        };
+        let why = contact_from_sensors(&alone, Window::ALL).unwrap_err();
+        assert!(
+            why.contains("2 carriers wore a sensor") && why.contains("1 handles"),
+            "{why}"
+        );
+    }
+}

@@ -803,3 +803,65 @@ pub(super) fn amplitudes(field: &Field, window: Window) -> Result<Vec<Outcome>, 
     })
     .collect()
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A minute of a beat of 2.15 Hz at 100 Hz, its phase off the line by 0.2 rad for half of the time, to either side in turn: each beat counts once.
+    #[test]
+    fn a_tempo_is_as_sure_as_its_beats() {
+        let (hz, off) = (2.15, 0.2);
+        let t_s: Vec<f64> = (0..6000).map(|k| 7.0 + 0.01 * f64::from(k)).collect();
+        let psi = |off: f64| -> Vec<f64> {
+            let side = |k: usize| if k.is_multiple_of(2) { off } else { -off };
+            let each = t_s.iter().enumerate();
+            each.map(|(k, t)| TAU * hz * t + side(k)).collect()
+        };
+        let loose = Tempo::of(&t_s, &psi(off));
+        // A line through 129 beats over a minute, each 0.2 rad off: σ √12 / (T √n).
+        let sd = off * 12f64.sqrt() / (60.0 * (60.0 * hz).sqrt());
+        assert!(
+            (loose.rate / (TAU * hz) - 1.0).abs() < 1e-6,
+            "{}",
+            loose.rate
+        );
+        assert!(
+            (loose.half / (1.96 * sd) - 1.0).abs() < 0.01,
+            "{}",
+            loose.half
+        );
+        assert!((loose.strays - off).abs() < 1e-3);
+        let e = loose.told().unwrap();
+        assert!((e.value - hz).abs() < 1e-5);
+        assert!(((e.interval[1] - e.interval[0]) / (2.0 * 1.96 * sd / TAU) - 1.0).abs() < 0.01);
+        // Never surer than a clock's ppm; who is half a turn off the line keeps no tempo.
+        let steady = Tempo::of(&t_s, &psi(0.0));
+        assert!((steady.half / (1e-6 * TAU * hz) - 1.0).abs() < 1e-6);
+        let faster: Vec<f64> = t_s
+            .iter()
+            .map(|t| TAU * (2.0 * t + 0.005 * (t - 7.0).powi(2)))
+            .collect();
+        let (name, why) = Tempo::of(&t_s, &faster).told().unwrap_err();
+        // 2 Hz to 2.6 Hz; means over ten beats begin and end a few seconds within.
+        assert!(
+            name == "beat" && why.contains("2.02 to 2.58 Hz over ten beats"),
+            "{why}"
+        );
+    }
+
+    #[test]
+    fn the_longest_stretch_that_was_heard_is_taken() {
+        let t_s: Vec<f64> = (0..100)
+            .map(|k| 0.1 * f64::from(k) + if k < 60 { 0.0 } else { 5.0 })
+            .collect();
+        let heard = |k: usize| (5..25).contains(&k) || k > 40;
+        let beat: Vec<f64> = (0..100)
+            .map(|k| if heard(k) { k as f64 } else { f64::NAN })
+            .collect();
+        // From 41 to 59, to a hole in the record, and from 60 on.
+        let (t, psi) = longest_heard(&t_s, &beat).unwrap();
+        assert_eq!((t[0], psi[0], psi[39]), (t_s[60], 60.0, 99.0));
+        assert_eq!(longest_heard(&t_s, &[f64::NAN; 100]), None);
+    }
+}

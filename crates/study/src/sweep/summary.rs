@@ -355,4 +355,54 @@ mod tests {
         assert_eq!(short(-12.3456), "-12.35");
         assert_eq!(short(1e-12), "1.000e-12");
     }
+
+    /// Means of 3, 1 and 2 at three points, at a fourth too few runs have it.
+    #[test]
+    fn a_range_is_told_with_the_places_of_its_ends() {
+        let mut found = Found {
+            metrics: vec!["a".into(), "turning".into(), "few".into()],
+            ranges: vec![Range::default(); 3],
+            points: 4,
+            runs: 16,
+            failures: 1,
+            reasons: vec![("too steep".into(), 1)],
+            ..Found::default()
+        };
+        let place = |x: f64| [Cell::Real(x), Cell::Text("bristle".into())];
+        let spread = |values: &[f64], turn| Spread::of_turning(values, turn).unwrap();
+        for (at, values) in [
+            (10.0, &[2.0, 3.0, 4.0][..]),
+            (20.0, &[1.0, 1.0]),
+            (30.0, &[2.0, 2.0, 2.0, 2.0]),
+            (40.0, &[99.0]),
+        ] {
+            found.ranges[0].take(&spread(values, None), 4, None, &place(at));
+        }
+        for (at, x) in [(10.0, 170.0), (20.0, -176.0), (30.0, 174.0)] {
+            let turn = Some(360.0);
+            found.ranges[1].take(&spread(&[x; 4], turn), 4, turn, &place(at));
+        }
+        found.ranges[2].take(&spread(&[1.0], None), 4, None, &place(10.0));
+        let text = found.table();
+        let cells = |name: &str| -> Vec<&str> {
+            let line = text.lines().find(|l| l.starts_with(name)).unwrap();
+            line.split_whitespace().collect()
+        };
+        assert!(
+            text.starts_with("4 points, 16 runs, 1 without a result"),
+            "{text}"
+        );
+        let ends = "1.000 2.000 3.000 (20.00, bristle), (10.00, bristle) in 10 of 16 runs";
+        assert_eq!(cells("a ")[1..].join(" "), ends);
+        // −176° is 184°.
+        let ends = "170.0 176.0 184.0 (10.00, bristle), (20.00, bristle) in 12 of 16 runs";
+        assert_eq!(cells("turning")[1..].join(" "), ends);
+        assert_eq!(
+            cells("few")[1..].join(" "),
+            "– in 1 of 16 runs, at no point in half of them"
+        );
+        assert!(text.ends_with("failed 1 time: too steep\n"), "{text}");
+        let near = spread(&[-3.0, -2.0, -1.0], None).near(359.0, 360.0);
+        assert_eq!((near.mean, near.quantiles[1]), (358.0, 358.0));
+    }
 }
