@@ -487,6 +487,35 @@ fn a_full_disk_is_said_in_one_sentence() {
     assert_eq!(said.trim().lines().count(), 1, "{said}");
 }
 
+/// A file that may not grow beyond 100 KiB stands for a disk that fills up in the middle: the first cause is told, not what it leads to.
+#[cfg(target_os = "linux")]
+#[test]
+fn a_disk_that_fills_up_in_the_middle_is_said() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let recorded = Command::new(bin("sim"))
+        .args(["record", "music", "--out", "m.mcap"])
+        .current_dir(folder.path())
+        .output()
+        .expect("starts");
+    assert!(recorded.status.success());
+    for command in ["record music", "replay m.mcap"] {
+        let limited = format!(
+            "trap '' XFSZ; ulimit -f 200; exec {} {command} --out r.mcap",
+            bin("sim").display()
+        );
+        let output = Command::new("sh")
+            .args(["-c", &limited])
+            .current_dir(folder.path())
+            .output()
+            .expect("starts");
+        let said = String::from_utf8_lossy(&output.stderr);
+        assert_eq!(output.status.code(), Some(1), "{command}: {said}");
+        assert!(said.contains("File too large"), "{command}: {said}");
+        assert_eq!(said.trim().lines().count(), 1, "{command}: {said}");
+        assert_eq!(files(folder.path()), ["m.mcap"], "{command}");
+    }
+}
+
 /// `sim record --out - | head -c 10`, of a run that is longer than any pipe; `analyze ingest` alike.
 #[test]
 fn a_reader_that_leaves_is_no_error() {

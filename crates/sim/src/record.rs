@@ -142,6 +142,11 @@ impl<'m> Recorder<'m> {
         &mut self.writer
     }
 
+    /// Why it took no more samples, where it did not: to be asked before the writer is given anything else.
+    pub fn failure(&mut self) -> Option<WriteError> {
+        self.failed.take()
+    }
+
     /// Completes the recording and gives it its name.
     ///
     /// # Errors

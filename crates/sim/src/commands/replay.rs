@@ -165,11 +165,11 @@ pub fn run(args: &Args) -> Result<Input> {
         &settings(&replay.scene),
         &mut both,
     );
-    if let Some(error) = both.failed {
+    // The first that failed knows the cause.
+    if let Some(error) = both.recorder.failure().or(both.failed) {
         return Err(error.into());
     }
     match outcome {
-        // The recorder stopped it: `finish` says why.
         Ok(()) | Err(Stopped::ByObserver { .. }) => {}
         Err(error) => {
             return Err(error).with_context(|| {

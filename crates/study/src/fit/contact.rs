@@ -29,6 +29,9 @@ const SAMPLED: f64 = 3.0 / 63.0;
 /// Periods of the roll in a window of the pendulum's fit, and windows that begin within the length of one.
 const PERIODS: f64 = 4.0;
 const SHIFTS: usize = 8;
+/// By how much a and b scatter from run to run of `music` (SD, as a part of themselves) beside what one run shows: the carriers' own frequencies, and what a
+/// pendulum with one damping leaves out, come back with every turn. Thirty seeds scatter by 3.0e-5 and 0.0021, and one shows 1.9e-5 and 0.0021.
+const OF_ITSELF: [f64; 2] = [5e-4, 0.0];
 /// Length of a segment in which lines are looked for, s.
 const LINE_S: f64 = 10.0;
 
@@ -385,7 +388,7 @@ pub(super) fn pendulum(field: &Field, window: Window) -> Result<Vec<Outcome>, St
     let coarse = solve(&blocks(2), |k| k).unwrap_or(value);
     let interval = std::array::from_fn(|p| {
         let half = half[p] + SAMPLED * (coarse[p] - value[p]).abs();
-        [value[p] - half, value[p] + half]
+        budgeted(value[p], [value[p] - half, value[p] + half], OF_ITSELF[p])
     });
     let names = [("pendulum", "1/(kg·m)"), ("roll damping", "1/s")];
     Ok(pair(names, [value[0], value[1]], interval))
@@ -416,24 +419,18 @@ mod tests {
 
     /// What a rule of the sixth order has to be: exact for every power below the seventh, between any samples.
     #[test]
-    fn leles_rules_are_exact_for_powers_below_the_seventh() {
+    fn leles_rule_is_exact_for_powers_below_the_seventh() {
         let step_s = 0.5;
         for power in 0..7 {
             let at = |k: usize| 0.3 + step_s * k as f64;
             let n = f64::from(power);
             let x: Vec<f64> = (0..5).map(|k| at(k).powi(power)).collect();
             let slope: Vec<f64> = (0..5).map(|k| n * at(k).powi(power - 1)).collect();
-            let bend: Vec<f64> = (0..5)
-                .map(|k| n * (n - 1.0) * at(k).powi(power - 2))
-                .collect();
             let off = lele_slope(&x, 2, step_s) - lele_mean(&slope, 2);
             assert!(off.abs() < 1e-9, "{power}: slope off by {off}");
-            let off = lele_bend(&x, 2, step_s) - lele_mean_of_bends(&bend, 2);
-            assert!(off.abs() < 1e-9, "{power}: bend off by {off}");
         }
         // A mean is of what it is a mean of.
         assert!((lele_mean(&[2.0; 5], 2) - 2.0).abs() < 1e-12);
-        assert!((lele_mean_of_bends(&[2.0; 5], 2) - 2.0).abs() < 1e-12);
     }
 
     /// Two who carry a body that heaves, rolls and pitches: what its handles do is turned by a rotation, what they push is k δ + c δ̇ of both, in closed

@@ -79,10 +79,7 @@ pub type Outcome = Result<Estimate, (String, String)>;
 
 /// Bootstrap samples behind an interval.
 const DRAWS: u64 = 500;
-/// Length of a block, s: two periods of the roll and a little. What a pendulum with one damping misses of friction and straps comes back with every
-/// turn, and the little left over makes it count as chance: in `music` b has an interval 2.3 times as wide as its scatter over seeds, a 1.6 times. Blocks of
-/// whole turns would give 1.3 and 0.6. That a scatters at all is the carriers' own frequencies (without their spread a ninth of it is left),
-/// which no single run shows; the little stands for it.
+/// Length of a block, s: two periods of the roll and a little.
 const BLOCK_S: f64 = 2.0;
 /// A handle carries where its share of the load is above this part of the mean share.
 const CARRIES: f64 = 1.0 / 7.0;
