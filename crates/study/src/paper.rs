@@ -247,12 +247,13 @@ pub fn to_json(conditions: &[Condition], wall_s: f64) -> Value {
     for condition in conditions {
         let metrics: serde_json::Map<String, Value> = ROWS
             .iter()
-            .filter_map(|row| {
-                let s = condition.summary(row.name)?;
-                Some((
-                    row.name.to_owned(),
-                    json!({"mean": s.mean, "sd": s.ci95.map(|_| s.sd), "ci95": s.ci95, "runs": s.runs}),
-                ))
+            .map(|row| {
+                let of = match condition.summary(row.name) {
+                    Some(s) => json!({"mean": s.mean, "sd": s.ci95.map(|_| s.sd), "ci95": s.ci95, "runs": s.runs}),
+                    // An onset that no run has is there, and null.
+                    None => json!({"mean": null, "sd": null, "ci95": null, "runs": 0}),
+                };
+                (row.name.to_owned(), of)
             })
             .collect();
         by_name.insert(

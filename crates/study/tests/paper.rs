@@ -89,6 +89,8 @@ fn programs_get_the_same_numbers() {
         json["conditions"]["music"]["metrics"]["onset_time_s"]["runs"],
         2
     );
+    let none = &json["conditions"]["baseline"]["metrics"]["onset_time_s"];
+    assert!(none["mean"].is_null() && none["runs"] == 0, "{none}");
     assert_eq!(json["conditions"]["music"]["unstable"], 2);
     assert_eq!(json["conditions"]["baseline"]["unstable"], 0);
     assert_eq!(json["paper"]["music"]["rms_roll_deg"]["mean"], 18.387);

@@ -36,6 +36,7 @@ const ERRORS: &[(&str, &str)] = &[
     ("detuning_rad_per_s", "detuning_rad_per_s_error"),
     ("pull_rad_per_s", "pull_rad_per_s_error"),
     ("captured", "captured_error"),
+    ("roll_lock", "roll_lock_error"),
     ("onset_time_s", "onset_time_s_error"),
     ("unstable", "unstable_error"),
     ("roll_excess_s", "roll_excess_s_error"),
