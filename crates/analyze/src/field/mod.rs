@@ -259,7 +259,9 @@ impl Field {
             }
             // The one sensor of a walker's phone plays the rath's role for want of another: steps tell.
             if !is_rath || (roles.patterns(Role::Carriers).is_empty() && !about_the_load(topic)) {
-                field.carriers.add(topic, &track, options, clock_sd_s);
+                field
+                    .carriers
+                    .add(topic, &track, options, gravity_m_per_s2, clock_sd_s);
             }
         }
         if let Some(topic) = roles.topic(Role::Beats) {
