@@ -329,6 +329,14 @@ impl Field {
                         ),
                     ));
                 }
+                if let Some(lean_deg) = motion.misdeclared_deg() {
+                    self.quality.push(Quality::remark(
+                        topic,
+                        "mounting",
+                        format!("as it is declared to be mounted, the load leans by {lean_deg:.0}° on average: it lies on its side or its back, or the sensor sits otherwise; what rests on its motion has no interval"),
+                    ));
+                    self.lost.push(Lost::Mounting);
+                }
                 self.motion = Some(motion);
             }
             Err(error) => self.no_motion = Some(error.to_string()),
