@@ -59,6 +59,14 @@ pub enum StepError {
         /// Rate found, Hz.
         found_hz: f64,
     },
+    /// Without gravity nothing tells what is vertical, and the norm folds.
+    #[error(
+        "the mean specific force is {found_m_per_s2:.2} m/s², not gravity: steps need accelerations with gravity, in m/s² (an app's \"linear acceleration\" has lost it)"
+    )]
+    NoGravity {
+        /// Norm of the mean over two seconds, as a rule, m/s².
+        found_m_per_s2: f64,
+    },
     /// Nothing periodic.
     #[error("no walking: {reason}")]
     NoWalking {

@@ -232,4 +232,17 @@ fn raw_phone_files_become_the_papers_metrics() {
             .unwrap()
             < 0.6
     );
+    // Said to be mounted upside down, it shows a load on its back.
+    let declared = "imu_mounting_roll_pitch_yaw_deg = [0.0,";
+    assert!(roles.contains(declared));
+    let upside_down = roles.replace(declared, "imu_mounting_roll_pitch_yaw_deg = [180.0,");
+    let request = Request {
+        roles: Some(toml::from_str(&upside_down).unwrap()),
+        ..Request::default()
+    };
+    let turned = examine("walk.mcap", &recording, &request).unwrap();
+    let said = |found: &Analysis| found.quality.iter().any(|q| q.kind == "mounting");
+    assert!(said(&turned) && !said(&found));
+    assert!(found.metrics.get("rms_roll_deg").unwrap().ci95.is_some());
+    assert!(turned.metrics.get("rms_roll_deg").unwrap().ci95.is_none());
 }

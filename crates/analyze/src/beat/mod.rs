@@ -54,8 +54,8 @@ pub struct Beats {
 
 /// Beats from sound.
 ///
-/// `sound` is one channel at `rate_hz`, of any scale; samples that are not finite count as silence. Range: 50 to 200 beats
-/// per minute. Where two metrical levels fit equally well, the one nearer to 110 per minute is taken.
+/// `sound` is one channel at `rate_hz`, of any scale; what begins in samples that are not finite is not known, and no beat is
+/// heard there. Range: 50 to 200 beats per minute. Where two metrical levels fit equally well, the one nearer to 110 per minute is taken.
 ///
 /// # Errors
 /// When the sound is too short, too slowly sampled, or holds nothing periodic.

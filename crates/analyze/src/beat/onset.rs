@@ -36,6 +36,8 @@ pub struct Onsets {
     pub strength: Vec<f64>,
     /// Accent: how much low sound begins; 0 and up, mean of its peaks about 1.
     pub accent: Vec<f64>,
+    /// Whether the sound is known where a frame tells what begins.
+    pub known: Vec<bool>,
 }
 
 impl Onsets {
@@ -49,20 +51,23 @@ impl Onsets {
         let (mut input, mut output) = (plan.make_input_vec(), plan.make_output_vec());
         let frames = (sound.len() as f64 / rate_hz * FRAME_HZ) as usize;
         let mut energy = vec![0.0; frames * bands];
+        let mut heard = vec![true; frames];
         for frame in 0..frames {
             let first = (frame as f64 / FRAME_HZ * rate_hz) as usize;
             for (k, (x, w)) in input.iter_mut().zip(&taper).enumerate() {
                 let s = sound.get(first + k).map_or(0.0, |s| f64::from(*s));
+                heard[frame] &= s.is_finite();
                 *x = if s.is_finite() { s * w } else { 0.0 };
             }
             // OK because both buffers were made by the plan.
             plan.process(&mut input, &mut output)
                 .expect("buffers of the plan's own length");
             for b in 0..bands {
-                energy[frame * bands + b] = output[edges[b]..edges[b + 1]]
-                    .iter()
-                    .map(Complex64::norm_sqr)
-                    .sum();
+                let band = output[edges[b]..edges[b + 1]].iter();
+                energy[frame * bands + b] = match heard[frame] {
+                    true => band.map(Complex64::norm_sqr).sum(),
+                    false => f64::NAN,
+                };
             }
         }
         let low = (0..bands)
@@ -79,6 +84,9 @@ impl Onsets {
             start_s: 0.5 * window as f64 / rate_hz + LAG_S,
             strength,
             accent,
+            known: (0..frames)
+                .map(|f| heard[f] && heard[f.saturating_sub(2)])
+                .collect(),
         }
     }
 
@@ -86,7 +94,10 @@ impl Onsets {
     pub fn times_s(&self) -> Vec<f64> {
         let frames = self.strength.windows(3).enumerate();
         frames
-            .filter(|(_, w)| w[1] > 1.0 && w[1] >= w[0] && w[1] > w[2])
+            .filter(|(k, w)| {
+                let known = self.known[*k..k + 3].iter().all(|k| *k);
+                known && w[1] > 1.0 && w[1] >= w[0] && w[1] > w[2]
+            })
             .map(|(k, _)| self.time_s((k + 1) as f64))
             .collect()
     }
@@ -119,7 +130,8 @@ fn flux(energy: &[f64], bands: usize, count: usize, logarithmic: bool) -> Vec<f6
     for b in 0..count {
         let mut level: Vec<f64> = (0..frames).map(|f| energy[f * bands + b]).collect();
         if logarithmic {
-            let Some(median) = median(&mut level.clone()) else {
+            let known = level.iter().copied().filter(|e| e.is_finite());
+            let Some(median) = median(&mut known.collect::<Vec<f64>>()) else {
                 continue;
             };
             let peak = level.iter().copied().fold(0.0, f64::max);
@@ -133,6 +145,7 @@ fn flux(energy: &[f64], bands: usize, count: usize, logarithmic: bool) -> Vec<f6
             level.iter_mut().for_each(|e| *e = e.sqrt());
         }
         for f in 2..frames {
+            // 0 where one of them is not known.
             out[f] += (level[f] - level[f - 2]).max(0.0);
         }
     }

@@ -11,6 +11,7 @@
 
 use super::onset::{FRAME_HZ, Onsets};
 use super::tempo::{PERIOD_S, tempogram};
+use std::ops::Range;
 
 /// λ: a period 10 % off costs 0.9 standard deviations of onset strength.
 const TIGHTNESS: f64 = 100.0;
@@ -57,7 +58,9 @@ pub fn beats(onsets: &Onsets) -> Option<Vec<f64>> {
             (score, chain)
         })
         .max_by(|a, b| a.0.total_cmp(&b.0))?;
-    let beats: Vec<f64> = best.1.iter().map(|&f| refined(onsets, f)).collect();
+    let heard = |f: &&usize| onsets.known[near(onsets, **f)].iter().all(|k| *k);
+    let beats = best.1.iter().filter(heard);
+    let beats: Vec<f64> = beats.map(|&f| refined(onsets, f)).collect();
     (beats.len() >= 3).then_some(beats)
 }
 
@@ -173,14 +176,15 @@ fn strokes(accent: &[f64]) -> Vec<(usize, f64)> {
         .collect()
 }
 
+/// The frames within 40 ms of one.
+fn near(onsets: &Onsets, frame: usize) -> Range<usize> {
+    frame.saturating_sub(4)..(frame + 5).min(onsets.strength.len())
+}
+
 /// The beat's time: the centre of the onset strength within 40 ms of the frame.
 fn refined(onsets: &Onsets, frame: usize) -> f64 {
-    let (a, b) = (
-        frame.saturating_sub(4),
-        (frame + 5).min(onsets.strength.len()),
-    );
     let (mut weight, mut moment) = (1e-3, 1e-3 * frame as f64);
-    for f in a..b {
+    for f in near(onsets, frame) {
         weight += onsets.strength[f];
         moment += onsets.strength[f] * f as f64;
     }

@@ -9,6 +9,7 @@ use crate::imu::rath::{ENDS, Motion};
 use crate::imu::track::{BRIDGED_S, period_s};
 use crate::imu::vertical::height;
 use crate::inputs::{Window, interpolate, mean_step_s, stretches};
+use crate::median::median;
 use crate::metrics::{Datum, Metrics};
 use crate::phase::hilbert;
 use crate::quality::Quality;
@@ -26,6 +27,9 @@ const MATCH: f64 = 0.8;
 const BETTER: f64 = 0.5;
 /// How far the clocks of two are looked for either way, s, or so much of what they share.
 const REACH_S: (f64, f64) = (5.0, 1.0 / 6.0);
+/// Over so long nobody who walks gains or loses much speed, s, and of gravity at least this share is felt.
+const FELT_OVER_S: f64 = 2.0;
+const LEAST_GRAVITY: f64 = 0.5;
 /// A synchrony that such offsets change by more than this is not known.
 const VAGUE: f64 = 0.1;
 
@@ -79,8 +83,16 @@ pub fn of_all(name: &str) -> bool {
 }
 
 impl Carriers {
-    /// Takes one sensor, and the standard error of its clock where taps have set that (s).
-    pub fn add(&mut self, topic: &str, track: &Track, options: Options, clock_sd_s: f64) {
+    /// Takes one sensor, and the standard error of its clock where taps have set that (s). Where gravity was taken out of its accelerations there are no
+    /// steps.
+    pub fn add(
+        &mut self,
+        topic: &str,
+        track: &Track,
+        options: Options,
+        gravity_m_per_s2: f64,
+        clock_sd_s: f64,
+    ) {
         let turns = track.gyro_rad_per_s.iter().any(|w| *w != [0.0; 3]);
         let heave: Vec<f64> = if turns {
             let up = |(q, a): (&UnitQuaternion<f64>, &[f64; 3])| (q * Vector3::from(*a)).z;
@@ -97,7 +109,11 @@ impl Carriers {
                 .map(|a| Vector3::from(*a).norm())
                 .collect()
         };
-        let steps = steps_in(&track.t_s, &heave);
+        let found_m_per_s2 = mean_force(track);
+        let steps = match found_m_per_s2 < LEAST_GRAVITY * gravity_m_per_s2 {
+            true => Err(StepError::NoGravity { found_m_per_s2 }),
+            false => steps_in(&track.t_s, &heave),
+        };
         self.worn.push(Worn {
             topic: topic.to_owned(),
             heave,
@@ -377,6 +393,19 @@ impl Carriers {
     }
 }
 
+/// Norm of the mean specific force over [`FELT_OVER_S`], as a rule, m/s²: of gravity, however the sensor is turned from time to time.
+fn mean_force(track: &Track) -> f64 {
+    let part = |t: f64| (t / FELT_OVER_S).floor();
+    let (mut rest, mut norms) = (&track.accel_m_per_s2[..], Vec::new());
+    for times in track.t_s.chunk_by(|a, b| part(*a) == part(*b)) {
+        let (here, behind) = rest.split_at(times.len());
+        let sum: Vector3<f64> = here.iter().map(|a| Vector3::from(*a)).sum();
+        norms.push((sum / times.len() as f64).norm());
+        rest = behind;
+    }
+    median(&mut norms).unwrap_or_default()
+}
+
 /// Offsets of two clocks, and others that go with the load's motion as well (s).
 type Offsets = ([f64; 2], Vec<[f64; 2]>);
 
@@ -469,7 +498,7 @@ mod tests {
                     t_s,
                     dropped: 0,
                 };
-                carriers.add(&format!("/imu/{k}"), &track, Options::default(), 0.0);
+                carriers.add(&format!("/imu/{k}"), &track, Options::default(), 9.81, 0.0);
             }
             let said = carriers.align(None, false);
             assert!(
@@ -516,7 +545,7 @@ mod tests {
         for (k, late_s) in [0.0, 0.1].into_iter().enumerate() {
             let options = Options::without_latency();
             let sd_s = if k == 1 { clock_sd_s } else { 0.0 };
-            carriers.add(&format!("/imu/{k}"), &walker(late_s), options, sd_s);
+            carriers.add(&format!("/imu/{k}"), &walker(late_s), options, 9.81, sd_s);
         }
         carriers
     }
@@ -568,7 +597,7 @@ mod tests {
         // Who does not tell what is up tells no heave, nor does anybody then.
         let mut without = walker(0.0);
         without.gyro_rad_per_s.fill([0.0; 3]);
-        carriers.add("/imu/2", &without, Options::without_latency(), 0.0);
+        carriers.add("/imu/2", &without, Options::without_latency(), 9.81, 0.0);
         assert!(carriers.heave_m(&at_s, 0.2).is_empty() && carriers.step_s().len() == 3);
     }
 
@@ -639,5 +668,42 @@ mod tests {
                 && !of_all("pull_rad_per_s")
                 && !of_all("t_float")
         );
+    }
+
+    /// Steps of a walker whose sensor turns every way count; with gravity taken out, as phones do, there are none, and that is said.
+    #[test]
+    fn without_gravity_there_are_no_steps() {
+        for (gravity, turns) in [(9.81, true), (9.81, false), (0.0, true), (0.0, false)] {
+            let t_s: Vec<f64> = (0..4000).map(|k| 0.01 * f64::from(k)).collect();
+            let up = |t: &f64| gravity + 6.0 * (TAU * 2.0 * t).cos();
+            // Worn upright, put away upside down.
+            let accel = t_s
+                .iter()
+                .map(|t| [0.0, 0.0, if *t < 20.0 { up(t) } else { -up(t) }]);
+            let rate = |t: &f64| match (turns, (19.9..20.1).contains(t)) {
+                (true, true) => 5.0 * std::f64::consts::PI,
+                _ => 0.0,
+            };
+            let track = Track {
+                accel_m_per_s2: accel.collect(),
+                gyro_rad_per_s: t_s.iter().map(|t| [rate(t), 0.0, 0.0]).collect(),
+                t_s,
+                dropped: 0,
+            };
+            let mut carriers = Carriers::default();
+            carriers.add("/imu/carrier_1", &track, Options::default(), 9.81, 0.0);
+            let steps = carriers.step_s();
+            let said = carriers.quality();
+            if gravity > 0.0 {
+                assert!(steps[0].len() > 70 && said.is_empty(), "{said:?}");
+            } else {
+                assert!(steps.is_empty() && carriers.phases().is_none());
+                let said = &said[0];
+                assert!(
+                    said.kind == "no_steps" && said.text.contains("not gravity"),
+                    "{said:?}"
+                );
+            }
+        }
     }
 }

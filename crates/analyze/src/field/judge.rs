@@ -661,7 +661,7 @@ mod tests {
             dropped: 0,
         };
         let mut carriers = Carriers::default();
-        carriers.add("/imu/1", &track, Options::default(), 0.0);
+        carriers.add("/imu/1", &track, Options::default(), 9.81, 0.0);
         let judge = Judge {
             truth: Truth::default(),
             height: None,

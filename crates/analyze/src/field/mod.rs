@@ -259,7 +259,9 @@ impl Field {
             }
             // The one sensor of a walker's phone plays the rath's role for want of another: steps tell.
             if !is_rath || (roles.patterns(Role::Carriers).is_empty() && !about_the_load(topic)) {
-                field.carriers.add(topic, &track, options, clock_sd_s);
+                field
+                    .carriers
+                    .add(topic, &track, options, gravity_m_per_s2, clock_sd_s);
             }
         }
         if let Some(topic) = roles.topic(Role::Beats) {
@@ -326,6 +328,14 @@ impl Field {
                             rath::BESIDE_HOLES / settings.height_corner_hz
                         ),
                     ));
+                }
+                if let Some(lean_deg) = motion.misdeclared_deg() {
+                    self.quality.push(Quality::remark(
+                        topic,
+                        "mounting",
+                        format!("as it is declared to be mounted, the load leans by {lean_deg:.0}° on average: it lies on its side or its back, or the sensor sits otherwise; what rests on its motion has no interval"),
+                    ));
+                    self.lost.push(Lost::Mounting);
                 }
                 self.motion = Some(motion);
             }

@@ -203,6 +203,8 @@ pub enum Lost {
     All(Instrument),
     /// About which axes it turned.
     Axes,
+    /// How it sits on the body.
+    Mounting,
 }
 
 /// Takes the intervals from numbers that rest on what was lost, which is in no budget. An accelerometer's missing peaks hardly turn the attitude.
@@ -213,6 +215,10 @@ pub fn without(metrics: &mut Metrics, lost: Lost) {
         Lost::Axes => (
             Instrument::Gyroscope,
             "does not stand on the accelerometer's axes",
+        ),
+        Lost::Mounting => (
+            Instrument::Accelerometer,
+            "shows gravity elsewhere than below the load as the sensor is said to be mounted",
         ),
     };
     let attitude = lost != Lost::Peaks(Instrument::Accelerometer);

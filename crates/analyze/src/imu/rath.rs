@@ -140,6 +140,22 @@ impl Motion {
     }
 }
 
+/// A load that is carried leans by less than this on average, rad.
+const CARRIED_RAD: f64 = std::f64::consts::FRAC_PI_4;
+/// Its mean upward direction is at least so long, 1: what tumbles has none.
+const ONE_WAY: f64 = 0.5;
+
+impl Motion {
+    /// How far the load leans on average, degrees, where a declared mounting makes it lean as nobody carries it.
+    pub fn misdeclared_deg(&self) -> Option<f64> {
+        let known = matches!(self.settings.mounting, Mounting::Known(_));
+        let within = self.settings.level_over.range(&self.inputs.t_s);
+        let up = mean_up(&self.orientation.earth_from_sensor, within);
+        let lean = up.angle(&Vector3::z());
+        (known && up.norm() > ONE_WAY && lean > CARRIED_RAD).then(|| lean.to_degrees())
+    }
+}
+
 /// Shorter stretches tell neither orientation nor height, s.
 const SHORTEST_S: f64 = 5.0;
 
@@ -373,17 +389,22 @@ fn mean_specific_force(track: &Track, estimate: &Estimate) -> f64 {
     sum.norm() / track.len() as f64
 }
 
+/// Mean of what is up over some of the orientations, or all where that is none, in the turned axes.
+fn mean_up(earth_from: &[UnitQuaternion<f64>], over: Range<usize>) -> Vector3<f64> {
+    let some = match over.is_empty() {
+        true => earth_from,
+        false => &earth_from[over],
+    };
+    let up = some.iter().map(|q| q.inverse() * Vector3::z());
+    up.sum::<Vector3<f64>>() / some.len().max(1) as f64
+}
+
 /// Body from sensor: z is the mean upward direction as the sensor sees it over some samples (all where these are none), x what is level of the
 /// sensor's own x. The shortest turn where that x stands nearly upright: it says little of forward then.
 fn level(estimate: &Estimate, over: Range<usize>) -> UnitQuaternion<f64> {
     /// Least level part of the sensor's x, 1: about 17° from upright.
     const LEVEL: f64 = 0.3;
-    let mut up = Vector3::zeros();
-    let all = &estimate.earth_from_sensor[..];
-    let some = if over.is_empty() { all } else { &all[over] };
-    for q in some {
-        up += q.inverse() * Vector3::z();
-    }
+    let up = mean_up(&estimate.earth_from_sensor, over);
     let Some(up) = up.try_normalize(0.0) else {
         return UnitQuaternion::identity();
     };
@@ -522,6 +543,30 @@ mod tests {
                     "{roll_deg} {pitch_deg}: {roll} {pitch} {truth}"
                 );
             }
+        }
+    }
+
+    /// A sensor that sits otherwise than declared is found out, one as declared is not, nor what nobody declared.
+    #[test]
+    fn a_load_on_its_side_or_back_is_another_mounting() {
+        let declared = UnitQuaternion::from_euler_angles(0.3, -0.2, 0.5);
+        for (turned_deg, found) in [(0.0, false), (30.0, false), (90.0, true), (180.0, true)] {
+            let turn = UnitQuaternion::from_euler_angles(f64::to_radians(turned_deg), 0.0, 0.0);
+            let (track, ..) = twin([0.0; 3], turn * declared);
+            let lean_deg = |mounting| {
+                let settings = Settings {
+                    mounting,
+                    ..Settings::default()
+                };
+                motion(&track, &settings).unwrap().misdeclared_deg()
+            };
+            let seen = lean_deg(Mounting::Known(declared));
+            assert_eq!(seen.is_some(), found, "{turned_deg}: {seen:?}");
+            assert!(
+                seen.is_none_or(|seen| (seen - turned_deg).abs() < 3.0),
+                "{seen:?}"
+            );
+            assert_eq!(lean_deg(Mounting::Levelled), None);
         }
     }
 
