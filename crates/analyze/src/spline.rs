@@ -8,10 +8,7 @@ use crate::median::median;
 /// some are lost. The motion tells which: of the times as written and the same on an even axis the ones that make it smoother, Σ (ΔM)²/Δt of
 /// [`spline_derivatives`], are right.
 pub fn derivatives(t_s: &[f64], x: &[f64]) -> Option<(Vec<f64>, Vec<f64>)> {
-    let as_written = || spline_derivatives(t_s, x);
-    let Some(even) = on_even_axis(t_s) else {
-        return as_written();
-    };
+    let even = on_even_axis(t_s)?;
     let found = spline_derivatives(&even, x)?;
     let step_s = even[even.len() - 1] / (even.len() - 1) as f64;
     let off_s = t_s.iter().zip(&even).map(|(t, e)| (t - t_s[0] - e).abs());
@@ -23,25 +20,24 @@ pub fn derivatives(t_s: &[f64], x: &[f64]) -> Option<(Vec<f64>, Vec<f64>)> {
         bend.map(|(m, t)| (m[1] - m[0]).powi(2) / (t[1] - t[0]))
             .sum()
     };
-    let other = as_written()?;
+    let other = spline_derivatives(t_s, x)?;
+    // Two samples at one time leave no number.
     Some(match rough(t_s, &other.1) < rough(&even, &found.1) {
         true => other,
         false => found,
     })
 }
 
-/// Times from the first on an even axis, each step the nearest whole number of usual ones; `None` where two fall on one place.
+/// Times from the first on an even axis, each step the nearest whole number of usual ones; where two fall on one place, by their count. `None` below two.
 fn on_even_axis(t_s: &[f64]) -> Option<Vec<f64>> {
     let mut steps: Vec<f64> = t_s.windows(2).map(|w| w[1] - w[0]).collect();
     let usual_s = median(&mut steps)?;
+    let places = t_s.windows(2).map(|w| ((w[1] - w[0]) / usual_s).round());
+    let apart = places.clone().all(|step| step >= 1.0);
     let mut place = 0.0;
     let mut out = vec![0.0];
-    for w in t_s.windows(2) {
-        let step = ((w[1] - w[0]) / usual_s).round();
-        if !(step >= 1.0) {
-            return None;
-        }
-        place += step;
+    for step in places {
+        place += if apart { step } else { 1.0 };
         out.push(place);
     }
     let step_s = (t_s[t_s.len() - 1] - t_s[0]) / place;
@@ -167,7 +163,14 @@ mod tests {
             .iter()
             .map(|t| (t + 0.0008 * random.uniform()) * 1.00003)
             .collect();
+        let even: Vec<f64> = (0..1500).map(|k| f64::from(k) / 100.0).collect();
+        let mut packed = even.clone();
+        for k in (10..1490).step_by(30) {
+            // Two came at once, some even by the same tick.
+            packed[k] = packed[k + 1] - f64::from(k as u8 % 2) * 1e-6;
+        }
         for (taken, written, what) in [
+            (&even, &packed, "packed"),
             (&taken, &taken, "lost"),
             (&uneven, &uneven, "uneven"),
             (&taken, &dated, "dated"),
