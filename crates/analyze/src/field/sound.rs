@@ -243,19 +243,15 @@ mod tests {
 
     const BLOCK: usize = 2205;
 
-    /// Blocks of a tenth of a second, in an order and as late as said, out of a file.
-    fn heard(sound: &[f32], order: &[usize], late_s: impl Fn(usize) -> f64) -> Heard {
+    /// What is heard of messages out of a file.
+    fn out_of_a_file(messages: impl Iterator<Item = (i64, RawAudio)>) -> Heard {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("sound.mcap");
         let mut writer = RecordingWriter::create(&path, &WriterOptions::default()).unwrap();
         let channel = writer
             .channel("/audio/drum", MessageKind::RawAudio)
             .unwrap();
-        for &k in order {
-            let block = sound[k * BLOCK..].iter().take(BLOCK);
-            let data = block.flat_map(|s| ((8000.0 * s) as i16).to_le_bytes());
-            let t_ns = 1_000_000_000 + (1e9 * (0.1 * k as f64 + late_s(k))) as i64;
-            let message = RawAudio::pcm_s16(t_ns, data.collect(), 22_050, 1);
+        for (t_ns, message) in messages {
             writer.message(channel, t_ns, &message).unwrap();
         }
         writer.finish().unwrap();
@@ -263,18 +259,23 @@ mod tests {
         listen(&recording).unwrap().unwrap()
     }
 
+    /// Blocks of a tenth of a second, in an order and as late as said.
+    fn heard(sound: &[f32], order: &[usize], late_s: impl Fn(usize) -> f64) -> Heard {
+        out_of_a_file(order.iter().map(|&k| {
+            let block = sound[k * BLOCK..].iter().take(BLOCK);
+            let data = block.flat_map(|s| ((8000.0 * s) as i16).to_le_bytes());
+            let t_ns = 1_000_000_000 + (1e9 * (0.1 * k as f64 + late_s(k))) as i64;
+            (t_ns, RawAudio::pcm_s16(t_ns, data.collect(), 22_050, 1))
+        }))
+    }
+
     /// Twice as fast, on two channels of other loudness: the same sound, and what is no such sound is counted.
     #[test]
     fn channels_are_averaged_and_fast_sound_is_thinned() {
         let (sound, _) = drums(&Drums::default());
         let plain = heard(&sound, &(0..400).collect::<Vec<_>>(), |_| 0.0);
-        let folder = tempfile::tempdir().unwrap();
-        let path = folder.path().join("sound.mcap");
-        let mut writer = RecordingWriter::create(&path, &WriterOptions::default()).unwrap();
-        let channel = writer
-            .channel("/audio/drum", MessageKind::RawAudio)
-            .unwrap();
-        for (k, block) in sound.chunks_exact(BLOCK).take(400).enumerate() {
+        let blocks = sound.chunks_exact(BLOCK).take(400).enumerate();
+        let found = out_of_a_file(blocks.flat_map(|(k, block)| {
             let frame = |s: &f32| [1.5f32, 0.5].map(|gain| (8000.0 * gain * s) as i16);
             let data = block.iter().flat_map(|s| [frame(s), frame(s)].concat());
             let data: Vec<u8> = data.flat_map(i16::to_le_bytes).collect();
@@ -288,15 +289,10 @@ mod tests {
                 format: "opus".into(),
                 ..fast.clone()
             };
-            writer.message(channel, t_ns, &fast).unwrap();
-            if k == 100 {
-                writer.message(channel, t_ns, &slow).unwrap();
-                writer.message(channel, t_ns, &packed).unwrap();
-            }
-        }
-        writer.finish().unwrap();
-        let recording = Recording::open(&path, &ReadOptions::default()).unwrap();
-        let found = listen(&recording).unwrap().unwrap();
+            let other = (k == 100).then_some([slow, packed]);
+            let all = [fast].into_iter().chain(other.into_iter().flatten());
+            all.map(move |message| (t_ns, message))
+        }));
         assert!(found.remarks[0].starts_with("2 messages are no 16-bit PCM"));
         assert_eq!(found.remarks.len(), 1);
         assert_eq!(found.onset_s.len(), plain.onset_s.len());
