@@ -136,6 +136,11 @@ pub fn metrics(motion: &Motion, window: Window) -> Metrics {
             }
             continue;
         }
+        if *name == "roll_excess_s" {
+            // Swings that keep step with the samples are all counted in one way or all in the other: no standard deviation tells of that.
+            value.ci95 = Some(extremes(x, &drawn));
+            continue;
+        }
         let x = match *name {
             "t_float" => floating(support_ratio),
             _ => x,
@@ -143,11 +148,6 @@ pub fn metrics(motion: &Motion, window: Window) -> Metrics {
         let half =
             1.96 * (variance(&drawn) + beyond_the_budget(name, motion, window).powi(2)).sqrt();
         value.datum = Datum::Number(x);
-        if *name == "roll_excess_s" {
-            // Swings that keep step with the samples are all counted in one way or all in the other: no standard deviation tells of that.
-            value.ci95 = Some(extremes(x, &drawn));
-            continue;
-        }
         // None of them is below nothing, and a share is one at most.
         let most = if *name == "t_float" {
             1.0

@@ -2,12 +2,17 @@
 
 use super::contact::{deviation, mean};
 use super::{Context, Value};
-use crate::summary::{ends, moves, rounding};
+use crate::summary::{ends, rounding};
 
 pub fn dz_pp_m(c: &Context) -> Value {
     let z = &c.height().x;
     let [low, high] = ends(z);
-    Value::number(if moves(z) { high - low } else { 0.0 })
+    let span = high - low;
+    Value::number(if span > rounding(&[low, high]) {
+        span
+    } else {
+        0.0
+    })
 }
 
 pub fn rms_z_m(c: &Context) -> Value {

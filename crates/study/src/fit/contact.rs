@@ -307,8 +307,7 @@ pub(super) fn pendulum(field: &Field, window: Window) -> Result<Vec<Outcome>, St
     if roll.iter().chain(total).any(|x| !x.is_finite()) {
         return Err("roll or forces have gaps".into());
     }
-    // Any roll that is pushed at one frequency is θ̈ ∝ −θ, and would pass for a pendulum of that frequency.
-    let line = |x: &[f64]| {
+    let spectrum = |x: &[f64]| {
         let (about, step_s) = about_mean(t_s, x)?;
         welch(
             &about,
@@ -317,8 +316,7 @@ pub(super) fn pendulum(field: &Field, window: Window) -> Result<Vec<Outcome>, St
         )
         .ok()
     };
-    let lines = (line(roll), line(total));
-    let roll_hz = lines.0.as_ref().and_then(|roll| roll.peak_hz());
+    let roll_hz = spectrum(roll).and_then(|roll| roll.peak_hz());
     let roll_hz = roll_hz
         .filter(|hz| *hz > 0.0)
         .ok_or("the roll does not move")?;
@@ -327,20 +325,24 @@ pub(super) fn pendulum(field: &Field, window: Window) -> Result<Vec<Outcome>, St
     let blocks = |skip: usize| {
         let step_s = step_s * skip as f64;
         let long = (PERIODS / roll_hz / step_s).ceil() as usize;
+        let shift = long.div_ceil(SHIFTS);
+        let swings = [0.0, FRAC_PI_2].map(|phase| -> Vec<[f64; 3]> {
+            let at = |n| swing(n, long, step_s, TAU * roll_hz, phase);
+            (0..=long).map(at).collect()
+        });
         let mut blocks: Vec<Block<2>> = Vec::new();
         for part in &parts {
             let at: Vec<usize> = part.clone().step_by(skip).collect();
-            for begin in (0..at.len().saturating_sub(long)).step_by(long.div_ceil(SHIFTS)) {
-                if begin % long < long.div_ceil(SHIFTS) {
+            for begin in (0..at.len().saturating_sub(long)).step_by(shift) {
+                if begin % long < shift {
                     blocks.push(Block::empty());
                 }
                 let Some(block) = blocks.last_mut() else {
                     continue;
                 };
-                for phase in [0.0, FRAC_PI_2] {
+                for swing in &swings {
                     let (mut x, mut y) = ([0.0; 2], 0.0);
-                    for (n, &k) in at[begin..=begin + long].iter().enumerate() {
-                        let [q, rate, bend] = swing(n, long, step_s, TAU * roll_hz, phase);
+                    for (&k, [q, rate, bend]) in at[begin..=begin + long].iter().zip(swing) {
                         x[0] -= total[k] * roll[k].sin() * q;
                         x[1] += roll[k] * rate;
                         y += roll[k] * bend;
@@ -366,7 +368,8 @@ pub(super) fn pendulum(field: &Field, window: Window) -> Result<Vec<Outcome>, St
             100.0 * other
         ));
     }
-    if let (_, Some(load)) = lines {
+    // Any roll that is pushed at one frequency is θ̈ ∝ −θ, and would pass for a pendulum of that frequency.
+    if let Some(load) = spectrum(total) {
         let near = |hz: f64| (hz - roll_hz).abs() < 2.5 / LINE_S;
         let strongest = |near: &dyn Fn(f64) -> bool| {
             let lines = load.hz.iter().zip(&load.power);
