@@ -40,6 +40,11 @@ fn a_study_of_a_second_says_what_the_contract_promises() {
     let runs = said["runs"].as_array().unwrap();
     for method in METHODS {
         let of: Vec<&Value> = runs.iter().filter(|r| r["method"] == method.name).collect();
+        // What judges is not judged.
+        if said["reference"]["method"] == method.name {
+            assert!(of.is_empty());
+            continue;
+        }
         assert!(of.len() >= 5, "{} is missing", method.name);
         // The last rung is the finest: it is right to what its order promises.
         let error = of.last().unwrap()["error_roll_rad"].as_f64().unwrap();

@@ -7,6 +7,7 @@ mod course;
 mod dop853;
 mod dopri5;
 mod events;
+mod fehlberg8;
 mod first_steps;
 mod fixed;
 mod pair;
@@ -228,6 +229,14 @@ pub const METHODS: &[Method] = &[
         adaptive: true,
         locates: false,
         run: pair::run::<dopri5::Dopri5, false>,
+    },
+    Method {
+        name: "fehlberg8",
+        about: "Runge-Kutta-Fehlberg 8(7), adaptive, contact events located: `sim accuracy` judges the others by it",
+        order: 8,
+        adaptive: true,
+        locates: true,
+        run: pair::run::<fehlberg8::Fehlberg8, true>,
     },
     Method {
         name: "radau5",

@@ -12,6 +12,9 @@
 //! allocation, no index check and no loop over coefficients is left inside a step.
 #![allow(clippy::int_plus_one)] // an unrolled stage may read `7 >= n + 1`
 
+#[cfg(test)]
+mod order_conditions;
+
 use super::course::{Course, same_moment_s, smallest_step_s};
 use super::events::{self, Looks};
 use super::first_steps::FirstSteps;
@@ -517,7 +520,8 @@ impl<'m, P: Pair, const EVENTS: bool> Run<'m, P, EVENTS> {
         for (k, slope) in self.k[..kept].iter_mut().zip(tiles(&self.slope)) {
             k[I] = *slope;
         }
-        if EVENTS && I <= P::STAGES {
+        // What is there at the start is known, and better than from a stage that comes back to it.
+        if EVENTS && I <= P::STAGES && const { time::<P>(I) > 0.0 } {
             self.looks
                 .note(const { time::<P>(I) }, self.course.margin_n());
         }
