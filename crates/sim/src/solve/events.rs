@@ -372,6 +372,9 @@ fn between(
     }
     // The margin at the start may be zero, which says nothing about where the next zero is.
     let mut guess = if a.1 > 0.0 { a.1 / (a.1 - b.1) } else { 0.5 };
+    if !guess.is_finite() {
+        guess = 0.5;
+    }
     a.1 = a.1.max(f64::MIN_POSITIVE);
     let whole = (b.0 - a.0).abs();
     loop {
@@ -445,6 +448,13 @@ mod tests {
             assert!((found.unwrap() - zero).abs() < 2e-15, "{found:?}");
             assert!(calls <= 8, "{calls}");
         }
+    }
+
+    #[test]
+    fn a_margin_beyond_all_numbers_is_halved_towards_its_zero() {
+        let (found, calls) = find(|t| (0.4 - t) * f64::INFINITY);
+        assert!((found.unwrap() - 0.4).abs() < 1e-14, "{found:?}");
+        assert!(calls <= 60, "{calls}");
     }
 
     /// With a look-alike that is off by so much of the margin, or has a kink beside it.

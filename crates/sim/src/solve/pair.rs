@@ -634,7 +634,9 @@ impl<'m, P: Pair, const EVENTS: bool> Run<'m, P, EVENTS> {
                 course.margin_at_n(t0 + theta * h, at)
             });
         }
-        if let Some(theta) = event.filter(|&theta| last * P::last_term(theta) > TRUST) {
+        // Of the shortest step the last term is rounding, whatever it says.
+        let rough = |&theta: &f64| last * P::last_term(theta) > TRUST && h > smallest_step_s(t0);
+        if let Some(theta) = event.filter(rough) {
             return Ok(Moved::Nowhere(theta));
         }
         let end = event.map_or(t1 - 2.0 * same_moment_s(t1), |theta| t0 + theta * h);
