@@ -342,6 +342,20 @@ fn the_study_is_the_same_for_any_number_of_threads() {
     }
 }
 
+#[test]
+fn what_the_twins_print_is_what_they_write() {
+    let folder = tempfile::tempdir().expect("a folder");
+    for (format, name) in [("table", "twin.txt"), ("json", "twin.json")] {
+        let said = good(run_in(
+            folder.path(),
+            "study",
+            &["twin", "--seeds", "1", "--out", "twins", "--format", format],
+        ));
+        let written = std::fs::read(folder.path().join("twins").join(name)).expect("written");
+        assert!(said.stdout == written, "{name}");
+    }
+}
+
 /// Every mean within the paper's ± of the paper's mean, and some that the paper does not print.
 #[test]
 fn table_1_is_reproduced() {

@@ -1,6 +1,7 @@
 //! Errors of estimates where the recording holds the truth (`--truth`).
 
 use std::collections::BTreeMap;
+use std::f64::consts::TAU;
 
 use nalgebra::{UnitQuaternion, Vector3};
 use recording::read::Recording;
@@ -151,16 +152,17 @@ impl Judge {
     /// Adds errors to the metrics.
     ///
     /// `NAME_error` is estimate minus truth; of words and yes-or-no, 0 for the same and 1 for different. Its interval is the
-    /// estimate's, moved along: it covers 0 when the estimate's covers the truth. `recorded` carriers have true phases.
+    /// estimate's, moved along: it covers 0 when the estimate's covers the truth. The true phases, if any, are those of `inputs`.
     pub fn errors(
         &self,
         motion: Option<&Motion>,
         carriers: &Carriers,
         estimated: &Metrics,
         metrics: &mut Metrics,
-        recorded: usize,
+        inputs: &Inputs,
         window: Window,
     ) {
+        let recorded = inputs.phase_rad.len();
         let mut out: Vec<(&'static str, Value)> = Vec::new();
         let mut of_pose = Metrics::default();
         let mut slow_m = None;
@@ -240,6 +242,17 @@ impl Judge {
                     },
                 ));
             }
+        }
+        let walked = metrics.get("step_rate_hz").filter(|v| v.source == "imu");
+        if self.step_s.is_empty()
+            && walking == recorded
+            && let (Some(true_hz), Some(found)) = (cycles_hz(inputs, window), walked)
+        {
+            let truth = Value {
+                unit: "Hz",
+                ..Value::number(true_hz)
+            };
+            out.push(("step_rate_hz_error", difference(found, &truth)));
         }
         metrics.0.extend(out);
     }
@@ -494,6 +507,19 @@ fn slower(t_s: &[f64], x: &[f64], corner_hz: f64) -> Option<Vec<f64>> {
     sosfiltfilt(&sections, x).ok()
 }
 
+/// How often the recorded phases go round in the window, the mean of all carriers, Hz: a step each time.
+fn cycles_hz(inputs: &Inputs, window: Window) -> Option<f64> {
+    let seen = window.range(&inputs.phase_t_s);
+    let (first, last) = (
+        seen.start,
+        seen.end.checked_sub(1).filter(|l| *l > seen.start)?,
+    );
+    let went_s = inputs.phase_t_s[last] - inputs.phase_t_s[first];
+    let went = |phase: &Vec<f64>| Some((phase.get(last)? - phase.get(first)?) / TAU / went_s);
+    let all: Vec<f64> = inputs.phase_rad.iter().map(went).collect::<Option<_>>()?;
+    (!all.is_empty() && went_s > 0.0).then(|| all.iter().sum::<f64>() / all.len() as f64)
+}
+
 /// Estimate minus truth.
 fn difference(estimate: &Value, truth: &Value) -> Value {
     let same = |a: bool| Value::number(if a { 0.0 } else { 1.0 });
@@ -679,7 +705,7 @@ mod tests {
             &carriers,
             &Metrics::default(),
             &mut metrics,
-            1,
+            &Inputs::default(),
             Window::ALL,
         );
         let f1 = metrics.get("step_f1").unwrap();
@@ -692,6 +718,30 @@ mod tests {
         );
         let rate = metrics.number("step_rate_hz_error").unwrap();
         assert!((rate - (40.0 - 39.0) / 20.0).abs() < 0.002, "{rate}");
+    }
+
+    /// Two carriers whose phases are known, and no true steps.
+    #[test]
+    fn recorded_phases_say_how_often_people_step() {
+        let t_s: Vec<f64> = (0..=900).map(|i| f64::from(i) / 30.0).collect();
+        let walk = |hz: f64| t_s.iter().map(|t| TAU * hz * t + 0.4).collect();
+        let inputs = Inputs {
+            phase_rad: vec![walk(2.0), walk(2.2)],
+            phase_t_s: t_s.clone(),
+            ..Inputs::default()
+        };
+        let window = Window {
+            start_s: 10.0,
+            end_s: 20.0,
+        };
+        let hz = cycles_hz(&inputs, window).unwrap();
+        assert!((hz - 2.1).abs() < 1e-12, "{hz}");
+        let outside = Window {
+            start_s: 40.0,
+            end_s: 50.0,
+        };
+        assert_eq!(cycles_hz(&inputs, outside), None);
+        assert_eq!(cycles_hz(&Inputs::default(), Window::ALL), None);
     }
 
     /// A load that heaves until it is unloaded and rolls, its sensor 0.36 m off the centre of mass, and the pose of that sensor: what the errors
@@ -770,7 +820,7 @@ mod tests {
             &carriers,
             &estimated,
             &mut metrics,
-            0,
+            &Inputs::default(),
             window,
         );
         let floating = (PI - 2.0 * (0.95f64 / 1.4).asin()) / TAU;

@@ -447,7 +447,7 @@ impl Field {
                 &self.carriers,
                 &estimated,
                 metrics,
-                inputs.phase_rad.len(),
+                inputs,
                 window,
             );
         }

@@ -1,7 +1,8 @@
 //! `study twin`: how far the paper's metrics can be had from sensors alone.
 
-use super::{Format, count, jobs, print, progress, watch_interrupts};
-use anyhow::Result;
+use super::{Format, count, jobs, print, progress, watch_interrupts, write_whole};
+use anyhow::{Context, Result};
+use std::path::PathBuf;
 use std::time::Instant;
 use study::twin::{FIRST_SEED, table, to_json, twins};
 
@@ -18,6 +19,9 @@ pub struct Args {
     /// Threads; 0 is one per core. The result does not depend on it.
     #[arg(long, value_name = "N", default_value_t = 0, value_parser = jobs, allow_negative_numbers = true)]
     jobs: usize,
+    /// A folder for the result's files (twin.txt, twin.json).
+    #[arg(long, value_name = "DIR")]
+    out: Option<PathBuf>,
     /// What to print.
     #[arg(long, value_enum, default_value_t = Format::Table)]
     format: Format,
@@ -27,6 +31,7 @@ const EXAMPLES: &str = "Examples:
   study twin                        music and baseline, clocks right and off: docs/field.md
   study twin --seeds 3
   study twin --first-seed 2001      others than those by which the intervals were set
+  study twin --out results          twin.txt and twin.json
   study twin --format json > twins.json";
 
 /// Simulates the twins and prints how far their sensors are off.
@@ -42,8 +47,16 @@ pub fn run(args: &Args) -> Result<()> {
         found.iter().map(|f| f.twins.len()).sum::<usize>(),
         began.elapsed().as_secs_f64()
     );
-    match args.format {
-        Format::Table => print(&table(&found)),
-        Format::Json => print(&format!("{:#}\n", to_json(&found))),
+    let text = table(&found);
+    let json = format!("{:#}\n", to_json(&found));
+    if let Some(folder) = &args.out {
+        std::fs::create_dir_all(folder)
+            .with_context(|| format!("{}: cannot be made", folder.display()))?;
+        write_whole(&folder.join("twin.txt"), text.as_bytes())?;
+        write_whole(&folder.join("twin.json"), json.as_bytes())?;
     }
+    print(match args.format {
+        Format::Table => &text,
+        Format::Json => &json,
+    })
 }
