@@ -507,8 +507,12 @@ fn slower(t_s: &[f64], x: &[f64], corner_hz: f64) -> Option<Vec<f64>> {
     sosfiltfilt(&sections, x).ok()
 }
 
-/// How often the recorded phases go round in the window, the mean of all carriers, Hz: a step each time.
+/// How often the recorded phases go round in the window, the mean of all carriers, Hz: a step each time. What sensors made of phases is
+/// no truth.
 fn cycles_hz(inputs: &Inputs, window: Window) -> Option<f64> {
+    if inputs.phases_are_measured {
+        return None;
+    }
     let seen = window.range(&inputs.phase_t_s);
     let (first, last) = (
         seen.start,
@@ -742,6 +746,11 @@ mod tests {
         };
         assert_eq!(cycles_hz(&inputs, outside), None);
         assert_eq!(cycles_hz(&Inputs::default(), Window::ALL), None);
+        let from_sensors = Inputs {
+            phases_are_measured: true,
+            ..inputs
+        };
+        assert_eq!(cycles_hz(&from_sensors, window), None);
     }
 
     /// A load that heaves until it is unloaded and rolls, its sensor 0.36 m off the centre of mass, and the pose of that sensor: what the errors

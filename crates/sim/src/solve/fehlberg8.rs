@@ -2,7 +2,7 @@
 //!
 //! The cubic is too rough for most of what is read off a step, so samples are stepped to and steps end just beyond events: dear, but
 //! nothing is shared with the methods that people use. `sim accuracy` judges those by this one.
-//! Source: Fehlberg, NASA TR R-287 (1968), Table X; Hairer, Nørsett, Wanner, Solving Ordinary Differential Equations I (1993), Table II.5.4.
+//! Source: Fehlberg, NASA TR R-287 (1968), Table X; Hairer, Nørsett, Wanner, Solving Ordinary Differential Equations I (1993), II.5.
 
 use super::pair::{Arithmetic, Pair, Polynomial, Row, Slopes, TILE, sum};
 
