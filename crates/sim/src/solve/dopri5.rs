@@ -2,7 +2,7 @@
 //!
 //! Source: Dormand & Prince, J. Comput. Appl. Math. 6 (1980), 19–26; dense output: Hairer, Nørsett, Wanner (1993), II.6.
 
-use super::pair::{Arithmetic, Pair, Polynomial, Row, Slopes, TILE, sum};
+use super::pair::{Arithmetic, Pair, Polynomial, Row, Slopes, TILE, cubic, sum};
 
 pub struct Dopri5;
 
@@ -73,11 +73,6 @@ impl Pair for Dopri5 {
     }
 
     #[inline(always)]
-    fn error(h: f64, squares: [f64; 2], count: f64, _friction: bool) -> f64 {
-        h * (squares[0] / count).sqrt()
-    }
-
-    #[inline(always)]
     fn dense<F: Arithmetic>(
         h: f64,
         y0: &[f64; TILE],
@@ -85,15 +80,8 @@ impl Pair for Dopri5 {
         k: &Slopes,
         out: &mut Polynomial,
     ) {
-        let last = sum::<F>(D, k);
-        for l in 0..TILE {
-            let dy = y1[l] - y0[l];
-            let bump = h * k[0][l] - dy;
-            out[0][l] = dy;
-            out[1][l] = bump;
-            out[2][l] = dy - h * k[6][l] - bump;
-            out[3][l] = h * last[l];
-        }
+        cubic(h, y0, y1, &k[0], &k[6], out);
+        out[3] = sum::<F>(D, k).map(|last| h * last);
     }
 
     #[inline(always)]

@@ -372,12 +372,13 @@ fn between(
     }
     // The margin at the start may be zero, which says nothing about where the next zero is.
     let mut guess = if a.1 > 0.0 { a.1 / (a.1 - b.1) } else { 0.5 };
-    if !guess.is_finite() {
-        guess = 0.5;
-    }
     a.1 = a.1.max(f64::MIN_POSITIVE);
     let whole = (b.0 - a.0).abs();
     loop {
+        // Margins may be beyond all numbers, or alike.
+        if !guess.is_finite() {
+            guess = 0.5;
+        }
         let width = (b.0 - a.0).abs();
         let least = (resolution / width).min(0.5);
         let theta = a.0 + guess.clamp(least, 1.0 - least) * (b.0 - a.0);
@@ -405,9 +406,6 @@ fn between(
         } else {
             0.5
         };
-        if !guess.is_finite() {
-            guess = 0.5;
-        }
         let next = guess * (b.0 - a.0);
         if safe && BENT * next.abs() * moved.max(next.abs()) <= resolution * whole {
             return a.0 + next;

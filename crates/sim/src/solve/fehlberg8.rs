@@ -4,7 +4,7 @@
 //! nothing is shared with the methods that people use. `sim accuracy` judges those by this one.
 //! Source: Fehlberg, NASA TR R-287 (1968), Table X; Hairer, Nørsett, Wanner, Solving Ordinary Differential Equations I (1993), II.5.
 
-use super::pair::{Arithmetic, Pair, Polynomial, Row, Slopes, TILE, sum};
+use super::pair::{Arithmetic, Pair, Polynomial, Row, Slopes, TILE, cubic, sum};
 
 pub struct Fehlberg8;
 
@@ -142,11 +142,6 @@ impl Pair for Fehlberg8 {
     }
 
     #[inline(always)]
-    fn error(h: f64, squares: [f64; 2], count: f64, _friction: bool) -> f64 {
-        h * ((squares[0] + squares[1]) / count).sqrt()
-    }
-
-    #[inline(always)]
     fn dense<F: Arithmetic>(
         h: f64,
         y0: &[f64; TILE],
@@ -154,13 +149,7 @@ impl Pair for Fehlberg8 {
         k: &Slopes,
         out: &mut Polynomial,
     ) {
-        for l in 0..TILE {
-            let dy = y1[l] - y0[l];
-            let bump = h * k[0][l] - dy;
-            out[0][l] = dy;
-            out[1][l] = bump;
-            out[2][l] = dy - h * k[13][l] - bump;
-        }
+        cubic(h, y0, y1, &k[0], &k[13], out);
     }
 
     #[inline(always)]

@@ -122,8 +122,12 @@ pub trait Pair {
     /// Two error estimates of a tile, per unit of h.
     fn errors<F: Arithmetic>(k: &Slopes) -> [Tile; 2];
     /// The error of a step of size h from the sums of squares of both estimates over `count` states, in units of the tolerance;
-    /// `friction`: whether a force may turn within the step.
-    fn error(h: f64, squares: [f64; 2], count: f64, friction: bool) -> f64;
+    /// `friction`: whether a force may turn within the step. Their root mean
+    /// square, if the method knows no better.
+    #[inline(always)]
+    fn error(h: f64, squares: [f64; 2], count: f64, _friction: bool) -> f64 {
+        h * ((squares[0] + squares[1]) / count).sqrt()
+    }
     /// Prepares the dense polynomial of a tile.
     fn dense<F: Arithmetic>(h: f64, y0: &Tile, y1: &Tile, k: &Slopes, out: &mut Polynomial);
     /// Evaluates it at `theta` in 0…1.
@@ -138,6 +142,18 @@ pub fn sum<F: Arithmetic>(row: Row, k: &Slopes) -> Tile {
         out = F::axpy(a, &k[j], &out);
     }
     out
+}
+
+/// The first rows of a dense polynomial: the cubic with the values and slopes of both ends of a step.
+#[inline(always)]
+pub fn cubic(h: f64, y0: &Tile, y1: &Tile, f0: &Tile, f1: &Tile, out: &mut Polynomial) {
+    for l in 0..TILE {
+        let dy = y1[l] - y0[l];
+        let bump = h * f0[l] - dy;
+        out[0][l] = dy;
+        out[1][l] = bump;
+        out[2][l] = dy - h * f1[l] - bump;
+    }
 }
 
 /// So many steps in a row without a stop, each limited by stability, cost more than the one implicit step that could replace them:

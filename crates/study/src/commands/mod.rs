@@ -184,6 +184,10 @@ fn print(text: &str) -> Result<()> {
     Ok(recording::text::print(text)?)
 }
 
+fn make_folder(folder: &Path) -> Result<()> {
+    std::fs::create_dir_all(folder).with_context(|| format!("{}: cannot be made", folder.display()))
+}
+
 /// Writes a file whole or not at all.
 fn write_whole(path: &Path, bytes: &[u8]) -> Result<()> {
     study::sweep::parts::write_whole(path, |file| Ok(file.write_all(bytes)?))

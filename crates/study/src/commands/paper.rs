@@ -1,7 +1,7 @@
 //! `study paper`: Table 1.
 
-use super::{Format, count, jobs, print, write_whole};
-use anyhow::{Context, Result, bail};
+use super::{Format, count, jobs, make_folder, print, write_whole};
+use anyhow::{Result, bail};
 use sim::scene::{Scene, load};
 use std::path::PathBuf;
 use std::time::Instant;
@@ -75,8 +75,7 @@ pub fn run(args: &Args) -> Result<()> {
 
     let text = table(&conditions);
     if let Some(folder) = &args.out {
-        std::fs::create_dir_all(folder)
-            .with_context(|| format!("{}: cannot be made", folder.display()))?;
+        make_folder(folder)?;
         // Files hold results alone, so the same study gives the same bytes: the time it took is not among them.
         let mut json = to_json(&conditions, 0.0);
         json.as_object_mut().map(|o| o.remove("wall_s"));

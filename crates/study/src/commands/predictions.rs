@@ -1,7 +1,7 @@
 //! `study predictions`: what the paper predicts, tried.
 
-use super::{Format, count, jobs, print, watch_interrupts, write_whole};
-use anyhow::{Context, Result, bail};
+use super::{Format, count, jobs, make_folder, print, watch_interrupts, write_whole};
+use anyhow::{Result, bail};
 use indicatif::{ProgressBar, ProgressStyle};
 use std::path::PathBuf;
 use std::time::Instant;
@@ -78,8 +78,7 @@ pub fn run(args: &Args) -> Result<()> {
     let json = format!("{:#}\n", to_json(&findings));
     if let Some(folder) = &args.out {
         let pictures = folder.join("predictions");
-        std::fs::create_dir_all(&pictures)
-            .with_context(|| format!("{}: cannot be made", pictures.display()))?;
+        make_folder(&pictures)?;
         for (_, finding) in &findings {
             for (stem, _, figure) in &finding.pictures {
                 figure.write(&pictures, stem).map_err(anyhow::Error::msg)?;

@@ -1,7 +1,7 @@
 //! `study twin`: how far the paper's metrics can be had from sensors alone.
 
-use super::{Format, count, jobs, print, progress, watch_interrupts, write_whole};
-use anyhow::{Context, Result};
+use super::{Format, count, jobs, make_folder, print, progress, watch_interrupts, write_whole};
+use anyhow::Result;
 use std::path::PathBuf;
 use std::time::Instant;
 use study::twin::{FIRST_SEED, table, to_json, twins};
@@ -50,8 +50,7 @@ pub fn run(args: &Args) -> Result<()> {
     let text = table(&found);
     let json = format!("{:#}\n", to_json(&found));
     if let Some(folder) = &args.out {
-        std::fs::create_dir_all(folder)
-            .with_context(|| format!("{}: cannot be made", folder.display()))?;
+        make_folder(folder)?;
         write_whole(&folder.join("twin.txt"), text.as_bytes())?;
         write_whole(&folder.join("twin.json"), json.as_bytes())?;
     }
