@@ -248,8 +248,7 @@ const CLOSE: f64 = 0.2;
 /// `x` at its times, which have no hole, or on an even axis of `step_s` from the first of them where steps are not even: samples are lost, or were taken
 /// unevenly. By a cubic spline; by straight lines where samples lie so close together that a spline would follow their noise.
 pub fn evened<'a>(t_s: &'a [f64], x: &'a [f64], step_s: f64) -> [Cow<'a, [f64]>; 2] {
-    let off = |t: &[f64]| ((t[1] - t[0]) / step_s - 1.0).abs();
-    if t_s.windows(2).all(|t| off(t) <= UNEVEN) {
+    if even(t_s, step_s) {
         return [t_s.into(), x.into()];
     }
     let (first, last) = (t_s[0], t_s[t_s.len() - 1]);
@@ -257,33 +256,82 @@ pub fn evened<'a>(t_s: &'a [f64], x: &'a [f64], step_s: f64) -> [Cow<'a, [f64]>;
     let at_s: Vec<f64> = (0..=steps as usize)
         .map(|k| first + k as f64 * step_s)
         .collect();
-    let close = t_s.windows(2).any(|t| t[1] - t[0] < CLOSE * step_s);
-    let smooth = (!close).then(|| resampled(t_s, x, &at_s)).flatten();
-    let x = smooth.unwrap_or_else(|| interpolate(t_s, x, &at_s));
+    let x = drawn(t_s, x, step_s, &at_s);
     [at_s.into(), x.into()]
 }
 
-/// `x` about its mean on an even axis, 0 in the holes of `t_s`, and the step (s): a transform of it has its lines where they are, though
-/// samples are missing. Where more is missing than is there, of the longest part without a hole. `None` as [`mean_step_s`].
-pub fn about_mean(t_s: &[f64], x: &[f64]) -> Option<(Vec<f64>, f64)> {
+/// Whether all steps are nearly `step_s`.
+fn even(t_s: &[f64], step_s: f64) -> bool {
+    t_s.windows(2)
+        .all(|t| ((t[1] - t[0]) / step_s - 1.0).abs() <= UNEVEN)
+}
+
+/// `x` at the times `at_s`, as [`evened`] does it.
+fn drawn(t_s: &[f64], x: &[f64], step_s: f64, at_s: &[f64]) -> Vec<f64> {
+    let close = t_s.windows(2).any(|t| t[1] - t[0] < CLOSE * step_s);
+    let smooth = (!close).then(|| resampled(t_s, x, at_s)).flatten();
+    smooth.unwrap_or_else(|| interpolate(t_s, x, at_s))
+}
+
+/// A signal about its mean on an even axis, 0 in its holes.
+pub struct Even {
+    /// Its samples.
+    pub x: Vec<f64>,
+    /// The step (s).
+    pub step_s: f64,
+    /// Where nothing was measured.
+    pub holes: Vec<Range<usize>>,
+}
+
+/// `x` about its mean on an even axis: a transform of it has its lines where they are, though samples are missing. Where more is missing than is there, of
+/// the longest part without a hole. `None` as [`mean_step_s`].
+pub fn about_mean(t_s: &[f64], x: &[f64]) -> Option<Even> {
     let parts = stretches(t_s, 0.0);
     let step_s = mean_step_in(t_s, &parts)?;
     if (t_s[t_s.len() - 1] - t_s[0]) / step_s + 1.0 > 2.0 * x.len() as f64 {
         let longest = parts.into_iter().max_by_key(ExactSizeIterator::len)?;
         return about_mean(&t_s[longest.clone()], &x[longest]);
     }
-    let (mut even_s, mut even) = (Vec::new(), Vec::new());
+    let mut even: Vec<f64> = Vec::new();
+    let mut holes = Vec::new();
     for part in &parts {
-        let [t_s, x] = evened(&t_s[part.clone()], &x[part.clone()], step_s);
-        even_s.extend_from_slice(&t_s);
-        even.extend_from_slice(&x);
+        let (first, part) = on_axis(&t_s[part.clone()], &x[part.clone()], t_s[0], step_s);
+        // A part of a sample or two may lie between two places, or on the last of the part before.
+        let twice = even.len().saturating_sub(first).min(part.len());
+        if first > even.len() {
+            holes.push(even.len()..first);
+            even.resize(first, f64::NAN);
+        }
+        even.extend_from_slice(&part[twice..]);
     }
-    let mean = even.iter().sum::<f64>() / even.len() as f64;
+    let there = even.iter().filter(|x| !x.is_nan());
+    let mean = there.clone().sum::<f64>() / there.count() as f64;
     even.iter_mut().for_each(|x| *x -= mean);
-    Some(match parts.len() {
-        1 => (even, step_s),
-        _ => (placed(&even_s, &even, step_s, 0.0), step_s),
+    holes.iter().for_each(|hole| even[hole.clone()].fill(0.0));
+    Some(Even {
+        x: even,
+        step_s,
+        holes,
     })
+}
+
+/// A part without a hole on the even axis of `step_s` from `start_s`, and its first place there: as it is where its samples lie on places, else as [`evened`].
+fn on_axis<'a>(t_s: &[f64], x: &'a [f64], start_s: f64, step_s: f64) -> (usize, Cow<'a, [f64]>) {
+    let place = |t: f64| (t - start_s) / step_s;
+    let [first, last] = [t_s[0], t_s[t_s.len() - 1]].map(place);
+    let (begin, end) = (first.round(), last.round());
+    let off = (first - begin).abs().max((last - end).abs());
+    let alone = t_s.len() == 1;
+    let whole = end - begin == (t_s.len() - 1) as f64;
+    if alone || whole && off <= UNEVEN && even(t_s, step_s) {
+        return (begin as usize, x.into());
+    }
+    let places = (first - 1e-6).ceil() as usize..=(last + 1e-6).floor() as usize;
+    let at_s: Vec<f64> = places
+        .clone()
+        .map(|k| start_s + k as f64 * step_s)
+        .collect();
+    (*places.start(), drawn(t_s, x, step_s, &at_s).into())
 }
 
 /// `x(t)` at the times `at_s` by straight lines between samples; held beyond the ends. Both time axes ascend.
@@ -424,14 +472,28 @@ mod tests {
         assert_eq!(stretches(&[0.0, 1.0, 2.0, 4.0, 5.0], 0.0).len(), 1);
         assert!(stretches(&[], 0.0).is_empty());
         assert_eq!(stretches(&[3.0], 0.0).len(), 1);
-        let (even, step_s) = about_mean(&t, &x).unwrap();
-        assert_eq!(even.len(), 600);
+        let Even {
+            x: even,
+            step_s,
+            holes,
+        } = about_mean(&t, &x).unwrap();
+        assert_eq!((even.len(), holes), (600, vec![200..260]));
         assert!(even[200..260].iter().all(|x| *x == 0.0) && (step_s - 0.05).abs() < 1e-12);
         assert!((even[265] - 1.0).abs() < 0.05);
+        // Samples that go on beside the places of those before the hole are drawn to them.
+        let shifted: Vec<f64> = t.iter().map(|t| t + 0.02 * f64::from(*t > 11.0)).collect();
+        let moved: Vec<f64> = shifted
+            .iter()
+            .map(|t| (std::f64::consts::TAU * t).sin())
+            .collect();
+        let other = about_mean(&shifted, &moved).unwrap();
+        assert_eq!(other.holes, [200..261]);
+        let after = other.x[262..599].iter().zip(&even[262..599]);
+        assert!(after.map(|(a, b)| (a - b).abs()).fold(0.0, f64::max) < 1e-3);
         // A sample years later asks for no memory.
         let late: Vec<f64> = t.iter().copied().chain([1e9]).collect();
         let x: Vec<f64> = x.iter().copied().chain([0.0]).collect();
-        assert_eq!(about_mean(&late, &x).unwrap().0.len(), 340);
+        assert_eq!(about_mean(&late, &x).unwrap().x.len(), 340);
     }
 
     #[test]

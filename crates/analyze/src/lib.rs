@@ -16,6 +16,7 @@ pub mod events;
 pub mod examine;
 pub mod field;
 pub mod filter;
+mod holes;
 pub mod imu;
 pub mod inputs;
 mod line;

@@ -1,5 +1,6 @@
 //! The strongest line of a signal, and what of its power lies near one.
 
+use crate::holes::fill;
 use crate::inputs::about_mean;
 use crate::spectrum::{Taper, rfft, rfft_hz, rfft_magnitude};
 use crate::summary::rounding;
@@ -20,12 +21,12 @@ pub struct Line {
 }
 
 impl Line {
-    /// argmax of |rfft(x − mean)|, 0 in holes; `None` below four samples or for a constant.
+    /// argmax of |rfft(x − mean)|; `None` below four samples or for a constant.
     pub fn strongest(t_s: &[f64], x: &[f64]) -> Option<Self> {
         if x.len() < 4 {
             return None;
         }
-        let (about, step_s) = about_mean(t_s, x)?;
+        let (about, step_s) = whole(t_s, x)?;
         let magnitude = rfft_magnitude(&about);
         let hz_grid = rfft_hz(about.len(), step_s);
         // Ties go to the lowest frequency, as NumPy's argmax does.
@@ -55,6 +56,17 @@ impl Line {
         near.map(|(_, m)| m / self.magnitude[self.bin])
             .reduce(f64::max)
     }
+}
+
+/// A signal about its mean on an even axis, drawn through its holes, and the step (s).
+fn whole(t_s: &[f64], x: &[f64]) -> Option<(Vec<f64>, f64)> {
+    let mut even = about_mean(t_s, x)?;
+    if !even.holes.is_empty() {
+        fill(&mut even.x, &even.holes, even.step_s);
+        let mean = even.x.iter().sum::<f64>() / even.x.len() as f64;
+        even.x.iter_mut().for_each(|x| *x -= mean);
+    }
+    Some((even.x, even.step_s))
 }
 
 /// How far the strongest line of `x`, evenly spaced at `t_s`, is from the farthest one of at least half its power (Hz).
@@ -88,9 +100,9 @@ pub struct Shares {
 }
 
 impl Shares {
-    /// For a signal on an even time axis, 0 in its holes; `None` where it does not move, or for less than [`FEWEST_PERIODS`].
+    /// For a signal on an even time axis; `None` where it does not move, or for less than [`FEWEST_PERIODS`].
     pub fn of(t_s: &[f64], x: &[f64], f_hz: f64) -> Option<Self> {
-        let (x, step_s) = about_mean(t_s, x)?;
+        let (x, step_s) = whole(t_s, x)?;
         if (x.len() as f64 + 0.5) * step_s * f_hz < FEWEST_PERIODS {
             return None;
         }
@@ -136,6 +148,38 @@ mod tests {
             (shares.at_half - 0.8).abs() < 1e-6 && (shares.at_f - 0.2).abs() < 1e-6,
             "{shares:?}"
         );
+    }
+
+    /// A step and its half, both of a slowly wandering phase, with few of their samples lost in rows. Zeros in holes of two make the ratio of the lines 57 %
+    /// larger and that of the shares 75 % smaller.
+    #[test]
+    fn holes_leave_lines_as_they_are() {
+        let wander = |t: f64| 0.6 * (0.37 * t).sin() + 0.4 * (0.23 * t + 1.0).cos();
+        let [t, height] = series(|t| {
+            let step = TAU * 2.15 * t + wander(t);
+            step.sin() + 0.04 * (2.0 * step + 1.0).sin()
+        });
+        let [_, roll] =
+            series(|t| (0.5 * (TAU * 2.15 * t + wander(t))).sin() + 0.02 * (TAU * 2.15 * t).sin());
+        let read = |t: &[f64], height: &[f64], roll: &[f64]| {
+            let line = Line::strongest(t, height).unwrap();
+            let shares = Shares::of(t, roll, line.hz).unwrap();
+            [
+                line.hz,
+                line.ratio_near(2.0 * line.hz, 0.45).unwrap(),
+                shares.at_half / shares.at_f,
+            ]
+        };
+        let truth = read(&t, &height, &roll);
+        for row in [2, 5, 15] {
+            let there = |k: &usize| (k + 37) % (30 * row) >= row;
+            let pick =
+                |x: &[f64]| -> Vec<f64> { (0..x.len()).filter(there).map(|k| x[k]).collect() };
+            let found = read(&pick(&t), &pick(&height), &pick(&roll));
+            for (a, b) in found.into_iter().zip(truth) {
+                assert!((a / b - 1.0).abs() < 0.01, "{row}: {found:?} {truth:?}");
+            }
+        }
     }
 
     #[test]

@@ -2,7 +2,7 @@
 
 use crate::envelope::outline;
 use crate::examine::{Analysis, MOST_SERIES};
-use crate::inputs::{Window, about_mean, stretches};
+use crate::inputs::{Even, Window, about_mean, stretches};
 use crate::peaks::SpectrumSummary;
 use crate::phase;
 use crate::spectrum::{Mode, Options, spectrogram};
@@ -582,7 +582,9 @@ fn roll_spectrogram(a: &Analysis) -> Option<Image> {
         return None;
     }
     // Dark where nothing was measured; not at all where that is most of it.
-    let (roll, step_s) = about_mean(&i.t_s, &i.roll_rad)?;
+    let Even {
+        x: roll, step_s, ..
+    } = about_mean(&i.t_s, &i.roll_rad)?;
     if !moves(&i.roll_rad) {
         return None;
     }
