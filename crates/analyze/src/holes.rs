@@ -4,15 +4,11 @@
 //! e_t = Σ_{k=0…p} a_k x_{t−k},   a₀ = 1;      lost x: Σ_{t=p…n−1} e_t² least,      a: by Burg's recursion from what x is so far
 //! ```
 //! Three rounds, from zeros on. A signal of lines goes on through a hole as it went before and behind it; noise falls to the mean, as fast as it forgets.
-//! p covers [`MEMORY_S`], within [`ORDERS`]. Sources: Janssen, Veldhuis & Vries, IEEE Trans. ASSP 34 (1986) 317 (with the ends' exact covariance in the place of least squares);
+//! Sources: Janssen, Veldhuis & Vries, IEEE Trans. ASSP 34 (1986) 317 (with the ends' exact covariance in the place of least squares);
 //! Kay, Modern Spectral Estimation (1988), ch. 7.
 
-use std::ops::{Range, RangeInclusive};
+use std::ops::Range;
 
-/// How far back a prediction looks (s): about two steps of a carrier.
-const MEMORY_S: f64 = 1.0;
-/// Between so many samples.
-const ORDERS: RangeInclusive<usize> = 32..=256;
 /// No more than one in so many of the samples are coefficients.
 const SAMPLES_PER_COEFFICIENT: usize = 8;
 /// So many products at most to solve for what is lost: of very long records the prediction looks less far back.
@@ -21,14 +17,12 @@ const ROUNDS: usize = 3;
 /// Of the diagonal, added to it: lines without noise leave nothing else there.
 const RIDGE: f64 = 1e-12;
 
-/// Fills the `lost` parts, which ascend, of a signal about its mean, sampled every `step_s`; what is there stays as it is. Zeros stay where the
-/// signal is too short to tell or stands still.
-pub fn fill(x: &mut [f64], lost: &[Range<usize>], step_s: f64) {
+/// Fills the `lost` parts, which ascend, of an even signal about its mean, by a prediction from so many samples; what is there stays as it is. Zeros
+/// stay where the signal is too short to tell or stands still.
+pub fn fill(x: &mut [f64], lost: &[Range<usize>], samples: usize) {
     let lost: Vec<usize> = lost.iter().cloned().flatten().collect();
     let affordable = (WORK / lost.len().max(1) as f64).sqrt() as usize;
-    let memory = (MEMORY_S / step_s).ceil() as usize;
-    let order = memory
-        .clamp(*ORDERS.start(), *ORDERS.end())
+    let order = samples
         .min(x.len() / SAMPLES_PER_COEFFICIENT)
         .min(affordable);
     lost.iter().for_each(|&t| x[t] = 0.0);
@@ -190,7 +184,7 @@ mod tests {
         for part in &lost {
             x[part.clone()].fill(9.0);
         }
-        fill(&mut x, &lost, 1.0 / 30.0);
+        fill(&mut x, &lost, 32);
         let off = x.iter().zip(&truth).map(|(a, b)| (a - b).abs());
         let worst = off.fold(0.0, f64::max);
         assert!(worst < 1e-3, "{worst:.1e}");
@@ -259,7 +253,7 @@ mod tests {
     fn what_tells_nothing_stays_zero() {
         for mut x in [vec![1.0; 6], vec![0.0; 400], vec![f64::INFINITY; 400]] {
             let lost = 2..4;
-            fill(&mut x, std::slice::from_ref(&lost), 0.01);
+            fill(&mut x, std::slice::from_ref(&lost), 32);
             assert_eq!(x[lost], [0.0, 0.0]);
         }
     }

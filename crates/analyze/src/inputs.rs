@@ -172,7 +172,7 @@ impl Inputs {
 }
 
 /// A step so many times one that 95 % of them do not exceed is a hole: single samples may be missing, or late, without one.
-const HOLE: f64 = 2.5;
+pub(crate) const HOLE: f64 = 2.5;
 
 /// The longest step of an ascending time axis that is no hole (s); infinite below two samples.
 pub fn longest_step_s(t_s: &[f64]) -> f64 {

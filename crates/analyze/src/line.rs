@@ -4,6 +4,7 @@ use crate::holes::fill;
 use crate::inputs::about_mean;
 use crate::spectrum::{Taper, rfft, rfft_hz, rfft_magnitude};
 use crate::summary::rounding;
+use std::ops::RangeInclusive;
 
 /// Half-width of "near a line", as a share of f.
 pub const NEAR: f64 = 0.1;
@@ -58,11 +59,18 @@ impl Line {
     }
 }
 
+/// What goes on through a hole is told by so much beside it (s): about two steps of a carrier.
+const MEMORY_S: f64 = 1.0;
+/// By no fewer and no more samples.
+const MEMORY: RangeInclusive<usize> = 32..=256;
+
 /// A signal about its mean on an even axis, drawn through its holes, and the step (s).
 fn whole(t_s: &[f64], x: &[f64]) -> Option<(Vec<f64>, f64)> {
     let mut even = about_mean(t_s, x)?;
     if !even.holes.is_empty() {
-        fill(&mut even.x, &even.holes, even.step_s);
+        let samples = (MEMORY_S / even.step_s).ceil() as usize;
+        let samples = samples.clamp(*MEMORY.start(), *MEMORY.end());
+        fill(&mut even.x, &even.holes, samples);
         let mean = even.x.iter().sum::<f64>() / even.x.len() as f64;
         even.x.iter_mut().for_each(|x| *x -= mean);
     }

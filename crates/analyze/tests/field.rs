@@ -7,6 +7,7 @@ use analyze::examine::{Analysis, Request, examine};
 use analyze::field::DeviceClocks;
 use analyze::imu::Track;
 use analyze::imu::axes::{misfit, signed_permutations};
+use analyze::imu::rath::{Settings, motion};
 use analyze::quality::Quality;
 use nalgebra::{Matrix3, Vector3};
 use recording::import::{ImportOptions, ingest};
@@ -119,6 +120,15 @@ fn track(recording: &Recording, topic: &str) -> Track {
     )
 }
 
+/// That of a recording's first sensor.
+fn track_of(name: &str) -> Track {
+    let folder = PathBuf::from(std::env::var_os("IMU_RECORDINGS").unwrap());
+    let recording = Recording::open(&folder.join(name), &ReadOptions::default()).unwrap();
+    let mut channels = recording.info().channels.iter();
+    let channel = channels.find(|c| c.schema.ends_with("Imu")).unwrap();
+    track(&recording, &channel.topic)
+}
+
 /// Of the 47 ways to exchange or turn the gyroscope's axes how many are found out; those that one way alone fits have to be named.
 fn found_out(track: &Track) -> usize {
     let mut count = 0;
@@ -143,16 +153,7 @@ fn found_out(track: &Track) -> usize {
 #[ignore = "needs recordings that are not shipped: see above"]
 fn val_broad_axes() {
     for name in BROAD {
-        let folder = PathBuf::from(std::env::var_os("IMU_RECORDINGS").unwrap());
-        let recording = Recording::open(&folder.join(name), &ReadOptions::default()).unwrap();
-        let channels = recording.info().channels.iter();
-        let topic = channels
-            .clone()
-            .find(|c| c.schema.ends_with("Imu"))
-            .unwrap()
-            .topic
-            .clone();
-        let track = track(&recording, &topic);
+        let track = track_of(name);
         let count = found_out(&track);
         println!("{name}: {count} of 47 wrong ways are found out");
         assert_eq!(count, 47, "{name}");
@@ -245,4 +246,45 @@ fn raw_phone_files_become_the_papers_metrics() {
     assert!(said(&turned) && !said(&found));
     assert!(found.metrics.get("rms_roll_deg").unwrap().ci95.is_some());
     assert!(turned.metrics.get("rms_roll_deg").unwrap().ci95.is_none());
+}
+
+/// Real turns and jolts in short holes: how far roll and height come out otherwise than without holes, and how far it is said that they may.
+#[test]
+#[ignore = "needs recordings that are not shipped: see above"]
+fn val_broad_holes() {
+    for name in BROAD {
+        let track = track_of(name);
+        let whole = motion(&track, &Settings::default()).unwrap().inputs;
+        for row in [3, 10, 25] {
+            // Three of a hundred, in rows, every so many but not evenly.
+            let lost = |k: usize| {
+                let place = k % (33 * row);
+                let begin = 7 * row + (k / (33 * row)) * 37 % (20 * row);
+                (begin..begin + row).contains(&place)
+            };
+            let mut kept = Track::default();
+            for k in (0..track.len()).filter(|k| !lost(*k)) {
+                kept.append(track.part(k..k + 1));
+            }
+            let found = motion(&kept, &Settings::default()).unwrap();
+            let again = found.again.as_deref().unwrap();
+            let apart = |a: &[f64], b: &[f64]| {
+                let both = a.iter().zip(b).map(|(a, b)| (a - b).powi(2));
+                let both: Vec<f64> = both.filter(|x| x.is_finite()).collect();
+                (both.iter().sum::<f64>() / both.len() as f64).sqrt()
+            };
+            let [roll, said] = [&whole.roll_rad, &again.roll_rad]
+                .map(|x| apart(&found.inputs.roll_rad, x).to_degrees());
+            let [height_m, height_said_m] =
+                [&whole.height_m, &again.height_m].map(|x| apart(&found.inputs.height_m, x));
+            println!(
+                "{name}, rows of {row}: roll {roll:.3}° (said {said:.3}°), height {:.1} mm (said {:.1} mm)",
+                1e3 * height_m,
+                1e3 * height_said_m
+            );
+            for (found, said) in [(roll, said), (height_m, height_said_m)] {
+                assert!(found < 3.0 * said && said < 3.0 * found, "{found} {said}");
+            }
+        }
+    }
 }

@@ -178,6 +178,36 @@ fn clocks_drift_and_samples_get_lost() {
     assert!(shown.windows(2).all(|w| w[0].t_s < w[1].t_s));
 }
 
+/// Rows of five, of which a few meet: holes of five samples and more, as much lost in all as is said.
+#[test]
+fn samples_get_lost_in_rows() {
+    let text = r#"
+        name = "radio"
+        duration_s = 200.0
+        [effects.imu]
+        rate_hz = 100.0
+        dropout = 0.1
+        dropout_row = 5
+        sensors = [{ on = "rath" }]
+    "#;
+    let (shown, _) = readings(&scene(text));
+    // A tenth of 20,001; rows make the standard error √5 times as large: 95, of which four.
+    assert!((17_620..=18_380).contains(&shown.len()), "{}", shown.len());
+    let ticks: Vec<i64> = shown
+        .iter()
+        .map(|r| (r.t_s * 100.0).round() as i64)
+        .collect();
+    let holes: Vec<i64> = ticks
+        .windows(2)
+        .map(|w| w[1] - w[0] - 1)
+        .filter(|lost| *lost > 0)
+        .collect();
+    assert!(holes.iter().all(|lost| *lost >= 5));
+    // (1 − p_b)^5 of them meet no other, p_b = 1 − 0.9^(1/5): nine of ten.
+    let alone = holes.iter().filter(|lost| **lost == 5).count() as f64 / holes.len() as f64;
+    assert!((alone - 0.9).abs() < 0.06, "{alone}");
+}
+
 /// Ranges clip and digits round.
 #[test]
 fn ranges_clip_and_digits_round() {

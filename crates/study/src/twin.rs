@@ -37,6 +37,8 @@ const CLOCKS: [&str; 5] = [
     "effects.imu.sensors.2.clock_offset_s=-0.2",
     "effects.imu.sensors.2.clock_drift_ppm=-50.0",
 ];
+/// Radios that lose three samples of a hundred, ten at a time.
+const LOST: [&str; 2] = ["effects.imu.dropout=0.03", "effects.imu.dropout_row=10"];
 /// What makes the scene `baseline` of it.
 const BASELINE: [&str; 4] = [
     "effects.drum=false",
@@ -55,6 +57,23 @@ pub const CONDITIONS: &[Condition] = &[
     Condition {
         name: "baseline",
         settings: &BASELINE,
+        clocks_off: false,
+    },
+    Condition {
+        name: "music, samples lost",
+        settings: &LOST,
+        clocks_off: false,
+    },
+    Condition {
+        name: "baseline, samples lost",
+        settings: &[
+            BASELINE[0],
+            BASELINE[1],
+            BASELINE[2],
+            BASELINE[3],
+            LOST[0],
+            LOST[1],
+        ],
         clocks_off: false,
     },
     Condition {

@@ -24,6 +24,7 @@ use crate::beat::lock::Course;
 use crate::events::Event;
 use crate::imu::Track;
 use crate::imu::axes::misfit;
+use crate::imu::bridge;
 use crate::imu::frozen::frozen;
 use crate::imu::interval::{self, Lost};
 use crate::imu::orientation::Options;
@@ -317,6 +318,17 @@ impl Field {
     fn motion(&mut self, topic: &str, track: &Track, settings: Settings) {
         match rath::motion(track, &settings) {
             Ok(motion) => {
+                let drawn_s = motion.drawn_s();
+                if drawn_s > 0.0 {
+                    self.quality.push(Quality::remark(
+                        topic,
+                        "drawn_through",
+                        format!(
+                            "{drawn_s:.2} s in holes of up to {:.1} s are drawn through by what the samples beside them let expect; intervals hold what as many holes again change",
+                            bridge::LONGEST_S
+                        ),
+                    ));
+                }
                 if motion.left_out_s > 0.0 {
                     self.quality.push(Quality::remark(
                         topic,

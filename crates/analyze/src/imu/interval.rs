@@ -1,7 +1,8 @@
 //! The paper's metrics of a [`Motion`], each number with its 95 % interval.
 //!
 //! The estimated columns are varied within the [`Budget`](super::budget::Budget) of what the sensor and the method leave uncertain, and sampled
-//! at the paper's 30 Hz with a random phase; the metric's spread over the draws is its standard error, 1.96 of which are given.
+//! at the paper's 30 Hz with a random phase; the metric's spread over the draws is its standard error, 1.96 of which are given. Where short holes were
+//! drawn through, what as many holes again would change counts as one more.
 
 use super::budget::UNCALIBRATED_M_PER_S2;
 use super::rath::{Motion, Mounting};
@@ -71,12 +72,17 @@ pub fn metrics(motion: &Motion, window: Window) -> Metrics {
     let draws = drawn(tilt_rad, |name| gives(name) && name != "mechanism");
     let untilted = (tilt_rad > 0.0).then(|| drawn(0.0, |name| MEAN_SQUARES.contains(&name)));
     let untilted = untilted.as_ref().unwrap_or(&draws);
+    let again = motion
+        .again
+        .as_deref()
+        .map(|again| (again, metrics_of(again, window, gives)));
+    let number_again = |name: &str| again.as_ref().and_then(|(_, m)| m.number(name));
     let onsets: Vec<f64> = draws
         .iter()
         .filter_map(|d| d.number("onset_time_s"))
         .collect();
     let range = window.range(&motion.inputs.t_s);
-    let support_ratio = &motion.inputs.support_ratio[range.clone()];
+    let t_float = |inputs: &Inputs| floating(&inputs.support_ratio[range.clone()]);
     let rate_hz = rate_hz(&motion.inputs);
     for (name, value) in &mut out.0 {
         if let Some((_, why)) = BEYOND.iter().find(|(n, _)| n == name) {
@@ -100,7 +106,9 @@ pub fn metrics(motion: &Motion, window: Window) -> Metrics {
         };
         if *name == "onset_time_s" {
             let end_s = motion.inputs.t_s[range.clone()].last().copied();
-            value.ci95 = Some(onset_between(x, &onsets, end_s.unwrap_or(x)));
+            let ends = onset_between(x, &onsets, end_s.unwrap_or(x));
+            let off = number_again(name).map_or(0.0, |again| again - x);
+            value.ci95 = Some(apart(ends, x, off));
             let reason = doubtful(DRAWS - onsets.len(), "none");
             value.reason = value.reason.take().or(reason);
             continue;
@@ -123,7 +131,9 @@ pub fn metrics(motion: &Motion, window: Window) -> Metrics {
             };
             let mean_deg = angle.iter().sum::<f64>().to_degrees() / angle.len() as f64;
             value.datum = Datum::Number(root);
-            value.ci95 = Some(tilted(root, ci95, mean_deg, 1.96 * tilt_rad.to_degrees()));
+            let ends = tilted(root, ci95, mean_deg, 1.96 * tilt_rad.to_degrees());
+            let off = number_again(name).map_or(0.0, |again| again - x);
+            value.ci95 = Some(apart(ends, root, off));
             if matches!(motion.settings.mounting, Mounting::Known(_)) {
                 if motion.settings.budget.accel_bias_m_per_s2.is_none() {
                     value.reason = Some(format!(
@@ -138,22 +148,28 @@ pub fn metrics(motion: &Motion, window: Window) -> Metrics {
         }
         if *name == "roll_excess_s" {
             // Swings that keep step with the samples are all counted in one way or all in the other: no standard deviation tells of that.
-            value.ci95 = Some(extremes(x, &drawn));
+            let off = number_again(name).map_or(0.0, |again| again - x);
+            value.ci95 = Some(apart(extremes(x, &drawn), x, off));
             continue;
         }
-        let x = match *name {
-            "t_float" => floating(support_ratio),
-            _ => x,
+        let floats = *name == "t_float";
+        let number_again = match &again {
+            Some((again, _)) if floats => Some(t_float(again)),
+            _ => number_again(name),
         };
-        let half =
-            1.96 * (variance(&drawn) + beyond_the_budget(name, motion, window).powi(2)).sqrt();
+        let x = if floats { t_float(&motion.inputs) } else { x };
+        let off = match (&again, *name) {
+            (Some((again, _)), "dz_pp_m") => {
+                let heights = [&motion.inputs, *again].map(|i| &i.height_m[range.clone()]);
+                farthest_apart(heights) / 1.96
+            }
+            _ => number_again.map_or(0.0, |again| again - x),
+        };
+        let beyond = beyond_the_budget(name, motion, window);
+        let half = 1.96 * (variance(&drawn) + beyond.powi(2) + off.powi(2)).sqrt();
         value.datum = Datum::Number(x);
         // None of them is below nothing, and a share is one at most.
-        let most = if *name == "t_float" {
-            1.0
-        } else {
-            f64::INFINITY
-        };
+        let most = if floats { 1.0 } else { f64::INFINITY };
         value.ci95 = Some([(x - half).max(0.0), (x + half).min(most)]);
         let of_height = OF_COURSE.contains(name).then(|| {
             let corner_hz = motion.settings.height_corner_hz;
@@ -322,6 +338,21 @@ fn extremes(found: f64, drawn: &[f64]) -> [f64; 2] {
         all().fold(f64::MAX, f64::min),
         all().fold(f64::MIN, f64::max),
     ]
+}
+
+/// The largest difference of two columns: what holes add to one swing, if it is the largest, they add to the swing from lowest to highest.
+fn farthest_apart([a, b]: [&[f64]; 2]) -> f64 {
+    let apart = a.iter().zip(b).map(|(a, b)| (a - b).abs());
+    apart.fold(0.0, f64::max)
+}
+
+/// An interval of `x` that holes make wider: as many again change it by `off`, one standard deviation.
+fn apart([low, high]: [f64; 2], x: f64, off: f64) -> [f64; 2] {
+    let wider = |half: f64| half.hypot(1.96 * off);
+    match off == 0.0 {
+        true => [low, high],
+        false => [(x - wider(x - low)).max(0.0), x + wider(high - x)],
+    }
 }
 
 /// Said where more than one in forty equally good sensors would find an onset, or none, against the one that did not.

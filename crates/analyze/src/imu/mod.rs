@@ -6,6 +6,7 @@
 //! | module | gives |
 //! |---|---|
 //! | [`track`] | a clean series of samples out of whatever columns a file had |
+//! | [`bridge`] | what short holes most likely held |
 //! | [`orientation`] | sensor → earth (z up), causal and batch |
 //! | [`vertical`] | height by drift-free double integration, with its valid band |
 //! | [`rath`] | the body's motion |
@@ -18,6 +19,7 @@
 //! | [`truth`] | errors against a recorded truth |
 
 pub mod axes;
+pub mod bridge;
 pub mod budget;
 pub mod frozen;
 pub mod interval;

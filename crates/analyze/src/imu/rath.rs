@@ -12,12 +12,13 @@
 //! What an inertial sensor cannot give: mean height, heading, forces of single handles. Those stay missing, with the reason. The numbers
 //! made of the motion, and how sure they are: [`super::interval`].
 
+use super::bridge::{self, Drawn, bridge};
 use super::budget::Budget;
 use super::orientation::{self, Estimate, Options};
 use super::track::Track;
 use super::vertical;
 use crate::filter::{Band, butter, sosfiltfilt};
-use crate::inputs::{Inputs, Window, interpolate, mean_step_in};
+use crate::inputs::{HOLE, Inputs, Window, interpolate, mean_step_in, stretches};
 use nalgebra::{Matrix3, Rotation3, UnitQuaternion, Vector3};
 use std::ops::{Add, Mul, Range};
 
@@ -120,6 +121,10 @@ pub struct Motion {
     pub stretches: Vec<Range<usize>>,
     /// What of the recording is in none of them, s.
     pub left_out_s: f64,
+    /// How far each acceleration may be off, m/s²: 0 but where a short hole was drawn through.
+    pub unsure_m_per_s2: Vec<f64>,
+    /// Where one was, the columns once more, with as many holes again.
+    pub again: Option<Box<Inputs>>,
     /// Orientation of the body, and what was learnt of the gyroscope; one per time of `inputs.t_s`.
     pub orientation: Estimate,
     /// Body from sensor, as used.
@@ -133,10 +138,20 @@ impl Motion {
     pub fn height_m(&self, corner_hz: f64) -> Vec<f64> {
         stretchwise_height(
             &self.accel_up_m_per_s2,
+            &self.unsure_m_per_s2,
             &self.stretches,
             mean_step_in(&self.inputs.t_s, &self.stretches).unwrap_or_default(),
             corner_hz,
         )
+    }
+}
+
+impl Motion {
+    /// How much was drawn through in short holes, s.
+    pub fn drawn_s(&self) -> f64 {
+        let drawn = self.unsure_m_per_s2.iter().filter(|u| **u > 0.0).count();
+        let step_s = mean_step_in(&self.inputs.t_s, &self.stretches);
+        drawn as f64 * step_s.unwrap_or_default()
     }
 }
 
@@ -159,20 +174,23 @@ impl Motion {
 /// Shorter stretches tell neither orientation nor height, s.
 const SHORTEST_S: f64 = 5.0;
 
-/// The body's motion from its sensor. Nothing is carried over a hole: the columns have no samples there, and no height near it.
+/// The body's motion from its sensor. Short holes are drawn through ([`super::bridge`]); nothing is carried over others: the columns have no samples there,
+/// and no height near them.
 ///
 /// # Errors
 /// When the recording is too short, too slowly sampled, or gravity has been removed from it.
 pub fn motion(track: &Track, settings: &Settings) -> Result<Motion, MotionError> {
     let span_s = |r: &Range<usize>| track.t_s[r.end - 1] - track.t_s[r.start];
-    let mut whole = track.stretches();
-    let found_s = whole.iter().map(span_s).fold(0.0, f64::max);
-    if found_s < SHORTEST_S {
-        return Err(MotionError::TooShort { found_s });
-    }
+    let too_short = || {
+        let found = track.stretches();
+        let found_s = found.iter().map(span_s).fold(0.0, f64::max);
+        MotionError::TooShort { found_s }
+    };
+    let mut whole = stretches(&track.t_s, bridge::LONGEST_S);
     whole.retain(|r| span_s(r) >= SHORTEST_S);
-    let seen_s: f64 = whole.iter().map(span_s).sum();
-    let left_out_s = track.t_s[track.len() - 1] - track.t_s[0] - seen_s;
+    if whole.is_empty() {
+        return Err(too_short());
+    }
     let usual_s = track.period_s().unwrap_or(1.0);
     let mean_s = mean_step_in(&track.t_s, &whole).unwrap_or(1.0);
     // Samples in packets are as dense as their mean step, not as the usual one.
@@ -187,7 +205,32 @@ pub fn motion(track: &Track, settings: &Settings) -> Result<Motion, MotionError>
             found_hz: 1.0 / period_s,
         });
     }
-    let (track, stretches) = even(track, &whole, period_s);
+    let even = even(track, &whole, period_s);
+    if even.stretches.is_empty() {
+        return Err(too_short());
+    }
+    let left_out_s = track.t_s[track.len() - 1] - track.t_s[0] - even.seen_s;
+    let [once, twice] = even.drawn;
+    let again = (twice != once)
+        .then(|| of_even(twice, even.stretches.clone(), period_s, settings).ok())
+        .flatten();
+    let mut found = of_even(once, even.stretches, period_s, settings)?;
+    found.left_out_s = left_out_s;
+    found.again = again.map(|again| Box::new(again.inputs));
+    Ok(found)
+}
+
+/// The motion from even samples in stretches.
+fn of_even(
+    drawn: Drawn,
+    stretches: Vec<Range<usize>>,
+    period_s: f64,
+    settings: &Settings,
+) -> Result<Motion, MotionError> {
+    let Drawn {
+        track,
+        unsure_m_per_s2,
+    } = drawn;
     let mut estimate = orientation::batch(&track, settings.orientation);
     let found = mean_specific_force(&track, &estimate);
     let g = settings.gravity_m_per_s2;
@@ -252,7 +295,8 @@ pub fn motion(track: &Track, settings: &Settings) -> Result<Motion, MotionError>
             .collect();
     }
     let corner_hz = settings.height_corner_hz;
-    let mut height_m = stretchwise_height(&accel_up, &stretches, period_s, corner_hz);
+    let mut height_m =
+        stretchwise_height(&accel_up, &unsure_m_per_s2, &stretches, period_s, corner_hz);
     // At its free ends the height shows the accelerometer's bias; that fades by e every 1/(√2 π f₀).
     for stretch in &stretches {
         // A short recording keeps most of its height; beside a hole there is time enough to do without.
@@ -283,29 +327,83 @@ pub fn motion(track: &Track, settings: &Settings) -> Result<Motion, MotionError>
         accel_up_m_per_s2: accel_up,
         gravity_off_m_per_s2: mean,
         stretches,
-        left_out_s,
+        left_out_s: 0.0,
+        unsure_m_per_s2,
+        again: None,
         orientation: estimate,
         body_from_sensor,
         settings: *settings,
     })
 }
 
-/// The samples of the stretches on an even grid each, of the same period; and where the stretches are now.
-fn even(track: &Track, whole: &[Range<usize>], period_s: f64) -> (Track, Vec<Range<usize>>) {
-    let mut out = Track {
+/// The samples of the stretches on an even grid each, of the same period.
+struct Evened {
+    /// Without short holes; and drawn with as many again.
+    drawn: [Drawn; 2],
+    /// Where the stretches are now.
+    stretches: Vec<Range<usize>>,
+    /// How long they are together, s.
+    seen_s: f64,
+}
+
+fn even(track: &Track, whole: &[Range<usize>], period_s: f64) -> Evened {
+    let dropped = Track {
         dropped: track.dropped,
         ..Track::default()
     };
-    let mut stretches = Vec::with_capacity(whole.len());
+    let nothing = Drawn::measured(dropped);
+    let mut out = Evened {
+        drawn: [nothing.clone(), nothing],
+        stretches: Vec::with_capacity(whole.len()),
+        seen_s: 0.0,
+    };
+    let mut add = |part: [Drawn; 2], span_s: f64| {
+        let first = out.drawn[0].track.len();
+        for (to, part) in out.drawn.iter_mut().zip(part) {
+            to.append(part);
+        }
+        out.stretches.push(first..out.drawn[0].track.len());
+        out.seen_s += span_s;
+    };
+    let measured = |track: Track| {
+        let drawn = Drawn::measured(track);
+        [drawn.clone(), drawn]
+    };
     for range in whole {
-        let first = out.len();
-        out.append(evened(track.part(range.clone()), period_s));
-        stretches.push(first..out.len());
+        let part = track.part(range.clone());
+        let span_s = |r: Range<usize>| part.t_s[r.end - 1] - part.t_s[r.start];
+        let even = evened(&part, period_s);
+        let holes = holes(&part.t_s, &even.t_s, period_s);
+        if holes.is_empty() {
+            add(measured(even), span_s(0..part.len()));
+        } else if let Some(drawn) = bridge(&even, &holes, period_s) {
+            add(drawn, span_s(0..part.len()));
+        } else {
+            for r in part.stretches() {
+                let span_s = span_s(r.clone());
+                if span_s >= SHORTEST_S {
+                    add(measured(evened(&part.part(r), period_s)), span_s);
+                }
+            }
+        }
     }
-    (out, stretches)
+    out
 }
 
-fn evened(track: Track, period_s: f64) -> Track {
+/// Where several samples in a row are missing, as ranges of an even axis of `period_s` over the same time.
+fn holes(t_s: &[f64], even_s: &[f64], period_s: f64) -> Vec<Range<usize>> {
+    let inside = |w: &[f64]| {
+        let within = Window {
+            start_s: w[0] + 0.5 * period_s,
+            end_s: w[1] - 0.5 * period_s,
+        };
+        within.range(even_s)
+    };
+    let gaps = t_s.windows(2).filter(|w| w[1] - w[0] > HOLE * period_s);
+    gaps.map(inside).filter(|r| !r.is_empty()).collect()
+}
+
+fn evened(track: &Track, period_s: f64) -> Track {
     let (start, end) = (track.t_s[0], track.t_s[track.len() - 1]);
     let jitter = track
         .t_s
@@ -314,7 +412,7 @@ fn evened(track: Track, period_s: f64) -> Track {
         .map(|(k, t)| (t - start - k as f64 * period_s).abs())
         .fold(0.0, f64::max);
     if jitter < 0.02 * period_s {
-        return track;
+        return track.clone();
     }
     // Bounded by the samples: within a stretch no step is longer than some usual ones.
     let n = ((end - start) / period_s) as usize + 1;
@@ -368,15 +466,18 @@ fn drawn(t_s: &[f64], x: &[f64], at_s: &[f64], period_s: f64) -> Vec<f64> {
     out
 }
 
-/// [`vertical::height`] of each stretch by itself, m.
+/// [`vertical::height_where_sure`] of each stretch by itself, m.
 fn stretchwise_height(
     accel_up_m_per_s2: &[f64],
+    unsure_m_per_s2: &[f64],
     stretches: &[Range<usize>],
     period_s: f64,
     corner_hz: f64,
 ) -> Vec<f64> {
-    let of =
-        |r: &Range<usize>| vertical::height(&accel_up_m_per_s2[r.clone()], period_s, corner_hz);
+    let of = |r: &Range<usize>| {
+        let (accel, unsure) = (&accel_up_m_per_s2[r.clone()], &unsure_m_per_s2[r.clone()]);
+        vertical::height_where_sure(accel, unsure, period_s, corner_hz)
+    };
     stretches.iter().flat_map(of).collect()
 }
 

@@ -12,6 +12,9 @@
 //! The height's mean and its slow changes are not in it. Source: Numerov (1924) for the weights; Whittaker (1923) for
 //! smoothing by least squares.
 
+use crate::median::median;
+use std::f64::consts::TAU;
+
 /// Corner below which height is held at zero, Hz.
 pub const CORNER_HZ: f64 = 0.1;
 
@@ -22,23 +25,79 @@ pub const VALID_BAND_HZ: [f64; 2] = [0.3, 10.0];
 ///
 /// Fewer than three samples give zeros. A constant acceleration (a bias) gives nearly nothing away from the ends.
 pub fn height(accel_up_m_per_s2: &[f64], period_s: f64, corner_hz: f64) -> Vec<f64> {
-    let a = accel_up_m_per_s2;
+    let trust = vec![1.0; accel_up_m_per_s2.len()];
+    weighted(accel_up_m_per_s2, &trust, period_s, corner_hz)
+}
+
+/// The same where some accelerations are known to `unsure_m_per_s2` (standard deviation of each) only, others (0) as well as usual.
+///
+/// ```text
+/// Σ w_i ( … )² + ω₀⁴ Σ z_i²,    w = 1/(1 + (u/(ω₀² s))²),    s² = σ²/(2 f₀ Δt)
+/// ```
+/// The second term holds z as heights of deviation s would be held, each for itself, against accelerations as sure as ω₀² s; and s is what has as much
+/// between f₀ and 2f₀ as z has there, σ. What is unsure then follows from what the height did before and after: where little of it is slow, a slow course that
+/// begins in a hole is none.
+pub fn height_where_sure(
+    accel_up_m_per_s2: &[f64],
+    unsure_m_per_s2: &[f64],
+    period_s: f64,
+    corner_hz: f64,
+) -> Vec<f64> {
+    let mut trust = vec![1.0; accel_up_m_per_s2.len()];
+    let heights = |trust: &[f64]| {
+        [corner_hz, 2.0 * corner_hz].map(|f| weighted(accel_up_m_per_s2, trust, period_s, f))
+    };
+    if unsure_m_per_s2.iter().all(|u| *u == 0.0) {
+        return weighted(accel_up_m_per_s2, &trust, period_s, corner_hz);
+    }
+    for _ in 0..ROUNDS {
+        let [all, faster] = heights(&trust);
+        let slow = all.iter().zip(&faster).map(|(a, b)| (a - b).abs());
+        let amounts = all.iter().map(|z| z.abs());
+        // The free ends swing, and behind a hole may.
+        let [slow, most] = [slow.collect(), amounts.collect()]
+            .map(|mut x: Vec<f64>| median(&mut x).unwrap_or(0.0) / NORMAL);
+        let square = slow.max(LEAST_SLOW * most).powi(2);
+        let usual = (TAU * corner_hz).powi(4) * square / (2.0 * corner_hz * period_s);
+        if usual > 0.0 {
+            let each = trust.iter_mut().zip(unsure_m_per_s2);
+            each.for_each(|(w, u)| *w = usual / (usual + u * u));
+        }
+    }
+    weighted(accel_up_m_per_s2, &trust, period_s, corner_hz)
+}
+
+/// The median of a normal number's amount.
+const NORMAL: f64 = 0.6745;
+/// A slow course that holes made goes into what is taken for slow at first.
+const ROUNDS: usize = 3;
+/// So much of a motion is taken for slow at least: with less a hole would be bent until it took from the motion itself.
+const LEAST_SLOW: f64 = 0.05;
+
+fn weighted(a: &[f64], trust: &[f64], period_s: f64, corner_hz: f64) -> Vec<f64> {
     let n = a.len();
     if n < 3 {
         return vec![0.0; n];
     }
     let dt2 = period_s * period_s;
-    let hold = (std::f64::consts::TAU * corner_hz * period_s).powi(4);
+    let hold = (TAU * corner_hz * period_s).powi(4);
+    // Each difference is as sure as the least sure of its three samples.
+    let trust: Vec<f64> = trust.windows(3).map(|w| w[0].min(w[1]).min(w[2])).collect();
     let bend: Vec<f64> = a
         .windows(3)
-        .map(|w| (w[0] + 10.0 * w[1] + w[2]) / 12.0 * dt2)
+        .zip(&trust)
+        .map(|(w, trust)| (w[0] + 10.0 * w[1] + w[2]) / 12.0 * dt2 * trust)
         .collect();
     let rhs = second_difference_transposed(&bend, n);
-    let solver = Pentadiagonal::new(n, hold);
+    let solver = Pentadiagonal::new(&trust, hold);
     let mut z = solver.solve(rhs.clone());
     // The matrix is badly conditioned (ω₀Δt to the fourth); two refinements bring back the digits.
     for _ in 0..2 {
-        let curve: Vec<f64> = z.windows(3).map(|w| w[0] - 2.0 * w[1] + w[2]).collect();
+        let curve: Vec<f64> = z
+            .windows(3)
+            .zip(&trust)
+            .map(|(w, trust)| (w[0] - 2.0 * w[1] + w[2]) * trust)
+            .collect();
         let mut residual = second_difference_transposed(&curve, n);
         for ((r, b), z) in residual.iter_mut().zip(&rhs).zip(&z) {
             *r = b - *r - hold * z;
@@ -61,7 +120,7 @@ fn second_difference_transposed(v: &[f64], n: usize) -> Vec<f64> {
     out
 }
 
-/// L D Lᵀ of DᵀD + hold·I, a symmetric matrix with two diagonals on either side.
+/// L D Lᵀ of DᵀWD + hold·I, W the trust in each difference, a symmetric matrix with two diagonals on either side.
 struct Pentadiagonal {
     d: Vec<f64>,
     l1: Vec<f64>,
@@ -69,15 +128,16 @@ struct Pentadiagonal {
 }
 
 impl Pentadiagonal {
-    fn new(n: usize, hold: f64) -> Self {
+    fn new(trust: &[f64], hold: f64) -> Self {
+        let n = trust.len() + 2;
         let (mut main, mut first, mut second) = (vec![hold; n], vec![0.0; n], vec![0.0; n]);
-        for i in 0..n - 2 {
-            main[i] += 1.0;
-            main[i + 1] += 4.0;
-            main[i + 2] += 1.0;
-            first[i] -= 2.0;
-            first[i + 1] -= 2.0;
-            second[i] += 1.0;
+        for (i, w) in trust.iter().enumerate() {
+            main[i] += w;
+            main[i + 1] += 4.0 * w;
+            main[i + 2] += w;
+            first[i] -= 2.0 * w;
+            first[i + 1] -= 2.0 * w;
+            second[i] += w;
         }
         let (mut d, mut l1, mut l2) = (vec![0.0; n], vec![0.0; n], vec![0.0; n]);
         for i in 0..n {
@@ -126,7 +186,6 @@ impl Pentadiagonal {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use std::f64::consts::TAU;
 
     #[test]
     fn a_sine_comes_back_with_the_stated_gain() {
@@ -151,6 +210,29 @@ mod tests {
         let corner = TAU * CORNER_HZ;
         assert!(z[3000..9000].iter().all(|z| z.abs() < 1e-3));
         assert!(z.iter().all(|z| z.abs() < 1.5 * 0.05 / (corner * corner)));
+    }
+
+    /// An impulse that nothing felt, where accelerations are unsure, does not move the height; where they are sure it does.
+    #[test]
+    fn what_is_unsure_follows_from_its_neighbours() {
+        let (dt, w) = (0.005, TAU * 2.0);
+        let n = 8000;
+        let truth: Vec<f64> = (0..n).map(|i| 0.05 * (w * i as f64 * dt).sin()).collect();
+        let mut a: Vec<f64> = truth.iter().map(|z| -w * w * z).collect();
+        let hole = 4000..4010;
+        a[hole.clone()].iter_mut().for_each(|a| *a += 2.0);
+        let mut unsure = vec![0.0; n];
+        let worst = |unsure: &[f64]| {
+            let z = height_where_sure(&a, unsure, dt, 0.2);
+            let off = (1000..7000).map(|i| (z[i] - truth[i]).abs());
+            off.fold(0.0, f64::max)
+        };
+        let moved = worst(&unsure);
+        unsure[hole].fill(2.0 * 10f64.sqrt());
+        let held = worst(&unsure);
+        // 0.1 m/s for about 1/ω₀.
+        assert!((0.02..0.08).contains(&moved), "{moved}");
+        assert!(held < 0.1 * moved, "{held} {moved}");
     }
 
     #[test]

@@ -21,6 +21,8 @@ pub struct Imu {
     pub ideal: bool,
     /// Probability that a sample is lost, 0 to 1.
     pub dropout: f64,
+    /// Samples that are lost at a time, as a radio loses packets; rows that meet are longer ones.
+    pub dropout_row: u32,
     /// Gyroscope white noise, rad/s/√Hz.
     pub gyro_noise_rad_per_s_per_sqrt_hz: f64,
     /// Gyroscope bias walk, rad/s²/√Hz.
@@ -69,6 +71,8 @@ pub struct Sensor {
 }
 
 const GRAVITY: f64 = 9.80665;
+/// Samples lost at a time: each one asks for all that may have begun before it.
+const LONGEST_ROW: u32 = 1000;
 
 impl Default for Imu {
     fn default() -> Self {
@@ -76,6 +80,7 @@ impl Default for Imu {
             rate_hz: 200.0,
             ideal: false,
             dropout: 0.0,
+            dropout_row: 1,
             gyro_noise_rad_per_s_per_sqrt_hz: 1.6968e-4,
             gyro_bias_walk_rad_per_s2_per_sqrt_hz: 1.9393e-5,
             gyro_bias_sd_rad_per_s: 0.0,
@@ -122,6 +127,8 @@ impl Imu {
             ));
         }
         Checker::within(&key("dropout"), self.dropout, 0.0..=1.0)?;
+        let row = f64::from(self.dropout_row);
+        Checker::within(&key("dropout_row"), row, 1.0..=f64::from(LONGEST_ROW))?;
         for (name, x) in [
             (
                 "gyro_noise_rad_per_s_per_sqrt_hz",
@@ -256,6 +263,7 @@ impl Imu {
                 clock_offset_s: sensor.clock_offset_s,
                 clock,
                 dropout: self.dropout,
+                dropout_row: self.dropout_row,
                 gyroscope,
                 accelerometer,
                 // OK because the number of sensors is far below 2^27.

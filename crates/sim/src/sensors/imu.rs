@@ -81,6 +81,8 @@ pub struct Imu {
     pub clock: usize,
     /// Probability that a sample is lost.
     pub dropout: f64,
+    /// How many are lost at a time.
+    pub dropout_row: u32,
     /// Gyroscope, rad/s.
     pub gyroscope: Triad,
     /// Accelerometer, m/s².
@@ -252,6 +254,16 @@ impl Imu {
         }
     }
 
+    /// Whether one of the rows that reach a tick begins: with probability p a tick is lost if each begins one of n with 1 − (1 − p)^(1/n).
+    fn is_lost(&self, tick: u64) -> bool {
+        let begins = match self.dropout_row {
+            1 => self.dropout,
+            n => 1.0 - (1.0 - self.dropout).powf(1.0 / f64::from(n)),
+        };
+        let first = tick.saturating_sub(u64::from(self.dropout_row) - 1);
+        (first..=tick).any(|k| self.draws.uniform(Use::Dropout, k) <= begins)
+    }
+
     /// The sample of tick `tick`, or nothing when it is lost. To be called for every tick in order: biases walk on.
     pub fn measure(
         &self,
@@ -267,7 +279,7 @@ impl Imu {
                 memory.bias[i] += triads[i / 3].bias_walk / root_rate * z;
             }
         }
-        if self.dropout > 0.0 && self.draws.uniform(Use::Dropout, tick) <= self.dropout {
+        if self.dropout > 0.0 && self.is_lost(tick) {
             return None;
         }
         let noise = if triads.iter().any(|t| t.noise_density > 0.0) {

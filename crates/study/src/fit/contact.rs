@@ -308,13 +308,9 @@ pub(super) fn pendulum(field: &Field, window: Window) -> Result<Vec<Outcome>, St
         return Err("roll or forces have gaps".into());
     }
     let spectrum = |x: &[f64]| {
-        let (about, step_s) = about_mean(t_s, x)?;
-        welch(
-            &about,
-            1.0 / step_s,
-            &Options::seconds(LINE_S, 1.0 / step_s),
-        )
-        .ok()
+        let about = about_mean(t_s, x)?;
+        let rate_hz = 1.0 / about.step_s;
+        welch(&about.x, rate_hz, &Options::seconds(LINE_S, rate_hz)).ok()
     };
     let roll_hz = spectrum(roll).and_then(|roll| roll.peak_hz());
     let roll_hz = roll_hz

@@ -338,6 +338,89 @@ fn a_hole_takes_away_what_it_hides_and_nothing_else() {
     );
 }
 
+/// The twin with a sensor's noise and a wandering step.
+fn noisy_twin() -> (Track, Vec<f64>, Vec<f64>) {
+    let (mut track, roll, height, _) = twin([0.0; 3], UnitQuaternion::identity());
+    let mut random = Random(7);
+    for (readings, sd) in [
+        (&mut track.gyro_rad_per_s, 0.003),
+        (&mut track.accel_m_per_s2, 0.05),
+    ] {
+        let all = readings.iter_mut().flatten();
+        all.for_each(|x| *x += sd * random.normal());
+    }
+    (track, roll, height)
+}
+
+/// Without rows of so many samples, a share of all, that begin anywhere.
+fn without_rows(track: &Track, row: usize, share: f64, seed: u64) -> Track {
+    let mut random = Random(seed);
+    let mut lost = vec![false; track.len()];
+    while (lost.iter().filter(|l| **l).count() as f64) < share * track.len() as f64 {
+        let begin = 1 + (random.uniform() * (track.len() - row - 2) as f64) as usize;
+        if !lost[begin - 1..=begin + row].contains(&true) {
+            lost[begin..begin + row].fill(true);
+        }
+    }
+    let mut kept = Track::default();
+    for (k, _) in lost.iter().enumerate().filter(|(_, lost)| !**lost) {
+        kept.append(track.part(k..k + 1));
+    }
+    kept
+}
+
+#[test]
+fn short_holes_are_drawn_through() {
+    let (track, roll, height) = noisy_twin();
+    let (settings, window) = most();
+    let inner = 1000..7000;
+    let truths = [
+        (
+            "rms_roll_deg",
+            rms(roll[inner.clone()].iter().copied()).to_degrees(),
+        ),
+        ("dz_pp_m", 0.12),
+        ("rms_z_m", rms(height[inner].iter().copied())),
+        ("peak_hz", 2.14),
+        ("roll_peak_hz", 1.07),
+    ];
+    for (row, share) in [(3, 0.03), (10, 0.03), (18, 0.03), (5, 0.1)] {
+        for seed in 1..4 {
+            let found = motion(&without_rows(&track, row, share, seed), &settings).unwrap();
+            assert_eq!(found.stretches.len(), 1, "{row}");
+            assert!(found.left_out_s < 1e-9 && found.again.is_some());
+            let drawn = found.drawn_s() / 40.0;
+            assert!((drawn / share - 1.0).abs() < 0.1, "{drawn} of {share}");
+            let m = metrics(&found, window);
+            for (name, truth) in truths {
+                let [low, high] = m.get(name).unwrap().ci95.unwrap();
+                println!("{row} {share} {name} {low:.4} … {high:.4}, true {truth:.4}");
+                assert!(low < truth && truth < high, "{name} {low} {truth} {high}");
+            }
+        }
+    }
+}
+
+/// A hole that no other hole leaves room to try is not drawn through.
+#[test]
+fn holes_that_nothing_tells_of_part_a_track() {
+    let (track, ..) = noisy_twin();
+    let (settings, _) = most();
+    let mut holed = track.part(0..4000);
+    // Ten samples are lost, four there, ten lost, and so on to the end.
+    for begin in (4010..4400).step_by(14) {
+        holed.append(track.part(begin..begin + 4));
+    }
+    let found = motion(&holed, &settings).unwrap();
+    assert_eq!(found.inputs.t_s.len(), 4000);
+    assert!(found.again.is_none() && found.drawn_s() == 0.0);
+    assert!(
+        (found.left_out_s - 1.96).abs() < 0.04,
+        "{}",
+        found.left_out_s
+    );
+}
+
 #[test]
 fn single_samples_may_be_lost() {
     let (track, roll, height, _) = twin([0.0; 3], UnitQuaternion::identity());
