@@ -477,7 +477,7 @@ mod tests {
             step_s,
             holes,
         } = about_mean(&t, &x).unwrap();
-        assert_eq!((even.len(), holes), (600, vec![200..260]));
+        assert_eq!((even.len(), holes.len(), &holes[0]), (600, 1, &(200..260)));
         assert!(even[200..260].iter().all(|x| *x == 0.0) && (step_s - 0.05).abs() < 1e-12);
         assert!((even[265] - 1.0).abs() < 0.05);
         // Samples that go on beside the places of those before the hole are drawn to them.
@@ -487,7 +487,7 @@ mod tests {
             .map(|t| (std::f64::consts::TAU * t).sin())
             .collect();
         let other = about_mean(&shifted, &moved).unwrap();
-        assert_eq!(other.holes, [200..261]);
+        assert_eq!(other.holes[0], 200..261);
         let after = other.x[262..599].iter().zip(&even[262..599]);
         assert!(after.map(|(a, b)| (a - b).abs()).fold(0.0, f64::max) < 1e-3);
         // A sample years later asks for no memory.

@@ -40,7 +40,7 @@ pub const SHORTEST_S: f64 = 5.0;
 const LEAST_SHARE: f64 = 0.05;
 const GAP_S: f64 = 10.0;
 /// What straight lines may bridge of a swing that lasts a third of a second and more, s.
-const BRIDGED_S: f64 = 0.1;
+const BRIDGED_S: f64 = 0.2;
 /// Steps swing at least this much (RMS), m/s²: a device on a table does not walk.
 const LEAST_SWING_M_PER_S2: f64 = 0.2;
 
