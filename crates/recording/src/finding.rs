@@ -21,6 +21,8 @@ pub enum Kind {
     AbsentField,
     /// Header stamps that are zero.
     ZeroStamp,
+    /// Messages dated long before all others, which no time is counted from.
+    Early,
     /// Times outside what nanoseconds in 63 bits can hold (beyond the year 2262).
     TimeOutOfRange,
     /// A part of the file whose checksum does not match.
@@ -67,6 +69,7 @@ impl Kind {
             Kind::ClockDrift => "clock_drift",
             Kind::AbsentField => "absent_field",
             Kind::ZeroStamp => "zero_stamp",
+            Kind::Early => "early",
             Kind::TimeOutOfRange => "time_out_of_range",
             Kind::BadCrc => "bad_crc",
             Kind::BadChunk => "bad_chunk",
@@ -122,7 +125,7 @@ pub struct Finding {
     pub kind: Kind,
     /// How many times it occurs.
     pub count: u64,
-    /// When it first occurs, seconds since the recording's first message; `None` where time means nothing.
+    /// When it first occurs, seconds since [`Info::start_ns`](crate::read::Info::start_ns); `None` where time means nothing.
     pub t_s: Option<f64>,
     /// One line for people, without the topic.
     pub text: String,

@@ -89,6 +89,65 @@ fn oddities_are_said() {
     );
 }
 
+/// Latched messages stamped with nothing do not make half a century of a minute, in one chunk or many; what is more than an exception, or not far enough
+/// off, does.
+#[test]
+fn a_few_early_messages_begin_no_recording() {
+    let begun = |chunk_bytes: u64, early: i64, before_ns: i64| {
+        let options = WriterOptions {
+            chunk_bytes,
+            ..WriterOptions::default()
+        };
+        let found = recording(&options, |writer| {
+            let value = writer.channel("/a", MessageKind::Float64).expect("opens");
+            for i in 0..1000i64 {
+                // Anywhere in the file.
+                let t_ns = match i % 300 {
+                    7 if i / 300 < early => START_NS - before_ns + i,
+                    _ => START_NS + i * 10_000_000,
+                };
+                let message = recording::cdr::Float64 { data: i as f64 };
+                writer.message(value, t_ns, &message).expect("writes");
+            }
+        });
+        let (said, info) = (lines(&found), found.info());
+        assert_eq!(info.messages, 1000);
+        let said = said.into_iter().find(|line| line.starts_with("early"));
+        ((info.start_ns - START_NS) as f64 / 1e9, info.early, said)
+    };
+    const HOUR_NS: i64 = 3_600_000_000_000;
+    for chunk_bytes in [400, 10_000, 1 << 20] {
+        assert_eq!(
+            begun(chunk_bytes, 3, HOUR_NS),
+            (
+                0.0,
+                3,
+                Some("early 3 messages are dated up to 3600.000 s before all others: seconds are counted from the first of the others".into())
+            ),
+            "{chunk_bytes}"
+        );
+        let (start_s, early, said) = begun(chunk_bytes, 1, START_NS);
+        assert_eq!((start_s, early), (0.0, 1));
+        assert_eq!(
+            said.unwrap(),
+            "early 1 message is dated 1700000000.000 s before all others: seconds are counted from the first of the others"
+        );
+        // Half of what the rest lasts.
+        assert_eq!(begun(chunk_bytes, 1, 5_000_000_000).1, 0);
+    }
+    // Two of a hundred are a part of the recording.
+    let found = recording(&WriterOptions::default(), |writer| {
+        let value = writer.channel("/a", MessageKind::Float64).expect("opens");
+        for i in 0..100i64 {
+            let t_ns = START_NS + i * 10_000_000 + if i < 2 { 0 } else { HOUR_NS };
+            writer
+                .message(value, t_ns, &recording::cdr::Float64 { data: 0.0 })
+                .expect("writes");
+        }
+    });
+    assert_eq!((found.info().start_ns, found.info().early), (START_NS, 0));
+}
+
 #[test]
 fn signals_come_sorted_from_chunks_that_are_not() {
     let options = WriterOptions {

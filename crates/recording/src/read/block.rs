@@ -614,6 +614,7 @@ pub(super) fn scan(data: &[u8], blocks: &[Block], options: &ReadOptions) -> (Def
             if i64::try_from(time).is_ok() {
                 tally.start = Some(tally.start.map_or(time, |start| start.min(time)));
                 tally.end = Some(tally.end.map_or(time, |end| end.max(time)));
+                tally.early.see(time);
             }
         }
     };

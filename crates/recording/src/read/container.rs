@@ -320,6 +320,7 @@ impl Block {
 /// What a chunk's header says.
 pub(super) struct ChunkHeader<'a> {
     pub start_time: u64,
+    pub end_time: u64,
     pub uncompressed: u64,
     pub crc: u32,
     pub compression: &'a [u8],
@@ -343,14 +344,14 @@ pub(super) fn chunk_header(body: &[u8]) -> Option<ChunkHeader<'_>> {
 /// Reads the header of a chunk whose records may be cut off, with the length that they should have: all that follows is theirs.
 pub(super) fn begun_chunk_header(body: &[u8]) -> Option<(ChunkHeader<'_>, u64)> {
     let mut fields = Fields::new(body);
-    let start_time = fields.u64()?;
-    fields.u64()?;
+    let (start_time, end_time) = (fields.u64()?, fields.u64()?);
     let (uncompressed, crc) = (fields.u64()?, fields.u32()?);
     let length = fields.u32()?;
     let compression = fields.take(u64::from(length))?;
     let length = fields.u64()?;
     let header = ChunkHeader {
         start_time,
+        end_time,
         uncompressed,
         crc,
         compression,

@@ -12,6 +12,7 @@ mod collect;
 mod container;
 mod decode;
 mod decoders;
+mod early;
 mod idl;
 mod json;
 mod layout;
@@ -36,6 +37,7 @@ use std::{
 
 use crate::foreign;
 use container::{Container, Damage, Definitions};
+use early::Early;
 
 pub use container::ends_whole;
 pub use decoders::supported;
@@ -127,8 +129,12 @@ pub struct Info {
     pub metadata: BTreeMap<String, BTreeMap<String, String>>,
     /// Names and media types of the attachments, with their sizes in bytes.
     pub attachments: Vec<AttachmentInfo>,
-    /// Log time of the earliest message, ns.
+    /// Log time from which seconds are counted, ns: that of the earliest message, but for a few that are dated long before all others.
     pub start_ns: i64,
+    /// Log time of the earliest message, ns.
+    pub earliest_ns: i64,
+    /// How many messages lie before `start_ns`.
+    pub early: u64,
     /// Log time of the latest message, ns.
     pub end_ns: i64,
     /// How many messages there are.
@@ -320,7 +326,12 @@ impl Recording {
             .and_then(|(_, statistics)| Some(statistics.as_ref()?.messages));
         let searched = trusted.is_none();
         let (definitions, tally) = match (trusted, summary) {
-            (Some(tally), Some((definitions, _))) => (definitions, tally),
+            (Some(mut tally), Some((definitions, _))) => {
+                if early::may_be(&data, &container.blocks, tally.start, tally.end) {
+                    tally.early = block::scan(&data, &container.blocks, options).1.early;
+                }
+                (definitions, tally)
+            }
             (_, summary) => {
                 let (mut definitions, tally) = block::scan(&data, &container.blocks, options);
                 if let Some((others, _)) = summary {
@@ -493,6 +504,7 @@ struct Tally {
     per_channel: BTreeMap<u16, u64>,
     start: Option<u64>,
     end: Option<u64>,
+    early: Early,
 }
 
 /// The summary's counts, if they and its definitions fit what the walk saw.
@@ -525,6 +537,7 @@ fn trusted(container: &Container) -> Option<Tally> {
         per_channel: statistics.per_channel.clone(),
         start: any.then_some(statistics.start),
         end: any.then_some(statistics.end),
+        early: Early::default(),
     })
 }
 
@@ -549,6 +562,8 @@ fn info(container: &Container, definitions: &Definitions, tally: &Tally, trusted
         })
         .collect();
     let time = |time: Option<u64>| time.and_then(|time| i64::try_from(time).ok()).unwrap_or(0);
+    let messages = tally.per_channel.values().sum();
+    let (early, start) = tally.early.before(messages, tally.end).unwrap_or_default();
     Info {
         profile: container.profile.clone(),
         library: container.library.clone(),
@@ -563,9 +578,11 @@ fn info(container: &Container, definitions: &Definitions, tally: &Tally, trusted
                 bytes: attachment.data.len() as u64,
             })
             .collect(),
-        start_ns: time(tally.start),
+        start_ns: time(start.or(tally.start)),
+        earliest_ns: time(tally.start),
+        early,
         end_ns: time(tally.end),
-        messages: tally.per_channel.values().sum(),
+        messages,
         salvaged: !(trusted || container.complete && container.damage.is_empty()),
         skipped_messages: 0,
         warnings: {

@@ -281,6 +281,20 @@ impl<'a> Taker<'a> {
                 text: text.clone(),
             });
         }
+        let info = &recording.info;
+        if info.early > 0 {
+            findings.push(Finding {
+                topic: String::new(),
+                kind: Kind::Early,
+                count: info.early,
+                t_s: None,
+                text: format!(
+                    "{} {:.3} s before all others: seconds are counted from the first of the others",
+                    counted(info.early, "message is dated", "messages are dated up to"),
+                    seconds(info.start_ns, info.earliest_ns)
+                ),
+            });
+        }
         for (topic, text) in &recording.definitions.conflicts {
             findings.push(Finding {
                 topic: topic.clone(),
@@ -468,7 +482,7 @@ impl<'a> Taker<'a> {
                     say(&channel.topic, Kind::BadSummary, 1, text);
                 }
             }
-            let told = (info.start_ns, info.end_ns);
+            let told = (info.earliest_ns, info.end_ns);
             if let Some(found) = self.times.filter(|found| *found != told) {
                 let text = format!(
                     "the summary says that log times go from {:.3} s to {:.3} s after the first, they go from 0 s to {:.3} s",
