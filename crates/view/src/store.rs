@@ -20,6 +20,8 @@ pub const TIME: &str = "time";
 /// Wall-clock time of the messages, where the recording has it.
 pub const UTC: &str = "utc";
 
+/// A message may have been taken so long before the first one was logged.
+const EARLY_NS: i64 = 60_000_000_000;
 /// Stamps below this (2001-09-09) are not taken for wall-clock time: simulated recordings start at 0.
 const FIRST_WALL_CLOCK_NS: i64 = 1_000_000_000_000_000_000;
 
@@ -198,13 +200,16 @@ impl<'s> Store<'s> {
             return Ok(());
         };
         self.progress.last_ns.insert(path.to_owned(), *last);
-        let since = new.iter().map(|t| t.saturating_sub(self.start_ns));
+        // The few that are dated long before all others would make the axis as long.
+        let early_ns = self.start_ns.saturating_sub(EARLY_NS);
+        let dated = new.iter().map(|&t| match t < early_ns {
+            true => self.start_ns,
+            false => t,
+        });
+        let since = dated.clone().map(|t| t.saturating_sub(self.start_ns));
         let mut times = vec![TimeColumn::new_duration_nanos(TIME, since)];
         if self.start_ns >= FIRST_WALL_CLOCK_NS {
-            times.push(TimeColumn::new_timestamp_nanos_since_epoch(
-                UTC,
-                new.iter().copied(),
-            ));
+            times.push(TimeColumn::new_timestamp_nanos_since_epoch(UTC, dated));
         }
         let columns = columns.into_iter().map(|column| SerializedComponentColumn {
             list_array: column.list_array.slice(from, new.len()),
