@@ -1,6 +1,6 @@
 //! When the messages of a topic that feeds metrics were taken: by the log, by their own stamps, or evenly where they came in packets.
 
-use recording::read::Batch;
+use recording::read::{Batch, TAKEN_BEFORE_NS};
 use recording::signal::field_of;
 
 use crate::field::dates::{Dated, dated, delay_s};
@@ -121,7 +121,14 @@ impl Arrivals {
 }
 
 impl Axis {
-    fn new(t_s: Vec<f64>, rows: Vec<usize>, mut remarks: Vec<(&'static str, String)>) -> Self {
+    fn new(
+        mut t_s: Vec<f64>,
+        mut rows: Vec<usize>,
+        mut remarks: Vec<(&'static str, String)>,
+    ) -> Self {
+        let early = t_s.partition_point(|t| *t < -(TAKEN_BEFORE_NS as f64) / 1e9);
+        t_s.drain(..early);
+        rows.drain(..early);
         remarks.extend(uneven(&t_s));
         Axis {
             t_s,
@@ -251,6 +258,16 @@ mod tests {
             assert!(farthest_step_s(&axis) < 1e-4);
             assert_eq!(axis.remarks[0].0, "packets");
         }
+    }
+
+    #[test]
+    fn what_is_dated_long_before_the_recording_is_left_out() {
+        let mut arrivals = Arrivals::default();
+        arrivals.push(&[-3_600_000_000_000], None);
+        (0..300).for_each(|k| arrivals.push(&[taken_ns(k)], None));
+        let axis = arrivals.dated(0, |_, _| false);
+        assert_eq!((axis.t_s.len(), axis.rows[0]), (300, 1));
+        assert!(axis.remarks.is_empty(), "{:?}", axis.remarks);
     }
 
     #[test]

@@ -10,6 +10,7 @@ use re_log_types::external::re_tuid::Tuid;
 use re_log_types::{EntityPath, LogMsg, StoreId, StoreKind};
 use re_sdk_types::archetypes::RecordingInfo;
 use re_sdk_types::{AsComponents, SerializedComponentBatch, SerializedComponentColumn};
+use recording::read::TAKEN_BEFORE_NS;
 
 /// Name under which the viewer files recordings and remembers how the user arranged the views.
 pub const APPLICATION: &str = "rath";
@@ -20,8 +21,6 @@ pub const TIME: &str = "time";
 /// Wall-clock time of the messages, where the recording has it.
 pub const UTC: &str = "utc";
 
-/// A message may have been taken so long before the first one was logged.
-const EARLY_NS: i64 = 60_000_000_000;
 /// Stamps below this (2001-09-09) are not taken for wall-clock time: simulated recordings start at 0.
 const FIRST_WALL_CLOCK_NS: i64 = 1_000_000_000_000_000_000;
 
@@ -201,7 +200,7 @@ impl<'s> Store<'s> {
         };
         self.progress.last_ns.insert(path.to_owned(), *last);
         // The few that are dated long before all others would make the axis as long.
-        let early_ns = self.start_ns.saturating_sub(EARLY_NS);
+        let early_ns = self.start_ns.saturating_sub(TAKEN_BEFORE_NS);
         let dated = new.iter().map(|&t| match t < early_ns {
             true => self.start_ns,
             false => t,

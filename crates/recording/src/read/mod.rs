@@ -116,6 +116,9 @@ pub enum ReadError {
     },
 }
 
+/// A message may have been taken so long before the first one was logged; what is dated further before [`Info::start_ns`] belongs to no time of the recording.
+pub const TAKEN_BEFORE_NS: i64 = 60_000_000_000;
+
 /// What is in a recording.
 #[derive(Clone, Debug, Default)]
 pub struct Info {
