@@ -6,6 +6,10 @@ pub(crate) const EXCEL: &str = "a table of Excel; export CSV instead";
 /// How a file begins, in up to 8 bytes, what it is then, and what to do with it.
 const KINDS: &[(&[u8], &str)] = &[
     (
+        b"\x89MCAP0\r\n",
+        "a recording (MCAP) already; `analyze` reads it as it is",
+    ),
+    (
         b"#ROSBAG",
         "a ROS 1 bag; `mcap convert` makes a recording of it",
     ),

@@ -691,6 +691,18 @@ fn what_is_missing_or_odd_is_named() {
         error("run.bag", "#ROSBAG V2.0\n", None),
         "run.bag: is a ROS 1 bag; `mcap convert` makes a recording of it"
     );
+    let mut writer =
+        RecordingWriter::create(&folder.path().join("a.mcap"), &WriterOptions::default()).unwrap();
+    writer
+        .channel("/a", recording::topics::MessageKind::Float64)
+        .unwrap();
+    writer.finish().unwrap();
+    let already = ingest(folder.path(), &[folder.path().join("a.mcap")], None);
+    let already = already.err().expect("refused").to_string();
+    assert!(
+        already.ends_with("a.mcap: is a recording (MCAP) already; `analyze` reads it as it is"),
+        "{already}"
+    );
     let book = zipped(
         folder.path(),
         "book.xlsx",

@@ -30,7 +30,7 @@ pub(super) struct IngestArgs {
     #[arg(required = true, value_name = "FILE")]
     files: Vec<PathBuf>,
     /// The recording to write; `-` is standard output
-    #[arg(long, value_name = "FILE.mcap")]
+    #[arg(short, long, value_name = "FILE.mcap")]
     out: PathBuf,
     /// How the columns are laid out, where the files do not tell: a TOML file, or a built-in name (docs/recording.md has both)
     #[arg(long, value_name = "NAME|FILE.toml")]
