@@ -178,6 +178,13 @@ impl Judge {
             of_pose = self.metrics(motion, heave, window);
         }
         let walking = carriers.step_s().len();
+        let of_all = |error: &mut Value| {
+            if walking != recorded {
+                error.withhold(format!(
+                    "{walking} of {recorded} carriers walk with a sensor; the truth is that of all"
+                ));
+            }
+        };
         for (name, error) in ERRORS {
             // A metric that came from the sensors itself has no truth beside it, but in the true pose.
             let beside = metrics
@@ -188,10 +195,8 @@ impl Judge {
                 continue;
             };
             let mut error_of = difference(estimate, truth);
-            if walking != recorded && carriers::of_all(name) {
-                error_of.withhold(format!(
-                    "{walking} of {recorded} carriers walk with a sensor; the truth is that of all"
-                ));
+            if carriers::of_all(name) {
+                of_all(&mut error_of);
             }
             if let (Some(sd_m), None, true) = (slow_m, beside, interval::is_of_height(name)) {
                 let said = error_of.reason.take().map(|r| format!("{r}; "));
@@ -245,14 +250,15 @@ impl Judge {
         }
         let walked = metrics.get("step_rate_hz").filter(|v| v.source == "imu");
         if self.step_s.is_empty()
-            && walking == recorded
             && let (Some(true_hz), Some(found)) = (cycles_hz(inputs, window), walked)
         {
             let truth = Value {
                 unit: "Hz",
                 ..Value::number(true_hz)
             };
-            out.push(("step_rate_hz_error", difference(found, &truth)));
+            let mut error = difference(found, &truth);
+            of_all(&mut error);
+            out.push(("step_rate_hz_error", error));
         }
         metrics.0.extend(out);
     }
@@ -722,6 +728,30 @@ mod tests {
         );
         let rate = metrics.number("step_rate_hz_error").unwrap();
         assert!((rate - (40.0 - 39.0) / 20.0).abs() < 0.002, "{rate}");
+        // Of two carriers with phases one has a sensor.
+        let rate = Value {
+            unit: "Hz",
+            ..Value::number(2.0).source("imu")
+        };
+        let mut metrics = Metrics(vec![("step_rate_hz", rate)]);
+        let phase_t_s: Vec<f64> = (0..900).map(|k| f64::from(k) / 30.0).collect();
+        let inputs = Inputs {
+            phase_rad: vec![phase_t_s.iter().map(|t| TAU * 2.1 * t).collect(); 2],
+            phase_t_s,
+            ..Inputs::default()
+        };
+        let judge = Judge {
+            step_s: Vec::new(),
+            ..judge
+        };
+        let none = Metrics::default();
+        judge.errors(None, &carriers, &none, &mut metrics, &inputs, Window::ALL);
+        let error = metrics.get("step_rate_hz_error").unwrap();
+        let why = error.reason.as_deref().unwrap();
+        assert!(
+            error.as_f64().is_none() && why.starts_with("1 of 2 carriers"),
+            "{error:?}"
+        );
     }
 
     /// Two carriers whose phases are known, and no true steps.
