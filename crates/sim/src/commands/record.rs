@@ -43,10 +43,10 @@ pub struct Args {
     tolerance: Option<f64>,
 }
 
-/// Takes a `--seed`; how large it may be, the scene's check says.
+/// Takes a `--seed`.
 fn seed(text: &str) -> Result<u64, String> {
-    text.parse()
-        .map_err(|_| "expected a whole number, 0 or more, below 2^56".into())
+    let seed = text.parse::<u64>().ok().filter(|seed| seed >> 56 == 0);
+    seed.ok_or_else(|| "expected a whole number, 0 or more, below 2^56".into())
 }
 
 const EXAMPLES: &str = "Examples:
@@ -292,6 +292,15 @@ impl Listener for Watch<'_> {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn a_seed_is_what_a_scene_takes() {
+        let most = (1u64 << 56) - 1;
+        assert_eq!(seed(&most.to_string()), Ok(most));
+        for text in ["72057594037927936", "99999999999999999999", "-1", "1.5"] {
+            assert!(seed(text).is_err(), "{text}");
+        }
+    }
 
     #[test]
     fn a_name_does_not_lead_out_of_the_folder() {
