@@ -1,7 +1,7 @@
 //! Short holes in a sensor's samples, drawn through: a radio loses a few samples at a time, and a tilt that began anew behind each hole, without height
 //! near it, would leave nothing of a minute.
 //!
-//! Each axis goes on as the samples beside the hole let expect ([`crate::holes`]). What that may be wrong by is measured: as many samples are left out
+//! Each axis goes on as the samples beside the hole let expect (linear prediction, `holes.rs`). What that may be wrong by is measured: as many samples are left out
 //! half way between two holes as the hole has, and drawn likewise. The motion is estimated once more with those holes too, and what changes by that is what the
 //! holes that are there may have changed.
 
