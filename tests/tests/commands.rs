@@ -42,8 +42,8 @@ fn a_scene_becomes_a_recording_and_the_recording_findings() {
     assert!(warnings.contains("outside the recording"), "{warnings}");
     assert!(found["metrics"]["rms_roll_deg"]["value"].is_null());
     // The report may go into the folder that is made for the figures.
-    let page = ["shown", "report.html"].join("/");
-    let shown = ["music-1001.mcap", "--figures", "shown", "--report", &page];
+    let page = "shown/report.html";
+    let shown = ["music-1001.mcap", "--figures", "shown", "--report", page];
     good(run_in(folder.path(), "analyze", &shown));
     let shown = files(&folder.path().join("shown"));
     assert!(shown.iter().any(|name| name == "report.html") && shown.len() > 5);

@@ -1,7 +1,7 @@
-//! What a signal most likely did in the holes of its record, for transforms: zeros there would tear its lines apart.
+//! What a signal most likely did in the holes of its record: zeros there would tear its lines apart.
 //!
 //! ```text
-//! e_t = Σ_{k=0…p} a_k x_{t−k},   a₀ = 1;      lost x: Σ_{t=p…n−1} e_t² least,      a: by Burg's recursion from what x is so far
+//! Σ_{k=0…p} a_k x_{t−k} = e_t,   a₀ = 1,   e white      lost x: their mean, given the others      a: by Burg's recursion from what x is so far
 //! ```
 //! Three rounds, from zeros on. A signal of lines goes on through a hole as it went before and behind it; noise falls to the mean, as fast as it forgets.
 //! Sources: Janssen, Veldhuis & Vries, IEEE Trans. ASSP 34 (1986) 317 (with the ends' exact covariance in the place of least squares);
@@ -14,8 +14,15 @@ const SAMPLES_PER_COEFFICIENT: usize = 8;
 /// So many products at most to solve for what is lost: of very long records the prediction looks less far back.
 const WORK: f64 = 2e9;
 const ROUNDS: usize = 3;
+/// What is told by fewer samples is told badly.
+const FEWEST: usize = 32;
 /// Of the diagonal, added to it: lines without noise leave nothing else there.
 const RIDGE: f64 = 1e-12;
+
+/// How many samples tell what goes on through a hole, where those of so many seconds do; at most `most`.
+pub fn memory(memory_s: f64, step_s: f64, most: usize) -> usize {
+    ((memory_s / step_s).ceil() as usize).clamp(FEWEST, most)
+}
 
 /// Fills the `lost` parts, which ascend, of an even signal about its mean, by a prediction from so many samples; what is there stays as it is. Zeros
 /// stay where the signal is too short to tell or stands still.

@@ -1,10 +1,9 @@
 //! The strongest line of a signal, and what of its power lies near one.
 
-use crate::holes::fill;
+use crate::holes::{fill, memory};
 use crate::inputs::about_mean;
 use crate::spectrum::{Taper, rfft, rfft_hz, rfft_magnitude};
 use crate::summary::rounding;
-use std::ops::RangeInclusive;
 
 /// Half-width of "near a line", as a share of f.
 pub const NEAR: f64 = 0.1;
@@ -61,16 +60,18 @@ impl Line {
 
 /// What goes on through a hole is told by so much beside it (s): about two steps of a carrier.
 const MEMORY_S: f64 = 1.0;
-/// By no fewer and no more samples.
-const MEMORY: RangeInclusive<usize> = 32..=256;
+/// By no more samples.
+const MEMORY: usize = 256;
 
 /// A signal about its mean on an even axis, drawn through its holes, and the step (s).
 fn whole(t_s: &[f64], x: &[f64]) -> Option<(Vec<f64>, f64)> {
     let mut even = about_mean(t_s, x)?;
     if !even.holes.is_empty() {
-        let samples = (MEMORY_S / even.step_s).ceil() as usize;
-        let samples = samples.clamp(*MEMORY.start(), *MEMORY.end());
-        fill(&mut even.x, &even.holes, samples);
+        fill(
+            &mut even.x,
+            &even.holes,
+            memory(MEMORY_S, even.step_s, MEMORY),
+        );
         let mean = even.x.iter().sum::<f64>() / even.x.len() as f64;
         even.x.iter_mut().for_each(|x| *x -= mean);
     }

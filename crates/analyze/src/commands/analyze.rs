@@ -153,13 +153,13 @@ fn one(path: &Path, args: &AnalyzeArgs, request: &Request) -> anyhow::Result<Ana
             );
         }
     }
-    // The figures' folder may be the place of the report.
-    #[cfg(feature = "figures")]
-    if let Some(folder) = &args.figures {
-        std::fs::create_dir_all(folder)
-            .with_context(|| format!("{}: cannot be made", folder.display()))?;
-    }
     if let Some(out) = &args.report {
+        // The figures' folder may be its place.
+        #[cfg(feature = "figures")]
+        if let Some(folder) = &args.figures {
+            std::fs::create_dir_all(folder)
+                .with_context(|| format!("{}: cannot be made", folder.display()))?;
+        }
         let page = report::html(&analysis, &command_line());
         whole::write_whole(out, |file| file.write_all(page.as_bytes())).with_context(|| {
             format!(

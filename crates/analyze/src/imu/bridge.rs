@@ -6,14 +6,14 @@
 //! holes that are there may have changed.
 
 use super::track::Track;
-use crate::holes::fill;
-use std::ops::{Range, RangeInclusive};
+use crate::holes::{fill, memory};
+use std::ops::Range;
 
 /// The longest hole that is drawn through, s.
 pub const LONGEST_S: f64 = 0.1;
-/// A prediction rests on so much beside a hole, s, and on so many samples.
+/// A prediction rests on so much beside a hole, s, and on no more samples.
 const MEMORY_S: f64 = 0.4;
-const MEMORY: RangeInclusive<usize> = 32..=128;
+const MEMORY: usize = 128;
 
 /// A track without holes.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -50,8 +50,7 @@ pub fn bridge(track: &Track, holes: &[Range<usize>], period_s: f64) -> Option<[D
     }
     let mut both: Vec<Range<usize>> = holes.iter().chain(&probes).cloned().collect();
     both.sort_unstable_by_key(|r| r.start);
-    let samples = (MEMORY_S / period_s).ceil() as usize;
-    let samples = samples.clamp(*MEMORY.start(), *MEMORY.end());
+    let samples = memory(MEMORY_S, period_s, MEMORY);
     let [mut once, mut twice] = [track.clone(), track.clone()];
     for axis in 0..3 {
         draw(&mut once.gyro_rad_per_s, axis, holes, samples);

@@ -76,7 +76,11 @@ pub fn metrics(motion: &Motion, window: Window) -> Metrics {
         .again
         .as_deref()
         .map(|again| (again, metrics_of(again, window, gives)));
-    let number_again = |name: &str| again.as_ref().and_then(|(_, m)| m.number(name));
+    // What as many holes again change.
+    let off = |name: &str, x: f64| {
+        let found = again.as_ref().and_then(|(_, m)| m.number(name));
+        found.map_or(0.0, |again| again - x)
+    };
     let onsets: Vec<f64> = draws
         .iter()
         .filter_map(|d| d.number("onset_time_s"))
@@ -107,8 +111,7 @@ pub fn metrics(motion: &Motion, window: Window) -> Metrics {
         if *name == "onset_time_s" {
             let end_s = motion.inputs.t_s[range.clone()].last().copied();
             let ends = onset_between(x, &onsets, end_s.unwrap_or(x));
-            let off = number_again(name).map_or(0.0, |again| again - x);
-            value.ci95 = Some(apart(ends, x, off));
+            value.ci95 = Some(apart(ends, x, off(name, x)));
             let reason = doubtful(DRAWS - onsets.len(), "none");
             value.reason = value.reason.take().or(reason);
             continue;
@@ -132,8 +135,7 @@ pub fn metrics(motion: &Motion, window: Window) -> Metrics {
             let mean_deg = angle.iter().sum::<f64>().to_degrees() / angle.len() as f64;
             value.datum = Datum::Number(root);
             let ends = tilted(root, ci95, mean_deg, 1.96 * tilt_rad.to_degrees());
-            let off = number_again(name).map_or(0.0, |again| again - x);
-            value.ci95 = Some(apart(ends, root, off));
+            value.ci95 = Some(apart(ends, root, off(name, x)));
             if matches!(motion.settings.mounting, Mounting::Known(_)) {
                 if motion.settings.budget.accel_bias_m_per_s2.is_none() {
                     value.reason = Some(format!(
@@ -148,22 +150,18 @@ pub fn metrics(motion: &Motion, window: Window) -> Metrics {
         }
         if *name == "roll_excess_s" {
             // Swings that keep step with the samples are all counted in one way or all in the other: no standard deviation tells of that.
-            let off = number_again(name).map_or(0.0, |again| again - x);
-            value.ci95 = Some(apart(extremes(x, &drawn), x, off));
+            value.ci95 = Some(apart(extremes(x, &drawn), x, off(name, x)));
             continue;
         }
         let floats = *name == "t_float";
-        let number_again = match &again {
-            Some((again, _)) if floats => Some(t_float(again)),
-            _ => number_again(name),
-        };
         let x = if floats { t_float(&motion.inputs) } else { x };
         let off = match (&again, *name) {
             (Some((again, _)), "dz_pp_m") => {
                 let heights = [&motion.inputs, *again].map(|i| &i.height_m[range.clone()]);
                 farthest_apart(heights) / 1.96
             }
-            _ => number_again.map_or(0.0, |again| again - x),
+            (Some((again, _)), "t_float") => t_float(again) - x,
+            _ => off(name, x),
         };
         let beyond = beyond_the_budget(name, motion, window);
         let half = 1.96 * (variance(&drawn) + beyond.powi(2) + off.powi(2)).sqrt();

@@ -210,11 +210,10 @@ pub fn motion(track: &Track, settings: &Settings) -> Result<Motion, MotionError>
         return Err(too_short());
     }
     let left_out_s = track.t_s[track.len() - 1] - track.t_s[0] - even.seen_s;
-    let [once, twice] = even.drawn;
-    let again = (twice != once)
-        .then(|| of_even(twice, even.stretches.clone(), period_s, settings).ok())
-        .flatten();
-    let mut found = of_even(once, even.stretches, period_s, settings)?;
+    let again = even
+        .again
+        .and_then(|drawn| of_even(drawn, even.stretches.clone(), period_s, settings).ok());
+    let mut found = of_even(even.drawn, even.stretches, period_s, settings)?;
     found.left_out_s = left_out_s;
     found.again = again.map(|again| Box::new(again.inputs));
     Ok(found)
@@ -338,8 +337,10 @@ fn of_even(
 
 /// The samples of the stretches on an even grid each, of the same period.
 struct Evened {
-    /// Without short holes; and drawn with as many again.
-    drawn: [Drawn; 2],
+    /// Without short holes.
+    drawn: Drawn,
+    /// The same with as many holes again, where there are any.
+    again: Option<Drawn>,
     /// Where the stretches are now.
     stretches: Vec<Range<usize>>,
     /// How long they are together, s.
@@ -351,23 +352,23 @@ fn even(track: &Track, whole: &[Range<usize>], period_s: f64) -> Evened {
         dropped: track.dropped,
         ..Track::default()
     };
-    let nothing = Drawn::measured(dropped);
     let mut out = Evened {
-        drawn: [nothing.clone(), nothing],
+        drawn: Drawn::measured(dropped),
+        again: None,
         stretches: Vec::with_capacity(whole.len()),
         seen_s: 0.0,
     };
-    let mut add = |part: [Drawn; 2], span_s: f64| {
-        let first = out.drawn[0].track.len();
-        for (to, part) in out.drawn.iter_mut().zip(part) {
-            to.append(part);
+    let mut add = |drawn: Drawn, again: Option<Drawn>, span_s: f64| {
+        if again.is_some() && out.again.is_none() {
+            out.again = Some(out.drawn.clone());
         }
-        out.stretches.push(first..out.drawn[0].track.len());
+        if let Some(all) = &mut out.again {
+            all.append(again.unwrap_or_else(|| drawn.clone()));
+        }
+        let first = out.drawn.track.len();
+        out.drawn.append(drawn);
+        out.stretches.push(first..out.drawn.track.len());
         out.seen_s += span_s;
-    };
-    let measured = |track: Track| {
-        let drawn = Drawn::measured(track);
-        [drawn.clone(), drawn]
     };
     for range in whole {
         let part = track.part(range.clone());
@@ -375,14 +376,18 @@ fn even(track: &Track, whole: &[Range<usize>], period_s: f64) -> Evened {
         let even = evened(&part, period_s);
         let holes = holes(&part.t_s, &even.t_s, period_s);
         if holes.is_empty() {
-            add(measured(even), span_s(0..part.len()));
-        } else if let Some(drawn) = bridge(&even, &holes, period_s) {
-            add(drawn, span_s(0..part.len()));
+            add(Drawn::measured(even), None, span_s(0..part.len()));
+        } else if let Some([drawn, again]) = bridge(&even, &holes, period_s) {
+            add(drawn, Some(again), span_s(0..part.len()));
         } else {
             for r in part.stretches() {
                 let span_s = span_s(r.clone());
                 if span_s >= SHORTEST_S {
-                    add(measured(evened(&part.part(r), period_s)), span_s);
+                    add(
+                        Drawn::measured(evened(&part.part(r), period_s)),
+                        None,
+                        span_s,
+                    );
                 }
             }
         }

@@ -43,15 +43,13 @@ pub fn height_where_sure(
     period_s: f64,
     corner_hz: f64,
 ) -> Vec<f64> {
-    let mut trust = vec![1.0; accel_up_m_per_s2.len()];
-    let heights = |trust: &[f64]| {
-        [corner_hz, 2.0 * corner_hz].map(|f| weighted(accel_up_m_per_s2, trust, period_s, f))
-    };
     if unsure_m_per_s2.iter().all(|u| *u == 0.0) {
-        return weighted(accel_up_m_per_s2, &trust, period_s, corner_hz);
+        return height(accel_up_m_per_s2, period_s, corner_hz);
     }
+    let mut trust = vec![1.0; accel_up_m_per_s2.len()];
     for _ in 0..ROUNDS {
-        let [all, faster] = heights(&trust);
+        let [all, faster] = [corner_hz, 2.0 * corner_hz]
+            .map(|hz| weighted(accel_up_m_per_s2, &trust, period_s, hz));
         let slow = all.iter().zip(&faster).map(|(a, b)| (a - b).abs());
         let amounts = all.iter().map(|z| z.abs());
         // The free ends swing, and behind a hole may.

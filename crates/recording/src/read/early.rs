@@ -26,7 +26,7 @@ impl Early {
     }
 
     /// How many of so many messages lie further before the rest than the rest lasts, to its `end`, and where the rest begins; `None` where none do.
-    pub fn before(&self, messages: u64, end: Option<u64>) -> Option<(u64, Option<u64>)> {
+    pub fn before(&self, messages: u64, end: Option<u64>) -> Option<(u64, u64)> {
         let (mut times, end) = (self.0.clone().into_vec(), end?);
         times.sort_unstable();
         let few = |early: &usize| *early as u64 * SHARE <= messages;
@@ -34,7 +34,7 @@ impl Early {
         let early = counts
             .filter(|&early| apart(times[early - 1], times[early], end))
             .last()?;
-        Some((early as u64, Some(times[early])))
+        Some((early as u64, times[early]))
     }
 }
 

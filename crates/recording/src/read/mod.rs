@@ -566,7 +566,7 @@ fn info(container: &Container, definitions: &Definitions, tally: &Tally, trusted
         .collect();
     let time = |time: Option<u64>| time.and_then(|time| i64::try_from(time).ok()).unwrap_or(0);
     let messages = tally.per_channel.values().sum();
-    let (early, start) = tally.early.before(messages, tally.end).unwrap_or_default();
+    let early = tally.early.before(messages, tally.end);
     Info {
         profile: container.profile.clone(),
         library: container.library.clone(),
@@ -581,9 +581,9 @@ fn info(container: &Container, definitions: &Definitions, tally: &Tally, trusted
                 bytes: attachment.data.len() as u64,
             })
             .collect(),
-        start_ns: time(start.or(tally.start)),
+        start_ns: time(early.map(|(_, start)| start).or(tally.start)),
         earliest_ns: time(tally.start),
-        early,
+        early: early.map_or(0, |(count, _)| count),
         end_ns: time(tally.end),
         messages,
         salvaged: !(trusted || container.complete && container.damage.is_empty()),
