@@ -245,32 +245,10 @@ const UNEVEN: f64 = 0.1;
 /// Samples closer than this part of a step hold no more than one of them.
 const CLOSE: f64 = 0.2;
 
-/// `x` at its times, which have no hole, or on an even axis of `step_s` from the first of them where steps are not even: samples are lost, or were taken
-/// unevenly. By a cubic spline; by straight lines where samples lie so close together that a spline would follow their noise.
-pub fn evened<'a>(t_s: &'a [f64], x: &'a [f64], step_s: f64) -> [Cow<'a, [f64]>; 2] {
-    if even(t_s, step_s) {
-        return [t_s.into(), x.into()];
-    }
-    let (first, last) = (t_s[0], t_s[t_s.len() - 1]);
-    let steps = ((last - first) / step_s + 1e-6).floor();
-    let at_s: Vec<f64> = (0..=steps as usize)
-        .map(|k| first + k as f64 * step_s)
-        .collect();
-    let x = drawn(t_s, x, step_s, &at_s);
-    [at_s.into(), x.into()]
-}
-
 /// Whether all steps are nearly `step_s`.
 fn even(t_s: &[f64], step_s: f64) -> bool {
     t_s.windows(2)
         .all(|t| ((t[1] - t[0]) / step_s - 1.0).abs() <= UNEVEN)
-}
-
-/// `x` at the times `at_s`, as [`evened`] does it.
-fn drawn(t_s: &[f64], x: &[f64], step_s: f64, at_s: &[f64]) -> Vec<f64> {
-    let close = t_s.windows(2).any(|t| t[1] - t[0] < CLOSE * step_s);
-    let smooth = (!close).then(|| resampled(t_s, x, at_s)).flatten();
-    smooth.unwrap_or_else(|| interpolate(t_s, x, at_s))
 }
 
 /// A signal about its mean on an even axis, 0 in its holes.
@@ -315,8 +293,14 @@ pub fn about_mean(t_s: &[f64], x: &[f64]) -> Option<Even> {
     })
 }
 
-/// A part without a hole on the even axis of `step_s` from `start_s`, and its first place there: as it is where its samples lie on places, else as [`evened`].
-fn on_axis<'a>(t_s: &[f64], x: &'a [f64], start_s: f64, step_s: f64) -> (usize, Cow<'a, [f64]>) {
+/// A part without a hole on the even axis of `step_s` from `start_s`, and its first place there: as it is where each sample lies on a place; else, where
+/// samples are lost or were taken unevenly, by a cubic spline, or by straight lines where samples lie so close together that a spline would follow their noise.
+pub fn on_axis<'a>(
+    t_s: &[f64],
+    x: &'a [f64],
+    start_s: f64,
+    step_s: f64,
+) -> (usize, Cow<'a, [f64]>) {
     let place = |t: f64| (t - start_s) / step_s;
     let [first, last] = [t_s[0], t_s[t_s.len() - 1]].map(place);
     let (begin, end) = (first.round(), last.round());
@@ -331,7 +315,10 @@ fn on_axis<'a>(t_s: &[f64], x: &'a [f64], start_s: f64, step_s: f64) -> (usize, 
         .clone()
         .map(|k| start_s + k as f64 * step_s)
         .collect();
-    (*places.start(), drawn(t_s, x, step_s, &at_s).into())
+    let close = t_s.windows(2).any(|t| t[1] - t[0] < CLOSE * step_s);
+    let smooth = (!close).then(|| resampled(t_s, x, &at_s)).flatten();
+    let x = smooth.unwrap_or_else(|| interpolate(t_s, x, &at_s));
+    (*places.start(), x.into())
 }
 
 /// `x(t)` at the times `at_s` by straight lines between samples; held beyond the ends. Both time axes ascend.
@@ -397,15 +384,17 @@ mod tests {
                 t_s.remove(100);
                 x.remove(100);
             }
-            let [at_s, found] = evened(&t_s, &x, 1.0 / 30.0);
-            assert_eq!(at_s.len(), 300);
-            for (t, x) in at_s.iter().zip(found.iter()) {
+            let (0, found) = on_axis(&t_s, &x, 0.0, 1.0 / 30.0) else {
+                panic!("it begins with the axis");
+            };
+            assert_eq!(found.len(), 300);
+            for (t, x) in even.iter().zip(found.iter()) {
                 assert!((x - swing(t)).abs() < off, "{t}: {x}");
             }
         }
         assert!(matches!(
-            evened(&even, &even, 1.0 / 30.0),
-            [Cow::Borrowed(_), Cow::Borrowed(_)]
+            on_axis(&even, &even, 0.0, 1.0 / 30.0),
+            (0, Cow::Borrowed(_))
         ));
     }
 

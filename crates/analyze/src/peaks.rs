@@ -2,7 +2,7 @@
 
 use serde::Serialize;
 
-use crate::inputs::{Window, evened, mean_step_s, stretches};
+use crate::inputs::{Window, mean_step_s, on_axis, stretches};
 use crate::median::median;
 use crate::spectrum::{DEFAULT_SEGMENT_S, Options, Spectrum, welch};
 use crate::summary::{ends, moves, squares};
@@ -108,7 +108,7 @@ impl SpectrumSummary {
         let step_s = mean_step_s(t_s)?;
         let fs_hz = 1.0 / step_s;
         let still = vec![0.0; x.len()];
-        let [_, x] = evened(t_s, if moves(x) { x } else { &still }, step_s);
+        let (_, x) = on_axis(t_s, if moves(x) { x } else { &still }, t_s[0], step_s);
         let spectrum = welch(&x, fs_hz, &Options::seconds(DEFAULT_SEGMENT_S, fs_hz)).ok()?;
         Some(SpectrumSummary::new(spectrum, f_hz, unit))
     }

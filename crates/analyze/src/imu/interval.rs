@@ -85,6 +85,11 @@ pub fn metrics(motion: &Motion, window: Window) -> Metrics {
         .iter()
         .filter_map(|d| d.number("onset_time_s"))
         .collect();
+    let by_holes = |found: bool| {
+        let again = again.as_ref()?.1.number("onset_time_s").is_some();
+        let what = if found { "none" } else { "one" };
+        (again != found).then(|| format!("with as many holes again {what} would be found"))
+    };
     let range = window.range(&motion.inputs.t_s);
     let t_float = |inputs: &Inputs| floating(&inputs.support_ratio[range.clone()]);
     let rate_hz = rate_hz(&motion.inputs);
@@ -102,7 +107,8 @@ pub fn metrics(motion: &Motion, window: Window) -> Metrics {
             } else {
                 onsets.len()
             };
-            value.reason = doubtful(others, if found { "none" } else { "one" });
+            let other = if found { "none" } else { "one" };
+            value.reason = doubtful(others, other).or_else(|| by_holes(found));
             continue;
         }
         let Datum::Number(x) = value.datum else {
@@ -112,8 +118,8 @@ pub fn metrics(motion: &Motion, window: Window) -> Metrics {
             let end_s = motion.inputs.t_s[range.clone()].last().copied();
             let ends = onset_between(x, &onsets, end_s.unwrap_or(x));
             value.ci95 = Some(apart(ends, x, off(name, x)));
-            let reason = doubtful(DRAWS - onsets.len(), "none");
-            value.reason = value.reason.take().or(reason);
+            let reason = || doubtful(DRAWS - onsets.len(), "none").or_else(|| by_holes(true));
+            value.reason = value.reason.take().or_else(reason);
             continue;
         }
         let draws = if MEAN_SQUARES.contains(name) {

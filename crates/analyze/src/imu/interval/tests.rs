@@ -458,6 +458,32 @@ fn an_onset_that_all_would_find_is_not_doubtful() {
     assert_eq!(found.get("unstable").unwrap().as_bool(), Some(true));
 }
 
+/// An onset that holes may have made, or hidden, is told as one.
+#[test]
+fn an_onset_that_holes_decide_is_said_to_be() {
+    let onset = |t: f64| 0.1 * (1.0 + ((t - 20.0) / 0.5).tanh()) * 3.0 * (TAU * 1.07 * t).sin();
+    let rest = |_: f64| 0.0;
+    let felt = |roll: fn(f64) -> f64| felt(roll, |_| 1.0, 1.0, [0.0; 3], AS_IT_SITS, Some(0.0));
+    for (roll, as_many, name, said) in [
+        (
+            onset as fn(f64) -> f64,
+            rest as fn(f64) -> f64,
+            "unstable",
+            Some("none"),
+        ),
+        (onset, rest, "onset_time_s", Some("none")),
+        (rest, onset, "unstable", Some("one")),
+        (onset, onset, "unstable", None),
+        (rest, rest, "unstable", None),
+    ] {
+        let mut found = felt(roll);
+        found.again = Some(Box::new(felt(as_many).inputs));
+        let found = metrics(&found, MOST);
+        let said = said.map(|what| format!("with as many holes again {what} would be found"));
+        assert_eq!(found.get(name).unwrap().reason, said, "{name}");
+    }
+}
+
 /// Peaks that an accelerometer lost are in what it alone tells; all else that is lost is in the attitude, and by it in everything.
 #[test]
 fn what_rests_on_what_was_lost_has_no_interval() {
