@@ -28,20 +28,23 @@ pub fn memory(memory_s: f64, step_s: f64, most: usize) -> usize {
 /// stay where the signal is too short to tell or stands still.
 pub fn fill(x: &mut [f64], lost: &[Range<usize>], samples: usize) {
     let lost: Vec<usize> = lost.iter().cloned().flatten().collect();
-    let affordable = (WORK / lost.len().max(1) as f64).sqrt() as usize;
-    let order = samples
-        .min(x.len() / SAMPLES_PER_COEFFICIENT)
-        .min(affordable);
-    lost.iter().for_each(|&t| x[t] = 0.0);
-    if lost.is_empty() || order == 0 {
+    if lost.is_empty() {
         return;
     }
+    lost.iter().for_each(|&t| x[t] = 0.0);
+    let order = order(samples, x.len(), lost.len());
     for _ in 0..ROUNDS {
         let Some(filled) = prediction(x, order).and_then(|a| expected(x, &lost, &a)) else {
             return;
         };
         lost.iter().zip(filled).for_each(|(&t, value)| x[t] = value);
     }
+}
+
+/// How far back a prediction of `lost` of `n` samples looks that may look back by `samples`.
+fn order(samples: usize, n: usize, lost: usize) -> usize {
+    let affordable = (WORK / lost as f64).sqrt() as usize;
+    samples.min(n / SAMPLES_PER_COEFFICIENT).min(affordable)
 }
 
 /// a₀ … a_p of the prediction error of a signal by Burg's recursion; `None` for one that is not finite or does not move.
@@ -236,6 +239,17 @@ mod tests {
         for (a, b) in found.iter().zip(dense.iter()) {
             assert!((a - b).abs() < 1e-9, "{a} {b}");
         }
+    }
+
+    #[test]
+    fn a_prediction_looks_back_as_far_as_the_record_and_the_work_allow() {
+        assert_eq!(memory(0.4, 0.005, 128), 80);
+        assert_eq!(memory(0.4, 0.05, 128), FEWEST);
+        assert_eq!(memory(0.4, 0.0005, 128), 128);
+        assert_eq!(order(256, 100_000, 10), 256);
+        assert_eq!(order(256, 800, 10), 100);
+        // 200,000 · 100² products.
+        assert_eq!(order(256, 2_000_000, 200_000), 100);
     }
 
     /// Burg's coefficients of a sampled x_t = 1.5 x_{t−1} − 0.9 x_{t−2} + e_t.

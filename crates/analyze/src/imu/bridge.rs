@@ -108,3 +108,102 @@ fn probes(holes: &[Range<usize>], len: usize) -> Vec<Range<usize>> {
     });
     between.collect()
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::random::Random;
+    use std::f64::consts::TAU;
+
+    const PERIOD_S: f64 = 0.01;
+
+    fn track(reading: impl Fn(usize) -> [[f64; 3]; 2]) -> Track {
+        let mut track = Track::default();
+        for k in 0..2000 {
+            let [gyro, accel] = reading(k);
+            track.t_s.push(PERIOD_S * k as f64);
+            track.gyro_rad_per_s.push(gyro);
+            track.accel_m_per_s2.push(accel);
+        }
+        track
+    }
+
+    /// A hole of `len` samples every two seconds.
+    fn every_two_seconds(len: usize) -> Vec<Range<usize>> {
+        (1..10).map(|k| 200 * k..200 * k + len).collect()
+    }
+
+    #[test]
+    fn as_many_again_lie_half_way_where_there_is_room() {
+        // Nine samples behind three lost ones are room for three more, five behind two are too few for two.
+        let found = probes(&[10..13, 22..24, 29..30], 40);
+        assert_eq!(found, [16..19, 34..35]);
+    }
+
+    /// Swings about gravity and a turn go on through holes; what was measured stays as it is and is sure.
+    #[test]
+    fn a_motion_goes_on_through_holes() {
+        let swing = |k: usize, hz: f64| (TAU * hz * PERIOD_S * k as f64).sin();
+        let truth = track(|k| {
+            [
+                [0.5 + swing(k, 1.1), 0.0, 0.1 * swing(k, 2.2)],
+                [0.3 * swing(k, 1.1), -1.0, 9.81 + 4.0 * swing(k, 2.2)],
+            ]
+        });
+        let holes = every_two_seconds(8);
+        let lost = |k: usize| holes.iter().any(|h| h.contains(&k));
+        let mut holed = truth.clone();
+        for k in (0..holed.len()).filter(|k| lost(*k)) {
+            holed.gyro_rad_per_s[k] = [7.0; 3];
+            holed.accel_m_per_s2[k] = [7.0; 3];
+        }
+        let [once, twice] = bridge(&holed, &holes, PERIOD_S).unwrap();
+        for drawn in [&once, &twice] {
+            let both = [
+                (&drawn.track.gyro_rad_per_s, &truth.gyro_rad_per_s),
+                (&drawn.track.accel_m_per_s2, &truth.accel_m_per_s2),
+            ];
+            for (found, truth) in both {
+                for (found, truth) in found.iter().flatten().zip(truth.iter().flatten()) {
+                    assert!((found - truth).abs() < 0.02, "{found} {truth}");
+                }
+            }
+            assert!(drawn.unsure_m_per_s2.iter().all(|u| *u < 0.05));
+        }
+        for k in (0..truth.len()).filter(|k| !lost(*k)) {
+            let same = once.track.accel_m_per_s2[k] == truth.accel_m_per_s2[k];
+            assert!(same && once.unsure_m_per_s2[k] == 0.0);
+        }
+        assert!(once.unsure_m_per_s2[200] > 0.0 && twice.unsure_m_per_s2[300] > 0.0);
+    }
+
+    /// Nothing is told of white noise of deviation σ but its mean: each sample is off by σ, and errors without memory are σ.
+    #[test]
+    fn of_noise_nothing_is_known() {
+        let noise = |seed: u64, sd: f64| {
+            let mut random = Random(seed);
+            (0..2000)
+                .map(|_| sd * random.normal())
+                .collect::<Vec<f64>>()
+        };
+        let [x, y, z] = [(1, 0.1), (2, 0.7), (3, 0.2)].map(|(seed, sd)| noise(seed, sd));
+        let track = track(|k| [[0.0; 3], [5.0 + x[k], y[k], 9.8 + z[k]]]);
+        let mut squares = 0.0;
+        let lengths = [2, 4, 8];
+        for len in lengths {
+            let holes = every_two_seconds(len);
+            let [once, _] = bridge(&track, &holes, PERIOD_S).unwrap();
+            squares += once.unsure_m_per_s2[200].powi(2) / lengths.len() as f64;
+        }
+        // Of 27 probes: 14 %, twice.
+        assert!((squares.sqrt() / 0.7 - 1.0).abs() < 0.28, "{squares}");
+    }
+
+    #[test]
+    fn where_nothing_tells_how_well_nothing_is_drawn() {
+        let track = track(|_| [[0.0; 3], [0.0, 0.0, 9.8]]);
+        let crowded: Vec<_> = (1..100).map(|k| 20 * k..20 * k + 9).collect();
+        assert!(bridge(&track, &crowded, PERIOD_S).is_none());
+        assert!(bridge(&track, &crowded[50..51], PERIOD_S).is_some());
+    }
+}

@@ -233,6 +233,71 @@ mod tests {
         assert!(held < 0.1 * moved, "{held} {moved}");
     }
 
+    /// What a jolt in a hole moves the height by falls with how unsure it is; where nothing is known, it moves nothing.
+    #[test]
+    fn the_less_sure_the_less_it_moves() {
+        let (dt, w) = (0.005, TAU * 2.0);
+        let n = 8000;
+        let truth: Vec<f64> = (0..n).map(|i| 0.05 * (w * i as f64 * dt).sin()).collect();
+        let hole = 4000..4010;
+        let off = |jolt: f64, unsure_m_per_s2: f64| {
+            let mut a: Vec<f64> = truth.iter().map(|z| -w * w * z).collect();
+            a[hole.clone()].iter_mut().for_each(|a| *a += jolt);
+            let mut unsure = vec![0.0; n];
+            unsure[hole.clone()].fill(unsure_m_per_s2);
+            let z = height_where_sure(&a, &unsure, dt, 0.2);
+            let off = (1000..7000).map(|i| (z[i] - truth[i]).abs());
+            off.fold(0.0, f64::max)
+        };
+        let moved = [0.0, 0.03, 0.1, 0.3, 1.0, 10.0].map(|unsure| off(2.0, unsure));
+        assert!(moved.windows(2).all(|m| m[1] < m[0]), "{moved:?}");
+        // What is left is the bend that nobody knows.
+        let [some, much] = [0.0, 100.0].map(|jolt| off(jolt, 1e6));
+        assert!((much - some).abs() < 1e-6, "{some} {much}");
+    }
+
+    /// The same as from the normal equations as they stand, dense.
+    #[test]
+    fn bands_are_the_normal_equations() {
+        use crate::random::Random;
+        use nalgebra::{DMatrix, DVector};
+        let (n, dt, corner_hz) = (40, 0.01, 0.5);
+        let mut random = Random(4);
+        let a: Vec<f64> = (0..n).map(|_| random.normal()).collect();
+        let trust: Vec<f64> = (0..n).map(|i| [1.0, 0.3, 1e-3][i * i % 7 % 3]).collect();
+        let d = DMatrix::from_fn(n - 2, n, |r, c| match c.checked_sub(r) {
+            Some(0 | 2) => 1.0,
+            Some(1) => -2.0,
+            _ => 0.0,
+        });
+        let least = |r: usize| trust[r..r + 3].iter().copied().fold(1.0, f64::min);
+        let w = DMatrix::from_diagonal(&DVector::from_fn(n - 2, |r, _| least(r)));
+        let felt = DVector::from_fn(n - 2, |r, _| {
+            (a[r] + 10.0 * a[r + 1] + a[r + 2]) / 12.0 * dt * dt
+        });
+        let hold = DMatrix::identity(n, n) * (TAU * corner_hz * dt).powi(4);
+        let normal = d.transpose() * &w * &d + hold;
+        let dense = normal.lu().solve(&(d.transpose() * w * felt)).unwrap();
+        let found = weighted(&a, &trust, dt, corner_hz);
+        let size = dense.amax();
+        for (a, b) in found.iter().zip(dense.iter()) {
+            assert!((a - b).abs() < 1e-8 * size, "{a} {b}");
+        }
+    }
+
+    /// At 1 kHz the condition is 10¹⁴: what one solution leaves of the digits the refinements bring back.
+    #[test]
+    fn fast_samples_keep_their_digits() {
+        let (dt, w) = (0.001, TAU * 2.0);
+        let n = 60_000;
+        let a: Vec<f64> = (0..n).map(|i| -w * w * (w * i as f64 * dt).sin()).collect();
+        let z = height(&a, dt, 0.1);
+        let gain = 1.0 / (1.0 + (0.1f64 / 2.0).powi(4));
+        let off = (n / 3..2 * n / 3).map(|i| (z[i] - gain * (w * i as f64 * dt).sin()).abs());
+        let worst = off.fold(0.0, f64::max);
+        assert!(worst < 1e-5, "{worst}");
+    }
+
     #[test]
     fn very_short_input_is_not_an_error() {
         assert_eq!(height(&[1.0, 2.0], 0.01, 0.1), [0.0, 0.0]);
