@@ -3,6 +3,7 @@
 
 use crate::spectrum::stream::WelchStream;
 use crate::spectrum::{DEFAULT_SEGMENT_S, Options, Spectrum};
+use std::collections::BTreeMap;
 
 /// What a signal came to.
 #[derive(Clone, Debug, PartialEq, serde::Serialize)]
@@ -140,11 +141,8 @@ pub struct Times {
     latest_ns: i64,
     steps: Moments,
     buffer: Vec<f64>,
-    /// Steps of ordinary length, and their sum (s).
-    ordinary: u64,
-    ordinary_s: f64,
-    /// The first steps, which are judged together: the number of messages that share the time after each, and its length (s).
-    first: Vec<(u64, f64)>,
+    /// Steps by their length, four to an octave: how many messages came with them, and their sum (s).
+    lengths: BTreeMap<u16, (u64, f64)>,
     /// Messages that share the time of the last.
     shared: u64,
     /// Sum of the steps back (s).
@@ -161,23 +159,11 @@ pub struct Gap {
     pub missing: u64,
 }
 
-/// A step so many times the mean of those before it is a gap; the first few are measured against their median.
+/// A step so many times the mean of those that are none is a gap, once so many messages have come with steps.
 const GAP: f64 = 10.0;
-const FIRST: usize = 16;
+const FIRST: u64 = 16;
 /// Steps back that together are a larger share of the span than this put a signal out of order.
 const MUCH_BACK: f64 = 0.01;
-
-/// Of some steps those that are no gaps beside the median: how many messages came with them, and their sum (s).
-fn ordinary(steps: &[(u64, f64)]) -> (u64, f64) {
-    let each = |(n, s): &(u64, f64)| s / *n as f64;
-    let mut sorted: Vec<f64> = steps.iter().map(each).collect();
-    sorted.sort_by(f64::total_cmp);
-    let most = sorted
-        .get((sorted.len().max(1) - 1) / 2)
-        .map_or(0.0, |m| GAP * m);
-    let kept = steps.iter().filter(|s| each(s) <= most);
-    kept.fold((0, 0.0), |(n, sum), s| (n + s.0, sum + s.1))
-}
 
 impl Times {
     /// The next log times.
@@ -199,6 +185,7 @@ impl Times {
             self.earliest_ns = self.earliest_ns.min(*t);
             self.latest_ns = self.latest_ns.max(*t);
         }
+        let mut came = Vec::with_capacity(self.buffer.len());
         for (k, step) in self.buffer.iter().enumerate() {
             // Messages that came together share the step to them; a clock that steps back tells no rate.
             if *step <= 0.0 {
@@ -207,26 +194,46 @@ impl Times {
                 continue;
             }
             let messages = std::mem::take(&mut self.shared) + 1;
-            if self.ordinary == 0 {
-                self.first.push((messages, *step));
-                if self.first.len() == FIRST {
-                    (self.ordinary, self.ordinary_s) = ordinary(&self.first);
-                }
-            } else if *step * self.ordinary as f64 <= GAP * self.ordinary_s * messages as f64 {
-                // Against the mean of those before, without a division for every message.
-                self.ordinary += messages;
-                self.ordinary_s += step;
-            } else {
-                let periods = (step * self.ordinary as f64 / self.ordinary_s).round() as u64;
-                self.gaps.push(Gap {
-                    before: k + place,
-                    missing: periods.saturating_sub(messages),
-                });
-            }
+            let each = (step / messages as f64).to_bits() >> 50;
+            let (n, sum_s) = self.lengths.entry(each as u16).or_default();
+            *n += messages;
+            *sum_s += step;
+            came.push((k + place, messages, *step));
+        }
+        let (n, sum_s) = self.ordinary();
+        if n >= FIRST {
+            let per_s = n as f64 / sum_s;
+            let gaps = came.into_iter().filter_map(|(before, messages, step)| {
+                let periods = step * per_s;
+                (periods > GAP * messages as f64).then(|| Gap {
+                    before,
+                    missing: (periods.round() as u64).saturating_sub(messages),
+                })
+            });
+            self.gaps.extend(gaps);
         }
         self.count += times_ns.len() as u64;
         self.last_ns = last;
         self.steps.push_finite(&self.buffer);
+    }
+
+    /// Steps that are no gaps: how many messages came with them, and their sum (s). From all steps on, the longest are left out for as long as they are
+    /// gaps beside the mean of the rest: that a queue was emptied at once does not make ordinary steps gaps.
+    fn ordinary(&self) -> (u64, f64) {
+        let mut most_s = f64::INFINITY;
+        let mut found = (0, 0.0);
+        loop {
+            let kept = self
+                .lengths
+                .values()
+                .filter(|(n, s)| s / *n as f64 <= most_s);
+            let (n, sum_s) = kept.fold((0, 0.0), |(n, sum), s| (n + s.0, sum + s.1));
+            if n == found.0 {
+                return found;
+            }
+            found = (n, sum_s);
+            most_s = GAP * sum_s / n as f64;
+        }
     }
 
     /// Where messages were lost in the batch that was pushed last; known once the first steps have shown the rate.
@@ -258,10 +265,7 @@ impl Times {
 
     /// Rate between gaps (Hz): that of the samples, which lost ones do not slow down.
     pub fn hz_between_gaps(&self) -> Option<f64> {
-        let (count, sum_s) = match self.ordinary {
-            0 => ordinary(&self.first),
-            n => (n, self.ordinary_s),
-        };
+        let (count, sum_s) = self.ordinary();
         (count > 0 && sum_s > 0.0)
             .then(|| count as f64 / sum_s)
             .or(self.hz())
@@ -491,6 +495,37 @@ mod tests {
         let mut odd = Times::default();
         odd.push(&[i64::MIN, i64::MAX, 5]);
         assert!(odd.hz().unwrap() > 0.0);
+    }
+
+    /// A queue that is emptied at once, at the beginning or all the time, changes no rate, and hides no gap.
+    #[test]
+    fn bursts_do_not_change_the_rate() {
+        let flushed = |n: i64| move |k: i64| (k - n).max(0) * 10_000_000 + k.min(n) * 100_000;
+        let pairs = |k: i64| k / 2 * 20_000_000 + k % 2 * 50_000;
+        let twins = |k: i64| k / 2 * 20_000_000 + k % 2 * 3;
+        let cases: [(&str, Box<dyn Fn(i64) -> i64>); 5] = [
+            ("12 flushed", Box::new(flushed(12))),
+            ("50 flushed", Box::new(flushed(50))),
+            ("200 flushed", Box::new(flushed(200))),
+            ("pairs", Box::new(pairs)),
+            ("twins", Box::new(twins)),
+        ];
+        for (what, at) in cases {
+            for batch in [1, 64, 60_000] {
+                let ns: Vec<i64> = (0..60_000)
+                    .map(|k| at(k) + if k < 30_000 { 0 } else { 5_000_000_000 })
+                    .collect();
+                let (mut times, mut gaps) = (Times::default(), 0);
+                for (b, ns) in ns.chunks(batch).enumerate() {
+                    times.push(ns);
+                    let late = |gap: &&Gap| b * batch + gap.before > 300;
+                    gaps += times.gaps().iter().filter(late).count();
+                }
+                let hz = times.hz_between_gaps().unwrap();
+                assert!((hz - 100.0).abs() < 0.5, "{what} {batch}: {hz}");
+                assert_eq!(gaps, 1, "{what} {batch}");
+            }
+        }
     }
 
     #[test]

@@ -894,6 +894,74 @@ fn a_signal_is_the_same_in_whatever_order_it_comes() {
     }
 }
 
+/// A field that some messages lack, from somewhere on or in between, has the rate and the jitter of the messages that have it.
+#[test]
+fn a_field_has_the_times_of_its_messages() {
+    let folder = tempfile::tempdir().unwrap();
+    let has = |k: usize, name: &str| match name {
+        "all" => true,
+        "thinned" => k < 5000 || k % 5 == 0,
+        "held" => !(2000..4000).contains(&k),
+        _ => k >= 1000,
+    };
+    let names = ["all", "thinned", "held", "late"];
+    let message = |k: usize| {
+        let there = names.iter().filter(|name| has(k, name));
+        let fields: Vec<String> = there.map(|name| format!("\"{name}\":{k}")).collect();
+        (k as f64 / 100.0, format!("{{{}}}", fields.join(",")))
+    };
+    let file = told(folder.path(), &[("/a", (0..6000).map(message).collect())]);
+    let found = json(&[&file, "--format", "json"]);
+    for name in names {
+        let t: Vec<f64> = (0..6000)
+            .filter(|k| has(*k, name))
+            .map(|k| k as f64 / 100.0)
+            .collect();
+        let steps = (t.len() - 1) as f64;
+        let mean_s = (t[t.len() - 1] - t[0]) / steps;
+        let squares = t.windows(2).map(|w| (w[1] - w[0] - mean_s).powi(2));
+        let jitter_s = (squares.sum::<f64>() / steps).sqrt();
+        let signal = &found["signals"][format!("/a.{name}")];
+        let number = |key: &str| signal[key].as_f64().unwrap();
+        assert_eq!(number("count"), t.len() as f64, "{name}");
+        assert!(
+            (number("hz") * mean_s - 1.0).abs() < 1e-9,
+            "{name}: {signal}"
+        );
+        assert!(
+            (number("jitter_s") - jitter_s).abs() < 1e-9,
+            "{name}: {signal}"
+        );
+    }
+}
+
+/// A topic that runs for a small part of the recording, one message to a chunk, has segments as long as any other.
+#[test]
+fn a_short_topic_of_a_long_recording_has_a_spectrum() {
+    let folder = tempfile::tempdir().unwrap();
+    let padding = "x".repeat(4200);
+    let swing = |k: u32| {
+        let t = f64::from(k) / 100.0;
+        let text = format!("{{\"v\":{},\"image\":\"{padding}\"}}", tone(1.8, t));
+        (1000.0 + t, text)
+    };
+    let ends = vec![(0.0, "1".to_owned()), (3600.0, "2".to_owned())];
+    let channels = [("/ends", ends), ("/a", (0..2500).map(swing).collect())];
+    let found = json(&[
+        &told(folder.path(), &channels),
+        "--format",
+        "json",
+        "--signal",
+        "/a.v",
+    ]);
+    let lines = &found["spectra"]["/a.v"];
+    assert!(lines["segment_s"].as_f64().unwrap() > 10.0, "{lines}");
+    assert!(
+        (lines["peak_hz"].as_f64().unwrap() - 1.8).abs() < 0.02,
+        "{lines}"
+    );
+}
+
 /// A topic that covers a part of the window, and quaternions that are none.
 #[test]
 fn what_metrics_lack_is_said() {

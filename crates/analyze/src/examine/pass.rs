@@ -29,6 +29,12 @@ pub(super) struct Entry {
     pub lines: bool,
     pub role: Option<Role>,
     pub stream: Stream,
+    /// Values that came before times told a rate, which the length of the segments follows; `None` since then.
+    waiting: Option<Vec<f64>>,
+    /// How many values there may be.
+    most: u64,
+    /// How many came.
+    came: u64,
     /// Times of its own where not every message has it.
     pub times: Option<Times>,
     /// Kept values, where it plays a role, and of which messages of the topic they are.
@@ -38,16 +44,36 @@ pub(super) struct Entry {
 }
 
 impl Entry {
+    /// The next values; `times` are those up to them.
+    fn take(&mut self, x: &[f64], finite: bool, times: &Times, window_s: f64) {
+        if let Some(waiting) = &mut self.waiting
+            && times.count() < FEW
+        {
+            waiting.extend_from_slice(x);
+            return;
+        }
+        self.begin(times, window_s);
+        self.stream.push(x, finite, times.gaps());
+    }
+
+    /// Takes what waited, at the rate that the times tell.
+    fn begin(&mut self, times: &Times, window_s: f64) {
+        let Some(waiting) = self.waiting.take() else {
+            return;
+        };
+        let hz = times.hz_between_gaps().unwrap_or(0.0);
+        let most = self.most.min((window_s * hz).ceil() as u64);
+        let nperseg = if self.lines { segment(hz, most) } else { 0 };
+        self.stream = Stream::new(hz, nperseg);
+        self.stream.push(&waiting, false, &[]);
+    }
+
     /// Takes all values anew, in the order of their times.
     fn take_sorted(&mut self, (times_ns, x): (Vec<i64>, Vec<f64>)) {
         let mut times = Times::default();
         times.push(&times_ns);
-        let hz = times.hz_between_gaps().unwrap_or(0.0);
-        let nperseg = match self.lines {
-            true => segment(hz, x.len() as u64),
-            false => 0,
-        };
-        self.stream = Stream::new(hz, nperseg);
+        (self.waiting, self.most) = (Some(Vec::new()), x.len() as u64);
+        self.begin(&times, f64::INFINITY);
         self.stream.push(&x, false, times.gaps());
         self.times = Some(times);
     }
@@ -69,9 +95,11 @@ pub(super) struct Pass<'a> {
     pub row: usize,
     /// By first channel of a topic: when its messages were taken, where it feeds metrics.
     pub axes: HashMap<usize, Axis>,
-    /// Rough rate of each channel, for the length of the segments (Hz).
-    pub rough_hz: Vec<f64>,
     pub entries: Vec<Entry>,
+    /// By channel: entries that every message so far has had, whose times are the channel's.
+    pub whole: Vec<Vec<usize>>,
+    /// Times of the batch's channel before the batch.
+    before: Times,
     /// Entry of a column of the stream.
     pub by_column: Vec<Option<usize>>,
     /// Entries of the angles of a quaternion, by the path of the quaternion.
@@ -83,14 +111,6 @@ pub(super) struct Pass<'a> {
 impl<'a> Pass<'a> {
     pub(super) fn new(recording: &'a Recording, request: &'a Request, roles: &'a Roles) -> Self {
         let info = recording.info();
-        let span_s = (info.end_ns.saturating_sub(info.start_ns)) as f64 / 1e9;
-        let rough = |messages: u64| {
-            if span_s > 0.0 {
-                messages.saturating_sub(1) as f64 / span_s
-            } else {
-                0.0
-            }
-        };
         let mut known = HashMap::new();
         let mut messages = vec![0; info.channels.len()];
         let mut first = Vec::with_capacity(info.channels.len());
@@ -109,8 +129,9 @@ impl<'a> Pass<'a> {
             request,
             roles,
             times: vec![Times::default(); info.channels.len()],
-            rough_hz: info.channels.iter().map(|c| rough(c.messages)).collect(),
             entries: Vec::new(),
+            whole: vec![Vec::new(); info.channels.len()],
+            before: Times::default(),
             by_column: Vec::new(),
             quaternions: Quaternions::default(),
             by_path: HashMap::new(),
@@ -119,6 +140,7 @@ impl<'a> Pass<'a> {
     }
 
     pub(super) fn take(&mut self, batch: &Batch<'_>) {
+        self.before.clone_from(&self.times[batch.channel]);
         self.times[batch.channel].push(batch.times_ns);
         if self.roles.feeds(batch.topic) {
             let arrivals = &mut self.arrivals[self.first[batch.channel]];
@@ -155,27 +177,28 @@ impl<'a> Pass<'a> {
             }
         });
         self.quaternions = quaternions;
+        // What this batch has nothing of goes on with times of its own.
+        let so_far = self.times[batch.channel].count();
+        self.whole[batch.channel].retain(|k| {
+            let entry = &mut self.entries[*k];
+            if entry.times.is_none() && entry.came < so_far {
+                entry.times = Some(self.before.clone());
+            }
+            entry.times.is_none()
+        });
     }
 
     fn entry(&mut self, batch: &Batch<'_>, path: &str, unit: &'static str) -> usize {
         let field = field(batch.topic, path);
-        // The batch's own rate, where it shows one: a topic need not last as long as the file.
-        let times = &self.times[batch.channel];
-        let hz = match times.count() >= FEW {
-            true => times.hz_between_gaps(),
-            false => None,
-        }
-        .unwrap_or(self.rough_hz[batch.channel]);
-        let mut messages = self.messages[self.first[batch.channel]];
-        if let (from, Some(to)) = self.request.window {
-            let window = ((to - from.unwrap_or(0.0)).max(0.0) * hz).ceil();
-            messages = messages.min(window as u64);
-        }
         let listed = self.request.lists(batch.topic, path);
         // A stamp's seconds and nanoseconds are a clock, not a signal with lines.
         let clock = field.contains("stamp.") || field == "time_s";
         let lines = listed && !clock;
-        let nperseg = if lines { segment(hz, messages) } else { 0 };
+        // Earlier messages had nothing of it.
+        let late = listed && self.before.count() > 0;
+        if listed && !late {
+            self.whole[batch.channel].push(self.entries.len());
+        }
         self.entries.push(Entry {
             path: path.to_owned(),
             unit,
@@ -183,8 +206,11 @@ impl<'a> Pass<'a> {
             listed,
             lines,
             role: self.roles.of_signal(path),
-            stream: Stream::new(hz, nperseg),
-            times: None,
+            stream: Stream::new(0.0, 0),
+            waiting: Some(Vec::new()),
+            most: self.messages[self.first[batch.channel]],
+            came: 0,
+            times: late.then(Times::default),
             kept: Vec::new(),
             outline: (self.request.traces && listed && !clock && !field.contains("covariance"))
                 .then(Envelope::default),
@@ -210,25 +236,24 @@ impl<'a> Pass<'a> {
                 &self.scratch
             }
         };
+        entry.came += values.len() as u64;
         if entry.listed {
             let start_ns = i128::from(self.recording.info().start_ns);
             match self.request.window {
                 (None, None) => {
-                    if rows.is_some() && entry.times.is_none() {
-                        entry.times = Some(Times::default());
-                    }
                     // A topic may come on several channels.
-                    if batch.channel != entry.channel && entry.times.is_none() {
+                    if entry.times.is_none() && batch.channel != entry.channel {
                         entry.times = Some(self.times[entry.channel].clone());
+                    } else if entry.times.is_none() && rows.is_some() {
+                        entry.times = Some(self.before.clone());
                     }
-                    let gaps = match &mut entry.times {
-                        Some(own) => {
-                            own.push(times);
-                            own.gaps()
-                        }
-                        None => self.times[batch.channel].gaps(),
-                    };
-                    entry.stream.push(values, finite, gaps);
+                    let mut own = entry.times.take();
+                    if let Some(own) = &mut own {
+                        own.push(times);
+                    }
+                    let so_far = own.as_ref().unwrap_or(&self.times[batch.channel]);
+                    entry.take(values, finite, so_far, f64::INFINITY);
+                    entry.times = own;
                 }
                 _ => {
                     let inside =
@@ -237,9 +262,10 @@ impl<'a> Pass<'a> {
                         .filter(|(t, _)| inside(**t))
                         .map(|(t, x)| (*t, *x))
                         .unzip();
-                    let own = entry.times.get_or_insert_default();
+                    let mut own = entry.times.take().unwrap_or_default();
                     own.push(&kept);
-                    entry.stream.push(&x, finite, own.gaps());
+                    entry.take(&x, finite, &own, self.request.longest_s());
+                    entry.times = Some(own);
                 }
             }
         }
@@ -277,9 +303,15 @@ impl<'a> Pass<'a> {
         entry.times.as_ref().unwrap_or(&self.times[entry.channel])
     }
 
-    /// Reads listed signals again whose values do not come in the order of their times, and takes them in that order. Where these are more than
-    /// memory should hold, a remark says that they have neither jitter nor spectrum.
+    /// Takes what still waits, and reads listed signals again whose values do not come in the order of their times, to take them in that order. Where
+    /// these are more than memory should hold, a remark says that they have neither jitter nor spectrum.
     pub(super) fn put_in_order(&mut self) -> Result<Vec<Quality>, ReadError> {
+        for entry in &mut self.entries {
+            let own = entry.times.take();
+            let times = own.as_ref().unwrap_or(&self.times[entry.channel]);
+            entry.begin(times, self.request.longest_s());
+            entry.times = own;
+        }
         let entries = self.entries.iter().enumerate();
         let tangled: HashMap<String, usize> = entries
             .filter(|(_, e)| e.listed && self.times_of(e).backward())

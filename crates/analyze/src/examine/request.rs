@@ -35,6 +35,13 @@ impl Request {
             && (self.signals.is_empty() || self.signals.iter().any(|p| matches(p, path)))
     }
 
+    /// How long the window may be that was asked for, s.
+    pub(super) fn longest_s(&self) -> f64 {
+        let (from, to) = self.window;
+        let span_s = to.map(|to| to - from.unwrap_or(0.0));
+        span_s.map_or(f64::INFINITY, |s| s.max(0.0))
+    }
+
     /// Whether a moment is in the window that was asked for, s.
     pub(crate) fn holds(&self, t_s: f64) -> bool {
         self.window.0.is_none_or(|a| t_s >= a) && self.window.1.is_none_or(|b| t_s <= b)

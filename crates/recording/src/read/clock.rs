@@ -4,7 +4,7 @@ use crate::finding::{Finding, Kind};
 use crate::text::counted;
 use std::cmp::Ordering;
 
-/// So many intervals are looked at before 'usual' means something, and no more than so many are kept.
+/// So many intervals are looked at together to learn what is usual, and no more than so many are kept.
 const SAMPLE: usize = 256;
 /// Fewer intervals than this say nothing about regularity.
 const ENOUGH: usize = 16;
@@ -23,10 +23,9 @@ pub(super) struct Order {
     latest: i64,
     duplicates: Count,
     backward: Count,
-    /// The first intervals, to learn what is usual, with where they ended.
+    /// Intervals to learn from what is usual, with where they began; emptied until it is known.
     sample: Vec<(i64, i64)>,
     usual: Option<i64>,
-    learned: bool,
     gaps: Count,
     longest: (i64, i64),
 }
@@ -70,10 +69,9 @@ impl Order {
         }
         let quiet = in_order
             && shortest > 0
-            && self.learned
             && self
                 .usual
-                .is_none_or(|usual| longest <= usual.saturating_mul(GAP));
+                .is_some_and(|usual| longest <= usual.saturating_mul(GAP));
         if quiet {
             self.latest = previous;
             return;
@@ -90,8 +88,8 @@ impl Order {
             Ordering::Greater if to <= self.latest => {}
             Ordering::Greater => {
                 let interval = to.saturating_sub(self.latest);
-                if self.learned {
-                    self.judge(interval, self.latest);
+                if let Some(usual) = self.usual {
+                    self.judge(interval, usual, self.latest);
                 } else {
                     self.sample.push((interval, self.latest));
                     if self.sample.len() >= SAMPLE {
@@ -103,11 +101,8 @@ impl Order {
         }
     }
 
-    fn judge(&mut self, interval: i64, from: i64) {
-        if self
-            .usual
-            .is_some_and(|usual| interval > usual.saturating_mul(GAP))
-        {
+    fn judge(&mut self, interval: i64, usual: i64, from: i64) {
+        if interval > usual.saturating_mul(GAP) {
             self.gaps.add(from);
             if interval > self.longest.0 {
                 self.longest = (interval, from);
@@ -115,9 +110,9 @@ impl Order {
         }
     }
 
-    /// Decides what interval is usual, if any: the median, where nine of ten intervals are below twice that.
+    /// Decides what interval is usual, if any: the median, where nine of ten intervals are below twice that. Else, as where a queue is emptied when the
+    /// recording begins, the next ones tell.
     fn learn(&mut self) {
-        self.learned = true;
         let sample = std::mem::take(&mut self.sample);
         if sample.len() < ENOUGH {
             return;
@@ -128,14 +123,14 @@ impl Order {
         if sorted[sorted.len() * 9 / 10] < usual.saturating_mul(2) {
             self.usual = Some(usual);
             for (interval, from) in sample {
-                self.judge(interval, from);
+                self.judge(interval, usual, from);
             }
         }
     }
 
     /// Whether there are gaps.
     pub fn has_gaps(&mut self) -> bool {
-        if !self.learned {
+        if self.usual.is_none() {
             self.learn();
         }
         self.gaps.count > 0
@@ -388,6 +383,24 @@ mod tests {
                 .collect::<Vec<_>>(),
         );
         assert_eq!(words(&mut order), []);
+    }
+
+    /// What was queued when the recording began comes at once, and does not hide a hole later.
+    #[test]
+    fn a_queue_that_is_emptied_hides_no_gap() {
+        for queued in [12, 50, 200] {
+            let at = |k: i64| {
+                let hole = if k < 1000 { 0 } else { 5_000_000_000 };
+                (k - queued).max(0) * 10_000_000 + k.min(queued) * 50_000 + hole
+            };
+            let mut order = Order::default();
+            order.observe(&(0..3000).map(at).collect::<Vec<_>>());
+            let found = words(&mut order);
+            assert!(
+                found.contains(&(Kind::Gap, 1, Some(at(999) as f64 / 1e9))),
+                "{queued}: {found:?}"
+            );
+        }
     }
 
     #[test]
