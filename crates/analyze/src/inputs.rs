@@ -363,6 +363,17 @@ pub fn between(t_s: &[f64], x: &[f64], at_s: &[f64]) -> Vec<f64> {
     out
 }
 
+/// As [`between`], but the nearest sample, of two the earlier: what stays at 0 for a while, as the force at a slack handle, stays there for as long.
+pub fn nearest(t_s: &[f64], x: &[f64], at_s: &[f64]) -> Vec<f64> {
+    let mut out = between(t_s, x, at_s);
+    for (y, at) in out.iter_mut().zip(at_s).filter(|(y, _)| !y.is_nan()) {
+        let k = t_s.partition_point(|t| t < at);
+        let later = k == 0 || t_s.get(k).is_some_and(|t| t - at < at - t_s[k - 1]);
+        *y = if later { x[k] } else { x[k - 1] };
+    }
+    out
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -483,6 +494,27 @@ mod tests {
         let late: Vec<f64> = t.iter().copied().chain([1e9]).collect();
         let x: Vec<f64> = x.iter().copied().chain([0.0]).collect();
         assert_eq!(about_mean(&late, &x).unwrap().x.len(), 340);
+    }
+
+    /// A force is 0 for as much of another clock's samples as of its own.
+    #[test]
+    fn the_nearest_sample_keeps_what_is_clipped() {
+        let force = |t: &f64| (100.0 * (0.9 + (7.3 * t).sin())).max(0.0);
+        let t_s: Vec<f64> = (0..3000).map(|k| f64::from(k) / 30.0).collect();
+        let x: Vec<f64> = t_s.iter().map(force).collect();
+        let at_s: Vec<f64> = t_s.iter().map(|t| t + 0.5 / 30.0).collect();
+        let slack = |x: &[f64]| x.iter().filter(|x| **x <= 0.0).count();
+        let (own, other) = (slack(&x), slack(&nearest(&t_s, &x, &at_s)));
+        assert!(own.abs_diff(other) <= 1, "{own} {other}");
+        assert!(slack(&between(&t_s, &x, &at_s)) < own * 9 / 10);
+        // Its own times, ties, before the first and behind the last.
+        let found = nearest(
+            &[0.0, 1.0, 2.0],
+            &[5.0, 6.0, 7.0],
+            &[-0.1, 0.0, 0.4, 0.5, 1.6, 2.0, 2.1],
+        );
+        assert!(found[0].is_nan() && found[6].is_nan());
+        assert_eq!(found[1..6], [5.0, 5.0, 5.0, 7.0, 7.0]);
     }
 
     #[test]

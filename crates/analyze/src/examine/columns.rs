@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 
 use super::natural::natural;
 use super::pass::{Entry, Pass};
-use crate::inputs::{Inputs, between};
+use crate::inputs::{Inputs, between, nearest};
 use crate::phase::{unwrap, wrap};
 use crate::quality::Quality;
 use crate::roles::{AngleUnit, Role, RolesFile};
@@ -191,7 +191,7 @@ impl Pass<'_> {
             (true, _) => x,
             (false, true) => at_times(&t_s, &x, &axis),
             (false, false) if role == Role::Phases => wrapped(&t_s, &x, &axis),
-            (false, false) => between(&t_s, &x, &axis),
+            (false, false) => nearest(&t_s, &x, &axis),
         };
         let columns = players.iter().zip(found).map(on_axis).collect();
         (axis, columns)

@@ -12,8 +12,11 @@ const fn least_end(of: Instrument) -> f64 {
 /// So many samples at the end, three of them in a row, and so many times as many as at one of the values below it: the crest of a sine has four times as many.
 const LEAST_SAMPLES: usize = 8;
 const PILED_UP: f64 = 8.0;
-/// How many of the values below it.
+/// How many of the values below it, or of bands as wide.
 const BELOW: usize = 8;
+/// What counts as the end: that value alone, or all within such a part of it, where values lie that close: a bias that was taken off, axes that were
+/// turned or made square, spread it.
+const WIDTHS: [f64; 5] = [0.0, 1e-3, 1e-4, 1e-5, 1e-6];
 
 /// What stayed at the end of its range.
 #[derive(Clone, Debug, PartialEq)]
@@ -65,22 +68,35 @@ pub fn saturated(track: &Track) -> Vec<Saturated> {
     .collect()
 }
 
-/// The largest value and which samples have it, where they pile up there.
+/// The largest value and which samples are there, where they pile up.
 fn piled_up(x: &[f64], least: f64) -> Option<(f64, Vec<usize>)> {
     let end = x.iter().copied().fold(f64::MIN, f64::max);
     if end < least {
         return None;
     }
-    let samples: Vec<usize> = (0..x.len()).filter(|k| x[*k] == end).collect();
-    let in_a_row = samples.windows(3).any(|w| w[2] - w[0] == 2);
-    if samples.len() < LEAST_SAMPLES || !in_a_row {
-        return None;
-    }
-    let mut others: Vec<f64> = x.iter().copied().filter(|x| *x < end).collect();
-    others.sort_unstable_by(|a, b| b.total_cmp(a));
-    let below = others.chunk_by(|a, b| a == b).take(BELOW);
-    let counted: usize = below.map(<[f64]>::len).sum();
-    (samples.len() as f64 * BELOW as f64 >= PILED_UP * counted as f64).then_some((end, samples))
+    let mut descending = x.to_vec();
+    descending.sort_unstable_by(|a, b| b.total_cmp(a));
+    WIDTHS.iter().find_map(|width| {
+        let width = width * end;
+        let samples: Vec<usize> = (0..x.len()).filter(|k| end - x[*k] <= width).collect();
+        let in_a_row = samples.windows(3).any(|w| w[2] - w[0] == 2);
+        if samples.len() < LEAST_SAMPLES || !in_a_row {
+            return None;
+        }
+        let others = &descending[samples.len()..];
+        let below = if width > 0.0 {
+            let all = descending.partition_point(|x| end - x <= (BELOW + 1) as f64 * width);
+            if descending[..all].chunk_by(|a, b| a == b).count() <= BELOW {
+                return None;
+            }
+            all - samples.len()
+        } else {
+            let values = others.chunk_by(|a, b| a == b).take(BELOW);
+            values.map(<[f64]>::len).sum()
+        };
+        let piled = samples.len() as f64 * BELOW as f64 >= PILED_UP * below as f64;
+        piled.then_some((end, samples))
+    })
 }
 
 #[cfg(test)]
@@ -117,6 +133,44 @@ mod tests {
                 (share - truth).abs() < 0.02,
                 "{quantum}: {share} of {truth}"
             );
+        }
+    }
+
+    /// Neither noise behind the converter, a bias that was taken off, axes made square, nor a turned case hide an end.
+    #[test]
+    fn an_end_that_is_spread_is_seen() {
+        let mut random = crate::random::Random(5);
+        let clipped = turning(1e-9, 2.5);
+        let mut spread = [1e-6, 1e-5, 1e-4].map(|sd| {
+            let mut track = clipped.clone();
+            for x in track.gyro_rad_per_s.iter_mut().flatten() {
+                *x += sd * random.normal();
+            }
+            track
+        });
+        let mut ramp = clipped.clone();
+        for (k, x) in ramp.gyro_rad_per_s.iter_mut().enumerate() {
+            x[1] += 1e-5 * 0.01 * k as f64;
+        }
+        let mut turned = clipped.clone();
+        let turn = nalgebra::Rotation3::from_euler_angles(0.0, 0.0, 0.35);
+        for x in &mut turned.gyro_rad_per_s {
+            *x = (turn * nalgebra::Vector3::from(*x)).into();
+        }
+        let share = saturated(&clipped)[0].samples.len();
+        for track in spread.iter_mut().chain([&mut ramp, &mut turned]) {
+            let found = saturated(track);
+            let gyro: Vec<&Saturated> = found
+                .iter()
+                .filter(|f| f.instrument == Instrument::Gyroscope)
+                .collect();
+            assert_eq!(gyro.len(), 1);
+            assert!(gyro[0].samples.len().abs_diff(share) < share / 20);
+            // A motion that only bends there is none.
+            for x in track.gyro_rad_per_s.iter_mut().flatten() {
+                *x += 0.01 * random.normal();
+            }
+            assert_eq!(saturated(track), []);
         }
     }
 
