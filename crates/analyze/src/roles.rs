@@ -117,10 +117,10 @@ pub struct RolesFile {
     #[serde(default, deserialize_with = "not_negative")]
     pub analysis_start_s: Option<f64>,
     /// The load's sensor: its place from the centre of mass, forward, left, up (m).
-    #[serde(default, deserialize_with = "place")]
+    #[serde(default, deserialize_with = "lever")]
     pub imu_place_m: Option<[f64; 3]>,
     /// How its axes stand to those of the load: roll, pitch, yaw, R = R_z R_y R_x (deg). Without it they are levelled by gravity.
-    #[serde(default, deserialize_with = "place")]
+    #[serde(default, deserialize_with = "angles")]
     pub imu_mounting_roll_pitch_yaw_deg: Option<[f64; 3]>,
     /// How old a gyroscope's sample is at its stamp (s).
     #[serde(default, deserialize_with = "age")]
@@ -191,12 +191,24 @@ fn age<'de, D: serde::Deserializer<'de>>(from: D) -> Result<Option<f64>, D::Erro
     Ok(Some(age_s))
 }
 
-/// Three numbers that are numbers.
-fn place<'de, D: serde::Deserializer<'de>>(from: D) -> Result<Option<[f64; 3]>, D::Error> {
+/// Metres from the centre of mass; no pole is longer, and centimetres are more.
+fn lever<'de, D: serde::Deserializer<'de>>(from: D) -> Result<Option<[f64; 3]>, D::Error> {
+    three(from, 10.0, "metres, up to 10")
+}
+
+fn angles<'de, D: serde::Deserializer<'de>>(from: D) -> Result<Option<[f64; 3]>, D::Error> {
+    three(from, 1e3, "degrees, up to 1000")
+}
+
+fn three<'de, D: serde::Deserializer<'de>>(
+    from: D,
+    most: f64,
+    expected: &str,
+) -> Result<Option<[f64; 3]>, D::Error> {
     let values = <[f64; 3]>::deserialize(from)?;
-    if !values.iter().all(|x| x.abs() <= 1e3) {
+    if !values.iter().all(|x| x.abs() <= most) {
         return Err(serde::de::Error::custom(format!(
-            "found {values:?}, expected three numbers up to 1000"
+            "found {values:?}, expected three numbers in {expected}"
         )));
     }
     Ok(Some(values))

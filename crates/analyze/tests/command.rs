@@ -833,6 +833,39 @@ fn degrees_are_taken_as_such() {
     }
 }
 
+#[test]
+fn heights_tell_their_unit() {
+    let folder = tempfile::tempdir().unwrap();
+    let message = |k: u32| {
+        let t = f64::from(k) / 30.0;
+        let x = 0.1 * tone(1.0, t);
+        let text = format!(
+            "{{\"z\":{x},\"z_m\":{x},\"z_cm\":{},\"z_mm\":{}}}",
+            1e2 * x,
+            1e3 * x
+        );
+        (t, text)
+    };
+    let file = told(folder.path(), &[("/s", (0..900).map(message).collect())]);
+    for field in ["z", "z_m", "z_cm", "z_mm"] {
+        let roles = format!("height = \"/s.{field}\"\n");
+        let rms_m = metric(&with_roles(folder.path(), &file, &roles), "rms_z_m");
+        assert!(
+            (rms_m / 0.05 / 2f64.sqrt() - 1.0).abs() < 1e-6,
+            "{field}: {rms_m}"
+        );
+    }
+    // A place in centimetres is none.
+    let roles = folder.path().join("roles.toml");
+    std::fs::write(&roles, "imu_place_m = [50.0, 0.0, 30.0]\n").unwrap();
+    let out = analyze(&[&file, "--roles", roles.to_str().unwrap()]);
+    let said = text(&out.stderr);
+    assert!(
+        said.contains("expected three numbers in metres, up to 10"),
+        "{said}"
+    );
+}
+
 /// A height that is sampled faster than the roll keeps its line, and a slower one its size.
 #[test]
 fn height_is_judged_on_its_own_clock() {

@@ -54,6 +54,8 @@ pub fn unit_of(schema: &str, field: &str) -> &'static str {
         ("_ns", "ns"),
         ("_kg", "kg"),
         ("_n", "N"),
+        ("_mm", "mm"),
+        ("_cm", "cm"),
         ("_m", "m"),
         ("_s", "s"),
         ("_j", "J"),

@@ -393,6 +393,33 @@ fn a_last_row_that_was_cut_off_is_left_out_and_told() {
     assert!(got.ingested.notes.iter().any(|n| n.ends_with(note)));
 }
 
+/// Two motions are not put between each other.
+#[test]
+fn a_log_that_begins_anew_is_refused() {
+    let folder = folder();
+    let layout = "[time]\ncolumn = \"t\"\nunit = \"s\"\n[acceleration]\ncolumns = [\"x\", \"y\", \"z\"]\nunit = \"g\"\n";
+    let layout = file(folder.path(), "layout.toml", layout);
+    let rows = |from: &str| -> String {
+        let again = (0..200).map(|k| format!("{},0,0,1\n", f64::from(k) / 100.0));
+        let late = "1.5,0,0,1\n1.49,0,0,1\n".to_owned();
+        let rows: String = again.collect();
+        match from {
+            "late" => format!("t,x,y,z\n{rows}2.0,0,0,1\n{late}2.01,0,0,1\n"),
+            _ => format!("t,x,y,z\n{rows}{rows}"),
+        }
+    };
+    let path = file(folder.path(), "late.csv", &rows("late"));
+    let got = ingest(folder.path(), &[path], layout.to_str()).expect("ingests");
+    assert_eq!(got.ingested.topics, [("/imu/late".to_owned(), 204)]);
+    let path = file(folder.path(), "twice.csv", &rows("twice"));
+    let refused = ingest(folder.path(), &[path], layout.to_str());
+    let said = refused.err().expect("is refused").to_string();
+    assert!(
+        said.contains("step back by 1.990 s behind 1.990 s"),
+        "{said}"
+    );
+}
+
 #[test]
 fn a_device_without_a_date_beside_one_with_is_told() {
     let folder = folder();

@@ -94,6 +94,16 @@ impl Pass<'_> {
         degrees && entry.role.is_some_and(Role::is_angle)
     }
 
+    /// What a value of 1 is in the unit that its role asks for.
+    fn unit(&self, entry: &Entry) -> f64 {
+        match (entry.role, entry.unit) {
+            (Some(Role::Height), "mm") => 1e-3,
+            (Some(Role::Height), "cm") => 1e-2,
+            _ if self.in_degrees(entry) => 1f64.to_radians(),
+            _ => 1.0,
+        }
+    }
+
     /// A role's column, ascending in time, at most one value per time; angles in radians.
     fn column(&self, entry: &Entry) -> (Vec<f64>, Vec<f64>) {
         let topic = self.first[entry.channel];
@@ -101,9 +111,8 @@ impl Pass<'_> {
             return Default::default();
         };
         let mut x = by_row(&entry.kept, self.arrivals[topic].len());
-        if self.in_degrees(entry) {
-            x.iter_mut().flatten().for_each(|a| *a = a.to_radians());
-        }
+        let unit = self.unit(entry);
+        x.iter_mut().flatten().for_each(|x| *x *= unit);
         let each = axis.t_s.iter().zip(&axis.rows);
         each.filter_map(|(t, row)| Some((*t, x[*row]?))).unzip()
     }
