@@ -240,10 +240,12 @@ fn of_even(
             .iter()
             .map(|a| Vector3::from(*a).norm());
         let norm = norms.sum::<f64>() / track.len() as f64;
-        // What jumps feels more than gravity on average, but the sensor keeps its attitude on average.
+        // What jumps feels more than gravity on average, and off the centre what pulls outwards, but the sensor keeps its attitude on average: what has
+        // lost gravity has a mean near 0.
         let felt = track.accel_m_per_s2.iter();
         let felt: Vector3<f64> = felt.map(|a| Vector3::from(*a)).sum();
-        if is_gravity(norm) || is_gravity(felt.norm() / track.len() as f64) {
+        let mean = felt.norm() / track.len() as f64;
+        if is_gravity(norm) || (0.5 * g..=1.2 * g).contains(&mean) {
             return Err(MotionError::Turning {
                 found_m_per_s2: found,
                 norm_m_per_s2: norm,

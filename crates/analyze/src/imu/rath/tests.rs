@@ -513,6 +513,12 @@ fn a_gyroscope_in_degrees_is_said() {
     }
     let error = motion(&track, &Settings::default()).unwrap_err();
     assert!(matches!(error, MotionError::Turning { .. }), "{error}");
+    // Off the centre a part of gravity is taken back.
+    for a in track.accel_m_per_s2.iter_mut().flatten() {
+        *a *= 0.7;
+    }
+    let error = motion(&track, &Settings::default()).unwrap_err();
+    assert!(matches!(error, MotionError::Turning { .. }), "{error}");
 }
 
 /// Height is given away at its ends: half a period of the corner, at most a tenth of all, and 0.8 of it beside a hole; nothing else is.
