@@ -30,16 +30,16 @@ pub fn onset_s(t_s: &[f64], roll_rad: &[f64]) -> Option<f64> {
     })
 }
 
-/// Samples of such a stretch; `None` where no step is known.
+/// Samples of such a stretch; `None` where no step is known, or one is longer than the stretch.
 pub fn stretch_samples(t_s: &[f64]) -> Option<usize> {
     // A thousandth of a sample of slack: times are rounded to nanoseconds.
     let m = (ONSET_STRETCH_S / mean_step_s(t_s)? + 1e-3).floor() as usize;
-    Some(m.max(1))
+    (m > 0).then_some(m)
 }
 
 pub fn onset_time_s(c: &Context) -> Value {
     let Some(onset_s) = c.onset() else {
-        return Value::missing("no onset");
+        return Value::missing(if holds_one(c) { "no onset" } else { TOO_SHORT });
     };
     let t_s = &c.roll().t_s;
     let earliest = stretch_samples(t_s).and_then(|m| t_s.get(m - 1));
@@ -56,12 +56,19 @@ pub fn unstable(c: &Context) -> Value {
     if c.onset().is_some() {
         return Value::bool(true);
     }
+    match holds_one(c) {
+        true => Value::bool(false),
+        false => Value::missing(TOO_SHORT),
+    }
+}
+
+const TOO_SHORT: &str = "the window holds no 2 s of roll without a hole";
+
+/// Whether there is a stretch to judge.
+fn holds_one(c: &Context) -> bool {
     let t_s = &c.roll().t_s;
     let holds = |m| stretches(t_s, 0.0).iter().any(|stretch| stretch.len() >= m);
-    match stretch_samples(t_s).is_some_and(holds) {
-        true => Value::bool(false),
-        false => Value::missing("the window holds no 2 s of roll without a hole"),
-    }
+    stretch_samples(t_s).is_some_and(holds)
 }
 
 #[cfg(test)]
@@ -93,5 +100,8 @@ mod tests {
         assert_eq!(onset_s(&t, &vec![1.0; t.len()]), Some(t[59]));
         let t: Vec<f64> = (0..1801).map(|k| k as f64 / 100.0).collect();
         assert_eq!(onset_s(&t, &vec![1.0; t.len()]), Some(1.99));
+        // Less than one sample in two seconds tells of no stretch.
+        let t: Vec<f64> = (0..30).map(|k| f64::from(k) * 2.5).collect();
+        assert_eq!(onset_s(&t, &vec![1.0; t.len()]), None);
     }
 }
