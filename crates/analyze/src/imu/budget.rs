@@ -14,6 +14,8 @@ pub struct Budget {
     pub tilt_offset_rad: f64,
     /// Roll and pitch: part that wanders over seconds, rad.
     pub tilt_wander_rad: f64,
+    /// Roll and pitch: how a bias walks on beyond the first minute, which `tilt_offset_rad` holds, rad/√s.
+    pub tilt_walk_rad_per_sqrt_s: f64,
     /// Angles: relative (gyroscope's scale).
     pub angle_scale: f64,
     /// Height: relative (accelerometer's scale, band).
@@ -35,6 +37,8 @@ impl Default for Budget {
             accel_bias_m_per_s2: None,
             tilt_offset_rad: 0.11f64.to_radians(),
             tilt_wander_rad: 0.05f64.to_radians(),
+            // 0.003 m/s³/√Hz (ADIS16448, as Burri et al. 2016 give it for the EuRoC recordings) over g.
+            tilt_walk_rad_per_sqrt_s: 3e-4,
             angle_scale: 0.003,
             height_scale: 0.01,
             height_wander_m: 0.002,

@@ -21,6 +21,8 @@ const DRAWS: usize = 40;
 const SEED: u64 = 0x7261_7468;
 /// How long what wanders stays alike, s.
 const WANDER_S: f64 = 3.0;
+/// What a bias walks in so long is in the budget's constant tilt, s.
+const FIRST_S: f64 = 60.0;
 /// Metrics that an inertial sensor cannot give, and why.
 const BEYOND: &[(&str, &str)] = &[
     (
@@ -565,7 +567,7 @@ fn farthest(
 fn varied(motion: &Motion, window: Window, draw: u64, tilt_rad: f64) -> Inputs {
     let budget = &motion.settings.budget;
     let seed = SEED ^ (draw.wrapping_add(1)).wrapping_mul(0x9e37_79b9_7f4a_7c15);
-    let (mut random, mut tilt) = (Random(seed), Random(!seed));
+    let [mut random, mut tilt, mut walk] = [seed, !seed, seed.rotate_left(32)].map(Random);
     let inputs = &motion.inputs;
     let range = window.range(&inputs.t_s);
     let Some(first) = inputs.t_s[range.clone()].first() else {
@@ -592,11 +594,11 @@ fn varied(motion: &Motion, window: Window, draw: u64, tilt_rad: f64) -> Inputs {
             1.0 + budget.angle_scale * random.normal(),
         );
         let wander = random.wander(t_s.len(), step_s, budget.tilt_wander_rad, WANDER_S);
-        pick(x)
-            .iter()
-            .zip(wander)
-            .map(|(x, w)| scale * x + offset + w)
-            .collect()
+        let walk_rad = budget.tilt_walk_rad_per_sqrt_s;
+        let walk = walked(&mut walk, t_s.len(), step_s, walk_rad);
+        let errors = wander.iter().zip(walk).map(|(a, b)| offset + a + b);
+        let x = pick(x).into_iter().zip(errors);
+        x.map(|(x, error)| scale * x + error).collect()
     };
     let roll_rad = angle(&inputs.roll_rad, &mut random);
     let pitch_rad = angle(&inputs.pitch_rad, &mut random);
@@ -626,6 +628,26 @@ fn varied(motion: &Motion, window: Window, draw: u64, tilt_rad: f64) -> Inputs {
         gravity_m_per_s2: inputs.gravity_m_per_s2,
         ..Inputs::default()
     }
+}
+
+/// What a bias that walks by so much in √s adds to an angle beyond the first minute, about its mean: the variance of T − 60 s, spread over T.
+fn walked(random: &mut Random, n: usize, step_s: f64, walk_per_sqrt_s: f64) -> Vec<f64> {
+    let span_s = n as f64 * step_s;
+    let beyond = 1.0 - FIRST_S / span_s;
+    if !(beyond > 0.0) {
+        return vec![0.0; n];
+    }
+    let kick = walk_per_sqrt_s * (beyond * step_s).sqrt();
+    let mut x = 0.0;
+    let mut out: Vec<f64> = (0..n)
+        .map(|_| {
+            x += kick * random.normal();
+            x
+        })
+        .collect();
+    let mean = out.iter().sum::<f64>() / n as f64;
+    out.iter_mut().for_each(|x| *x -= mean);
+    out
 }
 
 #[cfg(test)]

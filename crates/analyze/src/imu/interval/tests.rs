@@ -179,6 +179,7 @@ const SURE: Budget = Budget {
     accel_bias_m_per_s2: Some(0.0),
     tilt_offset_rad: 0.0,
     tilt_wander_rad: 0.0,
+    tilt_walk_rad_per_sqrt_s: 0.0,
     angle_scale: 0.0,
     height_scale: 0.0,
     height_wander_m: 0.0,
@@ -522,6 +523,23 @@ fn what_rests_on_what_was_lost_has_no_interval() {
         let why = left.get("t_float").unwrap().reason.clone().unwrap();
         assert!(why.starts_with("without an interval: the "), "{why}");
     }
+}
+
+/// A walk of density w has a mean square of w² T/6 about its mean (∫∫ |t − s|/2 over T²); a minute of it is none.
+#[test]
+fn a_bias_walks_on_beyond_a_minute() {
+    let mut random = Random(8);
+    let (w, step_s) = (3e-4, 0.1);
+    assert_eq!(walked(&mut random, 600, step_s, w), [0.0; 600]);
+    let n = 12_000;
+    let square = |x: Vec<f64>| x.iter().map(|x| x * x).sum::<f64>() / n as f64;
+    let draws = 400;
+    let found: f64 = (0..draws)
+        .map(|_| square(walked(&mut random, n, step_s, w)))
+        .sum();
+    let known = w * w * (1200.0 - 60.0) / 6.0;
+    // Its variance is T² w⁴/45: 4.5 % with 400 draws, three times.
+    assert!((found / f64::from(draws) / known - 1.0).abs() < 0.14);
 }
 
 #[test]
