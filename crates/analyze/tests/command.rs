@@ -439,10 +439,12 @@ fn no_input_is_written_over() {
     let file = recording(folder.path());
     let name = file.to_str().unwrap();
     let before = std::fs::read(&file).unwrap();
-    let both = folder.path().join("both");
-    let both = both.to_str().unwrap();
+    let [both, roles] = ["both", "roles.toml"].map(|name| folder.path().join(name));
+    std::fs::write(&roles, "mass_kg = 60.0\n").unwrap();
+    let [both, roles] = [&both, &roles].map(|path| path.to_str().unwrap());
     for args in [
         &[name, "--report", name][..],
+        &[name, "--roles", roles, "--report", roles],
         &[name, "--annotate", name],
         &[name, "--out", name],
         &[name, "--out", both, "--report", both],
@@ -450,6 +452,15 @@ fn no_input_is_written_over() {
         let out = analyze(args);
         assert_eq!(out.status.code(), Some(1), "{args:?}");
         assert!(text(&out.stderr).contains("named twice"), "{args:?}");
+    }
+    // A pattern that fits two recordings names an output and an input.
+    let other = folder.path().join("other.mcap");
+    std::fs::copy(&file, &other).unwrap();
+    for option in ["--report", "--out"] {
+        let out = analyze(&[option, name, other.to_str().unwrap()]);
+        assert_eq!(out.status.code(), Some(1), "{option}");
+        let said = text(&out.stderr);
+        assert!(said.contains("expected a name that ends in"), "{said}");
     }
     assert!(std::fs::read(&file).unwrap() == before);
 }

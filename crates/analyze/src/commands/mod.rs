@@ -6,10 +6,9 @@ mod ingest;
 mod window;
 
 use std::io::Write;
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 use std::process::ExitCode;
 
-use anyhow::bail;
 use clap::{Args, Parser, Subcommand, ValueEnum};
 use recording::read::ReadOptions;
 use recording::text::plain;
@@ -182,24 +181,6 @@ fn complain(error: &anyhow::Error) {
         }
         said = cause;
     }
-}
-
-/// Refuses to write a recording under the name of something else.
-fn is_recording(option: &str, path: &Path) -> anyhow::Result<()> {
-    const OTHERS: [&str; 9] = [
-        "csv", "tsv", "txt", "parquet", "json", "html", "zip", "npz", "wav",
-    ];
-    let extension = path.extension().unwrap_or_default().to_string_lossy();
-    if OTHERS
-        .iter()
-        .any(|other| extension.eq_ignore_ascii_case(other))
-    {
-        bail!(
-            "{option} {}: a recording is written, which is MCAP and no {extension}; expected a name that ends in .mcap",
-            path.display()
-        );
-    }
-    Ok(())
 }
 
 fn print(text: &str) -> anyhow::Result<()> {
