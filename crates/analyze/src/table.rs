@@ -1,5 +1,6 @@
 //! `--out`: the signals as one table, a row per time, a column per signal named by its path.
 
+use std::collections::HashMap;
 use std::io::Write;
 use std::path::Path;
 
@@ -181,38 +182,50 @@ fn on_axis(s: &Signal, next: &mut usize, axis: &[i64]) -> Vec<Option<f64>> {
     values
 }
 
-/// Roll, pitch and yaw of every quaternion among the signals.
+/// Roll, pitch and yaw of every quaternion among the signals, when all of it is there; a field of such a name has it for itself.
 fn quaternions(signals: &[Signal]) -> Vec<Signal> {
-    let at = |path: String| signals.iter().find(|s| s.path == path);
+    let named: HashMap<&str, &Signal> = signals.iter().map(|s| (s.path.as_str(), s)).collect();
     let mut out = Vec::new();
     for w in signals {
         let Some(prefix) = w.path.strip_suffix(".w") else {
             continue;
         };
-        let (Some(x), Some(y), Some(z)) = (
-            at(format!("{prefix}.x")),
-            at(format!("{prefix}.y")),
-            at(format!("{prefix}.z")),
-        ) else {
+        let at = |last: &str| named.get(format!("{prefix}.{last}").as_str());
+        let (Some(x), Some(y), Some(z)) = (at("x"), at("y"), at("z")) else {
             continue;
         };
-        let n = w.values.len();
-        if [x, y, z].iter().any(|s| s.values.len() != n) {
+        let (mut times_ns, mut values) = (Vec::new(), [const { Vec::new() }; 3]);
+        let mut parts = [x, y, z, &w].map(|part| (part, 0));
+        for axis in w.times_ns.chunks(1 << 16) {
+            let parts = parts.each_mut();
+            let parts = parts.map(|(part, next)| on_axis(part, next, axis));
+            for (k, time_ns) in axis.iter().enumerate() {
+                if let [Some(x), Some(y), Some(z), Some(w)] = [0, 1, 2, 3].map(|i| parts[i][k]) {
+                    times_ns.push(*time_ns);
+                    for (values, angle) in values.iter_mut().zip(angles(x, y, z, w)) {
+                        values.push(angle);
+                    }
+                }
+            }
+        }
+        if values[0].iter().all(|roll: &f64| roll.is_nan()) {
             continue;
         }
-        let all: Vec<[f64; 3]> = (0..n)
-            .map(|k| angles(x.values[k], y.values[k], z.values[k], w.values[k]))
-            .collect();
-        if all.iter().all(|a| a[0].is_nan()) {
-            continue;
-        }
-        for (k, angle) in ANGLES.iter().enumerate() {
-            out.push(Signal {
-                path: format!("{prefix}.{angle}"),
-                unit: "rad".into(),
-                times_ns: w.times_ns.clone(),
-                values: all.iter().map(|a| a[k]).collect(),
-            });
+        // The axis of what is complete is shared.
+        let times_ns = match times_ns.len() == w.times_ns.len() {
+            true => w.times_ns.clone(),
+            false => times_ns.into(),
+        };
+        for (angle, values) in ANGLES.iter().zip(values) {
+            let path = format!("{prefix}.{angle}");
+            if !named.contains_key(path.as_str()) {
+                out.push(Signal {
+                    path,
+                    unit: "rad".into(),
+                    times_ns: times_ns.clone(),
+                    values,
+                });
+            }
         }
     }
     out

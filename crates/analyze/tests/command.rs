@@ -1008,6 +1008,78 @@ fn an_orientation_that_comes_late_is_turned_into_angles() {
     assert!((roll["max"].as_f64().unwrap() - 0.3).abs() < 1e-3);
 }
 
+/// A table's column by the path of its signal: the value of each row.
+#[track_caller]
+fn column(table: &Path, path: &str) -> Vec<Option<f64>> {
+    let table = std::fs::read_to_string(table).unwrap();
+    let mut lines = table
+        .lines()
+        .map(|line| line.split(',').collect::<Vec<_>>());
+    let names = lines.next().unwrap();
+    let is = |name: &&str| name.split(" [").next() == Some(path);
+    let mut found = (0..names.len()).filter(|k| is(&names[*k]));
+    let k = found
+        .next()
+        .unwrap_or_else(|| panic!("no {path} in {names:?}"));
+    assert_eq!(found.next(), None, "{path} twice");
+    lines.map(|line| line[k].parse().ok()).collect()
+}
+
+/// Yaw in messages each of which may lack a part of the quaternion.
+#[test]
+fn angles_are_in_the_messages_that_hold_all_of_a_quaternion() {
+    let folder = tempfile::tempdir().unwrap();
+    let yaw = |k: u32| 0.01 * f64::from(k);
+    let lacks = |k: u32| ["x", "y", "z", "w"][k as usize / 50];
+    let message = |k: u32| {
+        let (z, w) = (yaw(k) / 2.0).sin_cos();
+        let text = format!("{{\"q\":{{\"x\":0.0,\"y\":0.0,\"z\":{z},\"w\":{w}}}}}");
+        let text = match k % 50 {
+            25 => text.replace(lacks(k), "other"),
+            _ => text,
+        };
+        (yaw(k), text)
+    };
+    let file = told(folder.path(), &[("/t", (0..200).map(message).collect())]);
+    let table = folder.path().join("x.csv");
+    let args = [&*file, "--format", "json", "--out", table.to_str().unwrap()];
+    assert_eq!(json(&args)["signals"]["/t.q.yaw"]["count"], 196);
+    let found = column(&table, "/t.q.yaw");
+    assert_eq!(found.len(), 200);
+    for (k, found) in (0..).zip(found) {
+        assert_eq!(found.is_none(), k % 50 == 25, "{k}");
+        assert!(
+            found.is_none_or(|found| (found - yaw(k)).abs() < 1e-9),
+            "{k}"
+        );
+    }
+}
+
+/// Messages that tell the angles of their quaternion themselves, in degrees; the first ones do not.
+#[test]
+fn fields_go_before_angles_of_their_name() {
+    let folder = tempfile::tempdir().unwrap();
+    let message = |k: u32| {
+        let (z, w) = (0.005 * f64::from(k)).sin_cos();
+        let own = format!(",\"yaw\":{}", 1000 + k);
+        let own = if k < 300 { "" } else { &own };
+        let text = format!("{{\"q\":{{\"x\":0.0,\"y\":0.0,\"z\":{z},\"w\":{w}{own}}}}}");
+        (0.01 * f64::from(k), text)
+    };
+    let file = told(folder.path(), &[("/t", (0..600).map(message).collect())]);
+    let table = folder.path().join("x.csv");
+    let out = analyze(&[&file, "--format", "json", "--out", table.to_str().unwrap()]);
+    let said = text(&out.stdout);
+    assert_eq!(said.matches("\"/t.q.yaw\"").count(), 1, "{said}");
+    let found: Value = serde_json::from_str(&said).unwrap();
+    let found = &found["signals"];
+    assert_eq!(found["/t.q.roll"]["count"], 600);
+    let yaw = &found["/t.q.yaw"];
+    assert_eq!((&yaw["count"], &yaw["min"]), (&300.into(), &1300.0.into()));
+    let found = column(&table, "/t.q.yaw");
+    assert_eq!((found[299], found[300]), (None, Some(1300.0)));
+}
+
 #[test]
 fn a_finding_says_where_and_when_once() {
     let folder = tempfile::tempdir().unwrap();
