@@ -958,6 +958,18 @@ fn limits_are_named() {
         said.contains("a has more than 64 items (the limit --max-items)"),
         "{said}"
     );
+    // A table that lacks columns for it says so too.
+    let list = format!("{{\"a\":{:?},\"b\":1}}", [1.5; 100]);
+    let file = told(
+        folder.path(),
+        &[("/big", vec![(0.0, list.clone()), (1.0, list)])],
+    );
+    let table = folder.path().join("x.csv");
+    let said = text(&analyze(&[&file, "--out", table.to_str().unwrap()]).stderr);
+    assert!(
+        said.contains("x.csv: /big: a has more than 64 items (the limit --max-items)"),
+        "{said}"
+    );
     let keys: Vec<String> = (0..5000).map(|k| format!("\"k{k}\":{k}")).collect();
     let keys = format!("{{{}}}", keys.join(","));
     let file = told(
@@ -1053,6 +1065,42 @@ fn angles_are_in_the_messages_that_hold_all_of_a_quaternion() {
             "{k}"
         );
     }
+}
+
+/// Fields that some messages lack do not make more rows of a thinned topic, nor uneven ones.
+#[test]
+fn a_topic_is_thinned_by_its_messages() {
+    let folder = tempfile::tempdir().unwrap();
+    let message = |k: u32| {
+        let text = match (k % 3, k % 5) {
+            (0, _) => format!("{{\"a\":{k}}}"),
+            (_, 0) => format!("{{\"a\":{k},\"b\":1}}"),
+            _ => format!("{{\"a\":{k},\"b\":1,\"c\":2}}"),
+        };
+        (0.01 * f64::from(k), text)
+    };
+    let slow = |k: u32| (0.002 + 0.1 * f64::from(k), "{\"s\":1}".to_owned());
+    let topics = [
+        ("/t", (0..600).map(message).collect()),
+        ("/s", (0..50).map(slow).collect()),
+    ];
+    let file = told(folder.path(), &topics);
+    let table = folder.path().join("x.csv");
+    let out = table.to_str().unwrap();
+    assert!(
+        analyze(&[&file, "--downsample", "10", "--out", out])
+            .status
+            .success()
+    );
+    let found: Vec<f64> = column(&table, "/t.a").into_iter().flatten().collect();
+    let expected: Vec<f64> = (0..60).map(|k| f64::from(10 * k)).collect();
+    assert_eq!(found, expected);
+    assert_eq!(column(&table, "/t.a").len(), 65);
+    // A message that has no row is counted once, however many fields it has.
+    let twice = |k: u32| (0.01 * f64::from(k / 2), message(k).1);
+    let file = told(folder.path(), &[("/t", (0..600).map(twice).collect())]);
+    let said = text(&analyze(&[&file, "--out", out]).stderr);
+    assert!(said.contains("300 messages have no row"), "{said}");
 }
 
 /// Messages that tell the angles of their quaternion themselves, in degrees; the first ones do not.

@@ -9,6 +9,7 @@ use analyze::quality::Quality;
 use analyze::report;
 use analyze::roles::RolesFile;
 use anyhow::{Context, bail};
+use recording::Kind;
 use recording::read::{ReadOptions, Recording, STDIN};
 use recording::text::counted;
 use recording::whole::{self, Output};
@@ -150,13 +151,18 @@ fn one(path: &Path, args: &AnalyzeArgs, request: &Request) -> anyhow::Result<Ana
         }
     }
     if let Some(out) = &args.out {
-        let overlaid = analyze::table::write(&recording, request, args.downsample, out)?;
-        if overlaid > 0 {
+        let written = analyze::table::write(&recording, request, args.downsample, out)?;
+        let out = out.display();
+        if written.overlaid > 0 {
             recording::note!(
-                "analyze: {}: {} no row, because one of the same topic and time came after",
-                out.display(),
-                counted(overlaid, "message has", "messages have")
+                "analyze: {out}: {} no row, because one of the same topic and time came after",
+                counted(written.overlaid, "message has", "messages have")
             );
+        }
+        let limits = (written.findings.iter())
+            .filter(|f| matches!(f.kind, Kind::LongSequence | Kind::OddSchema));
+        for limit in limits.take(20) {
+            recording::note!("analyze: {out}: {limit}");
         }
     }
     if let Some(out) = &args.report {
