@@ -247,6 +247,14 @@ fn window_signal_and_topic_narrow_what_is_told() {
     );
     let v = json(&[file, "--format", "json", "--topic", "/battery"]);
     assert_eq!(v["signals"].as_object().unwrap().len(), 1);
+    // Of several names, that which fits nothing is said.
+    let args = ["--topic", "/battery", "--topic", "/rath/stat"];
+    let said = text(&analyze(&[&[file], &args[..]].concat()).stderr);
+    assert!(
+        said.ends_with("no topic fits /rath/stat; did you mean /rath/state?\n")
+            && said.lines().count() == 1,
+        "{said}"
+    );
     let out = analyze(&[file, "--signal", "/nothing*"]);
     assert_eq!(out.status.code(), Some(1));
     assert!(

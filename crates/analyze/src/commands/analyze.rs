@@ -7,7 +7,7 @@ use analyze::examine::{Analysis, Request, examine};
 use analyze::field::DeviceClocks;
 use analyze::quality::Quality;
 use analyze::report;
-use analyze::roles::RolesFile;
+use analyze::roles::{RolesFile, matches, meant};
 use anyhow::{Context, bail};
 use recording::Kind;
 use recording::read::{ReadOptions, Recording, STDIN};
@@ -145,8 +145,15 @@ fn one(path: &Path, args: &AnalyzeArgs, request: &Request) -> anyhow::Result<Ana
     if analysis.is_empty() {
         bail!("{}", nothing(&analysis, request));
     }
+    for pattern in &request.topics {
+        let names = || analysis.topics.iter().map(|t| t.name.as_str());
+        if !names().any(|topic| matches(pattern, topic)) {
+            let hint = meant(pattern, names());
+            recording::note!("analyze: {name}: no topic fits {pattern}{hint}");
+        }
+    }
     for pattern in &request.signals {
-        if !(analysis.signals.iter()).any(|(path, _)| analyze::roles::matches(pattern, path)) {
+        if !(analysis.signals.iter()).any(|(path, _)| matches(pattern, path)) {
             recording::note!("analyze: {name}: no numeric signal fits {pattern}");
         }
     }
