@@ -79,7 +79,7 @@ struct AnalyzeArgs {
     /// Write the signals to a table; columns are named by their paths (in CSV with their units)
     #[arg(long, value_name = "FILE.parquet|.csv")]
     out: Option<PathBuf>,
-    /// Write one row in so many, for --out
+    /// Write one row of each topic in so many, for --out
     #[arg(long, value_name = "N", default_value_t = 1, value_parser = clap::value_parser!(u64).range(1..))]
     downsample: u64,
     /// Write the recording again with what was found beside it
