@@ -168,6 +168,11 @@ fn bad_input_gets_one_sentence_and_leaves_nothing() {
             "mine.toml: is named twice",
         ),
         (
+            &["record", "music", "--out", "mine.toml"],
+            Some("name = \"x\"\n"),
+            "mine.toml: expected a name that ends in .mcap",
+        ),
+        (
             &["record", "--out", "no/such/folder/x.mcap"],
             None,
             "no/such/folder/x.mcap",

@@ -1,6 +1,6 @@
 //! Quaternions as roll, pitch and yaw.
 
-use std::collections::{BTreeMap, HashMap};
+use std::collections::{BTreeMap, HashMap, HashSet};
 
 use recording::read::Batch;
 
@@ -33,6 +33,9 @@ pub(crate) struct Quaternions {
     /// By channel: the columns of a batch, and what was found among them. Another batch of the channel may have others, or the same in another
     /// order.
     known: HashMap<usize, (Vec<usize>, Vec<Found>)>,
+    /// Fields that are called as an angle would be: their own values are told under that name.
+    own: HashSet<String>,
+    rows: Vec<u32>,
     values: [Vec<f64>; 3],
     /// Quaternions that are no rotation, by their path without the last part: channel, how many, log time of the first (ns).
     pub odd: BTreeMap<String, (usize, u64, i64)>,
@@ -44,38 +47,64 @@ struct Found {
 }
 
 impl Quaternions {
-    /// Gives path, rows and values of every angle of every quaternion in the batch: in the messages that have all of it.
+    /// Gives path, rows and values of every angle of every quaternion in the batch: in exactly those messages that have all of it, and unless the
+    /// messages have a field of that name.
     pub fn each(&mut self, batch: &Batch<'_>, mut sink: impl FnMut(&str, Option<&[u32]>, &[f64])) {
         let entry = self.known.entry(batch.channel).or_default();
         let columns = || batch.columns.iter().map(|c| c.id);
         if !entry.0.iter().copied().eq(columns()) {
             *entry = (columns().collect(), find(batch));
+            let angle = |path: &&str| {
+                let last = path.rsplit_once('.').map(|(_, last)| last);
+                last.is_some_and(|last| ANGLES.contains(&last))
+            };
+            let own = batch.columns.iter().map(|c| c.path).filter(angle);
+            self.own.extend(own.map(str::to_owned));
         }
         for found in &entry.1 {
-            let rows = batch.columns[found.columns[0]].rows;
-            // Where its parts are in other messages each, it is in none.
-            if found.columns.iter().any(|c| batch.columns[*c].rows != rows) {
-                continue;
-            }
-            let [x, y, z, w] = found.columns.map(|c| batch.columns[c].values);
+            self.rows.clear();
             self.values.iter_mut().for_each(Vec::clear);
-            for (((x, y), z), w) in x.iter().zip(y).zip(z).zip(w) {
-                for (column, angle) in self.values.iter_mut().zip(angles(*x, *y, *z, *w)) {
+            let columns = found.columns.map(|c| &batch.columns[c]);
+            let mut next = [0; 4];
+            let (mut odd, mut first_ns) = (0, 0);
+            // OK because rows are counted in u32.
+            for (row, time_ns) in (0u32..).zip(batch.times_ns) {
+                let mut part = |i: usize| {
+                    let at: usize = next[i];
+                    let here = (columns[i].rows).is_none_or(|rows| rows.get(at) == Some(&row));
+                    next[i] += usize::from(here);
+                    here.then(|| columns[i].values[at])
+                };
+                let [Some(x), Some(y), Some(z), Some(w)] = [part(0), part(1), part(2), part(3)]
+                else {
+                    continue;
+                };
+                let found = angles(x, y, z, w);
+                if found[0].is_nan() && [x, y, z, w].iter().all(|part| part.is_finite()) {
+                    if odd == 0 {
+                        first_ns = *time_ns;
+                    }
+                    odd += 1;
+                }
+                self.rows.push(row);
+                for (column, angle) in self.values.iter_mut().zip(found) {
                     column.push(angle);
                 }
             }
-            let finite = |k: usize| [x, y, z, w].iter().all(|part| part[k].is_finite());
-            let odd = |k: &usize| self.values[0][*k].is_nan() && finite(*k);
-            let mut odd = (0..x.len()).filter(odd);
-            if let Some(k) = odd.next() {
+            if odd > 0 {
                 let roll = &found.paths[0];
                 let path = roll.strip_suffix(".roll").unwrap_or(roll).to_owned();
-                let first_ns = batch.times_ns[rows.map_or(k, |rows| rows[k] as usize)];
                 let known = self.odd.entry(path).or_insert((batch.channel, 0, first_ns));
-                known.1 += 1 + odd.count() as u64;
+                known.1 += odd;
             }
+            if self.rows.is_empty() {
+                continue;
+            }
+            let rows = (self.rows.len() < batch.times_ns.len()).then_some(&*self.rows);
             for (path, values) in found.paths.iter().zip(&self.values) {
-                sink(path, rows, values);
+                if !self.own.contains(path) {
+                    sink(path, rows, values);
+                }
             }
         }
     }
@@ -109,40 +138,80 @@ fn find(batch: &Batch<'_>) -> Vec<Found> {
 mod tests {
     use super::*;
 
-    #[test]
-    fn what_a_batch_lacks_or_has_elsewhere_is_looked_for_again() {
-        let one = [1.0];
-        let column = |id: usize, rows| recording::read::Column {
-            id,
-            path: ["/a.q.x", "/a.q.y", "/a.q.z", "/a.q.w", "/a.p.w"][id],
-            rows,
-            values: &one,
+    type Columns = [(usize, Option<&'static [u32]>)];
+
+    /// The angles of `/a.q` in a batch of two messages: which, and in which of the messages; columns are given by number, with their rows.
+    fn found(quaternions: &mut Quaternions, columns: &Columns) -> Vec<(String, Vec<u32>)> {
+        let named = [
+            ("/a.q.x", 0.1),
+            ("/a.q.y", 0.2),
+            ("/a.q.z", 0.3),
+            ("/a.q.w", 0.9),
+            ("/a.p.w", 1.0),
+            ("/a.q.yaw", 7.0),
+        ];
+        let values = named.map(|(_, x)| [x; 2]);
+        let column = |(id, rows): &(usize, Option<&'static [u32]>)| recording::read::Column {
+            id: *id,
+            path: named[*id].0,
+            rows: *rows,
+            values: &values[*id][..rows.map_or(2, <[u32]>::len)],
             finite: true,
         };
-        let mut quaternions = Quaternions::default();
-        let mut found = |columns: &[recording::read::Column<'_>]| {
-            let batch = Batch {
-                channel: 0,
-                topic: "/a",
-                schema: "",
-                times_ns: &[0],
-                stamps_ns: None,
-                columns,
-            };
-            let mut count = 0;
-            quaternions.each(&batch, |path, _, _| {
-                count += usize::from(path.starts_with("/a.q."))
-            });
-            count
+        let columns: Vec<_> = columns.iter().map(column).collect();
+        let batch = Batch {
+            channel: 0,
+            topic: "/a",
+            schema: "",
+            times_ns: &[0, 1],
+            stamps_ns: None,
+            columns: &columns,
         };
-        let rows = [0];
-        let first = [0, 1, 2, 4, 3].map(|id| column(id, (id == 1).then_some(&rows[..])));
-        assert_eq!(found(&first), 0, "y is in other messages than x");
-        let late = [0, 1, 2, 4, 3].map(|id| column(id, Some(&rows[..])));
-        assert_eq!(found(&late), 3, "all of it is in some messages");
-        assert_eq!(found(&[0, 1, 2, 4, 3].map(|id| column(id, None))), 3);
-        assert_eq!(found(&[4, 3, 2, 1, 0].map(|id| column(id, None))), 3);
-        assert_eq!(found(&[0, 1, 2, 4].map(|id| column(id, None))), 0);
+        let mut out = Vec::new();
+        quaternions.each(&batch, |path, rows, values| {
+            let rows = rows.map_or_else(|| vec![0, 1], <[u32]>::to_vec);
+            let expected = angles(0.1, 0.2, 0.3, 0.9);
+            let angle = ANGLES.iter().position(|last| path.ends_with(last)).unwrap();
+            assert_eq!(values, vec![expected[angle]; rows.len()]);
+            out.push((path.to_owned(), rows));
+        });
+        out
+    }
+
+    #[test]
+    fn what_a_batch_lacks_or_has_elsewhere_is_looked_for_again() {
+        let mut quaternions = Quaternions::default();
+        let mut count = |columns: &Columns| found(&mut quaternions, columns).len();
+        let rows = |rows| move |id| (id, rows);
+        let mut first = [0, 1, 2, 4, 3].map(rows(Some(&[0][..])));
+        first[1].1 = Some(&[1]);
+        assert_eq!(count(&first), 0, "y is in other messages than x");
+        let late = [0, 1, 2, 4, 3].map(rows(Some(&[0][..])));
+        assert_eq!(count(&late), 3, "all of it is in some messages");
+        assert_eq!(count(&[0, 1, 2, 4, 3].map(rows(None))), 3);
+        assert_eq!(count(&[4, 3, 2, 1, 0].map(rows(None))), 3);
+        assert_eq!(count(&[0, 1, 2, 4].map(rows(None))), 0);
+    }
+
+    #[test]
+    fn angles_are_where_all_four_parts_are() {
+        let mut quaternions = Quaternions::default();
+        let columns = [(0, None), (1, None), (2, Some(&[1][..])), (3, None)];
+        let expected = ANGLES.map(|angle| (format!("/a.q.{angle}"), vec![1]));
+        assert_eq!(found(&mut quaternions, &columns), expected);
+    }
+
+    #[test]
+    fn a_field_of_the_message_is_not_told_as_an_angle() {
+        let mut quaternions = Quaternions::default();
+        let names = |found: Vec<(String, Vec<u32>)>| -> Vec<String> {
+            found.into_iter().map(|(path, _)| path).collect()
+        };
+        for columns in [&[0, 1, 2, 3, 5][..], &[0, 1, 2, 3]] {
+            let columns: Vec<_> = columns.iter().map(|id| (*id, None)).collect();
+            let found = names(found(&mut quaternions, &columns));
+            assert_eq!(found, ["/a.q.roll", "/a.q.pitch"]);
+        }
     }
 
     #[test]

@@ -548,6 +548,14 @@ pub fn matches(pattern: &str, path: &str) -> bool {
     p[i..].iter().all(|c| *c == b'*')
 }
 
+/// What may have been meant by a pattern that nothing fits: the nearest name, as the end of a sentence.
+pub fn meant<'a>(pattern: &str, names: impl IntoIterator<Item = &'a str>) -> String {
+    let far = |name| (strsim::damerau_levenshtein(name, pattern), name);
+    let nearest = names.into_iter().map(far).min_by_key(|(far, _)| *far);
+    let near = nearest.filter(|(far, _)| 3 * far <= pattern.len());
+    near.map_or(String::new(), |(_, name)| format!("; did you mean {name}?"))
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;

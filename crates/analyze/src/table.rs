@@ -1,10 +1,12 @@
 //! `--out`: the signals as one table, a row per time, a column per signal named by its path.
 
+use std::collections::{BTreeMap, BTreeSet, HashMap};
 use std::io::Write;
 use std::path::Path;
 
-use recording::Signal;
 use recording::read::{ReadError, Recording};
+use recording::signal::field_of;
+use recording::{Finding, Signal};
 
 use crate::examine::Request;
 use crate::quaternion::{ANGLES, angles};
@@ -49,8 +51,16 @@ struct Table {
     time_ns: Vec<i64>,
     start_ns: i64,
     signals: Vec<Signal>,
-    /// Messages at whose time another of the same topic follows: the row holds the last.
-    overlaid: u64,
+    written: Written,
+}
+
+/// What is to be said of a table that was written.
+#[derive(Debug, Default)]
+pub struct Written {
+    /// Messages that have no row, because one of the same topic and time came after them.
+    pub overlaid: u64,
+    /// What the reader remarked.
+    pub findings: Vec<Finding>,
 }
 
 impl Table {
@@ -65,8 +75,8 @@ impl Table {
     }
 }
 
-/// Writes the signals that `request` names, all of them where it names none, in the window it names; one row in `downsample`. Gives how many
-/// messages have no row, because one of the same topic and time came after them.
+/// Writes the signals that `request` names, all of them where it names none, in the window it names; one row of each topic in
+/// `downsample`.
 ///
 /// # Errors
 /// [`TableError`]; nothing is left under the final name then.
@@ -75,7 +85,7 @@ pub fn write(
     request: &Request,
     downsample: u64,
     out: &Path,
-) -> Result<u64, TableError> {
+) -> Result<Written, TableError> {
     let name = out.display().to_string();
     let kind = out
         .extension()
@@ -103,7 +113,7 @@ pub fn write(
         Trouble::Io(source) => io(source),
         Trouble::Table(error) => error,
     })?;
-    Ok(table.overlaid)
+    Ok(table.written)
 }
 
 /// What can go wrong while a table is written.
@@ -128,36 +138,71 @@ fn collect(recording: &Recording, request: &Request, downsample: u64) -> Result<
                 .filter(|(_, last)| matches!(*last, "x" | "y" | "z" | "w"))
                 .is_some_and(|(prefix, _)| ANGLES.iter().any(|a| lists(&format!("{prefix}.{a}"))))
     };
-    let (mut signals, _) = recording.signals(&select)?;
+    let (mut signals, findings) = recording.signals(&select)?;
     let derived: Vec<Signal> = quaternions(&signals);
     signals.extend(derived);
     signals.retain(|s| lists(&s.path));
     signals.sort_by(|a, b| a.path.cmp(&b.path));
     let start_ns = recording.info().start_ns;
     let seconds = |t: i64| (i128::from(t) - i128::from(start_ns)) as f64 / 1e9;
-    let inside = |t: i64| request.holds(seconds(t));
-    let step = usize::try_from(downsample).unwrap_or(usize::MAX).max(1);
-    let mut time_ns: Vec<i64> = Vec::new();
+    let inside = |t: &i64| request.holds(seconds(*t));
+    let channels = &recording.info().channels;
+    let mut topics: BTreeMap<&str, Rows> = BTreeMap::new();
     let mut axes: Vec<*const i64> = Vec::new();
-    let mut overlaid = 0;
     for s in &signals {
-        // Signals of one topic share their axis: take it once, and thin it by itself so that every topic keeps rows.
+        // Complete signals of one topic share their axis: take it once.
         if !axes.contains(&s.times_ns.as_ptr()) {
             axes.push(s.times_ns.as_ptr());
-            let kept = s.times_ns.iter().filter(|t| inside(**t));
-            time_ns.extend(kept.step_by(step));
-            let pairs = s.times_ns.windows(2);
-            overlaid += pairs.filter(|w| w[0] == w[1] && inside(w[0])).count() as u64;
+            let of = |topic: &&str| s.path == *topic || field_of(&s.path, topic).is_some();
+            let topic = channels.iter().map(|c| c.topic.as_str()).filter(of);
+            let topic = topic.max_by_key(|topic| topic.len()).unwrap_or_default();
+            let rows = topics.entry(topic).or_default();
+            rows.take(s.times_ns.iter().copied().filter(inside));
         }
     }
+    // Each topic is thinned by itself, so that all keep rows.
+    let step = usize::try_from(downsample).unwrap_or(usize::MAX).max(1);
+    let kept = topics
+        .values()
+        .flat_map(|rows| rows.times_ns.iter().step_by(step));
+    let mut time_ns: Vec<i64> = kept.copied().collect();
     time_ns.sort_unstable();
     time_ns.dedup();
+    let overlaid = topics.values().map(|rows| rows.again.len() as u64).sum();
     Ok(Table {
         time_ns,
         start_ns,
         signals,
-        overlaid,
+        written: Written { overlaid, findings },
     })
+}
+
+/// The messages of a topic, as its signals tell them.
+#[derive(Default)]
+struct Rows {
+    /// Their times, ascending, each once.
+    times_ns: Vec<i64>,
+    /// Times that come again, and how many messages came before in that time.
+    again: BTreeSet<(i64, u32)>,
+}
+
+impl Rows {
+    /// Adds the times of a signal's values, which ascend.
+    fn take(&mut self, times_ns: impl Iterator<Item = i64>) {
+        let (mut last, mut before) = (None, 0);
+        for time_ns in times_ns {
+            if last == Some(time_ns) {
+                before += 1;
+                self.again.insert((time_ns, before));
+            } else {
+                (last, before) = (Some(time_ns), 0);
+                self.times_ns.push(time_ns);
+            }
+        }
+        // Stable: quick where two ascending runs become one.
+        self.times_ns.sort();
+        self.times_ns.dedup();
+    }
 }
 
 /// The signal's last value at each time of a stretch of the axis, where it has one there; `next` is where the signal goes on.
@@ -181,38 +226,50 @@ fn on_axis(s: &Signal, next: &mut usize, axis: &[i64]) -> Vec<Option<f64>> {
     values
 }
 
-/// Roll, pitch and yaw of every quaternion among the signals.
+/// Roll, pitch and yaw of every quaternion among the signals, when all of it is there; a field of such a name has it for itself.
 fn quaternions(signals: &[Signal]) -> Vec<Signal> {
-    let at = |path: String| signals.iter().find(|s| s.path == path);
+    let named: HashMap<&str, &Signal> = signals.iter().map(|s| (s.path.as_str(), s)).collect();
     let mut out = Vec::new();
     for w in signals {
         let Some(prefix) = w.path.strip_suffix(".w") else {
             continue;
         };
-        let (Some(x), Some(y), Some(z)) = (
-            at(format!("{prefix}.x")),
-            at(format!("{prefix}.y")),
-            at(format!("{prefix}.z")),
-        ) else {
+        let at = |last: &str| named.get(format!("{prefix}.{last}").as_str());
+        let (Some(x), Some(y), Some(z)) = (at("x"), at("y"), at("z")) else {
             continue;
         };
-        let n = w.values.len();
-        if [x, y, z].iter().any(|s| s.values.len() != n) {
+        let (mut times_ns, mut values) = (Vec::new(), [const { Vec::new() }; 3]);
+        let mut parts = [x, y, z, &w].map(|part| (part, 0));
+        for axis in w.times_ns.chunks(1 << 16) {
+            let parts = parts.each_mut();
+            let parts = parts.map(|(part, next)| on_axis(part, next, axis));
+            for (k, time_ns) in axis.iter().enumerate() {
+                if let [Some(x), Some(y), Some(z), Some(w)] = [0, 1, 2, 3].map(|i| parts[i][k]) {
+                    times_ns.push(*time_ns);
+                    for (values, angle) in values.iter_mut().zip(angles(x, y, z, w)) {
+                        values.push(angle);
+                    }
+                }
+            }
+        }
+        if values[0].iter().all(|roll: &f64| roll.is_nan()) {
             continue;
         }
-        let all: Vec<[f64; 3]> = (0..n)
-            .map(|k| angles(x.values[k], y.values[k], z.values[k], w.values[k]))
-            .collect();
-        if all.iter().all(|a| a[0].is_nan()) {
-            continue;
-        }
-        for (k, angle) in ANGLES.iter().enumerate() {
-            out.push(Signal {
-                path: format!("{prefix}.{angle}"),
-                unit: "rad".into(),
-                times_ns: w.times_ns.clone(),
-                values: all.iter().map(|a| a[k]).collect(),
-            });
+        // The axis of what is complete is shared.
+        let times_ns = match times_ns.len() == w.times_ns.len() {
+            true => w.times_ns.clone(),
+            false => times_ns.into(),
+        };
+        for (angle, values) in ANGLES.iter().zip(values) {
+            let path = format!("{prefix}.{angle}");
+            if !named.contains_key(path.as_str()) {
+                out.push(Signal {
+                    path,
+                    unit: "rad".into(),
+                    times_ns: times_ns.clone(),
+                    values,
+                });
+            }
         }
     }
     out

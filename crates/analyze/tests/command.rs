@@ -247,6 +247,14 @@ fn window_signal_and_topic_narrow_what_is_told() {
     );
     let v = json(&[file, "--format", "json", "--topic", "/battery"]);
     assert_eq!(v["signals"].as_object().unwrap().len(), 1);
+    // Of several names, that which fits nothing is said.
+    let args = ["--topic", "/battery", "--topic", "/rath/stat"];
+    let said = text(&analyze(&[&[file], &args[..]].concat()).stderr);
+    assert!(
+        said.ends_with("no topic fits /rath/stat; did you mean /rath/state?\n")
+            && said.lines().count() == 1,
+        "{said}"
+    );
     let out = analyze(&[file, "--signal", "/nothing*"]);
     assert_eq!(out.status.code(), Some(1));
     assert!(
@@ -439,10 +447,12 @@ fn no_input_is_written_over() {
     let file = recording(folder.path());
     let name = file.to_str().unwrap();
     let before = std::fs::read(&file).unwrap();
-    let both = folder.path().join("both");
-    let both = both.to_str().unwrap();
+    let [both, roles] = ["both", "roles.toml"].map(|name| folder.path().join(name));
+    std::fs::write(&roles, "mass_kg = 60.0\n").unwrap();
+    let [both, roles] = [&both, &roles].map(|path| path.to_str().unwrap());
     for args in [
         &[name, "--report", name][..],
+        &[name, "--roles", roles, "--report", roles],
         &[name, "--annotate", name],
         &[name, "--out", name],
         &[name, "--out", both, "--report", both],
@@ -450,6 +460,15 @@ fn no_input_is_written_over() {
         let out = analyze(args);
         assert_eq!(out.status.code(), Some(1), "{args:?}");
         assert!(text(&out.stderr).contains("named twice"), "{args:?}");
+    }
+    // A pattern that fits two recordings names an output and an input.
+    let other = folder.path().join("other.mcap");
+    std::fs::copy(&file, &other).unwrap();
+    for option in ["--report", "--out"] {
+        let out = analyze(&[option, name, other.to_str().unwrap()]);
+        assert_eq!(out.status.code(), Some(1), "{option}");
+        let said = text(&out.stderr);
+        assert!(said.contains("expected a name that ends in"), "{said}");
     }
     assert!(std::fs::read(&file).unwrap() == before);
 }
@@ -1048,6 +1067,18 @@ fn limits_are_named() {
         said.contains("a has more than 64 items (the limit --max-items)"),
         "{said}"
     );
+    // A table that lacks columns for it says so too.
+    let list = format!("{{\"a\":{:?},\"b\":1}}", [1.5; 100]);
+    let file = told(
+        folder.path(),
+        &[("/big", vec![(0.0, list.clone()), (1.0, list)])],
+    );
+    let table = folder.path().join("x.csv");
+    let said = text(&analyze(&[&file, "--out", table.to_str().unwrap()]).stderr);
+    assert!(
+        said.contains("x.csv: /big: a has more than 64 items (the limit --max-items)"),
+        "{said}"
+    );
     let keys: Vec<String> = (0..5000).map(|k| format!("\"k{k}\":{k}")).collect();
     let keys = format!("{{{}}}", keys.join(","));
     let file = told(
@@ -1096,6 +1127,114 @@ fn an_orientation_that_comes_late_is_turned_into_angles() {
     let roll = &found["signals"]["/pose.q.roll"];
     assert_eq!(roll["count"], 497, "{roll}");
     assert!((roll["max"].as_f64().unwrap() - 0.3).abs() < 1e-3);
+}
+
+/// A table's column by the path of its signal: the value of each row.
+#[track_caller]
+fn column(table: &Path, path: &str) -> Vec<Option<f64>> {
+    let table = std::fs::read_to_string(table).unwrap();
+    let mut lines = table
+        .lines()
+        .map(|line| line.split(',').collect::<Vec<_>>());
+    let names = lines.next().unwrap();
+    let is = |name: &&str| name.split(" [").next() == Some(path);
+    let mut found = (0..names.len()).filter(|k| is(&names[*k]));
+    let k = found
+        .next()
+        .unwrap_or_else(|| panic!("no {path} in {names:?}"));
+    assert_eq!(found.next(), None, "{path} twice");
+    lines.map(|line| line[k].parse().ok()).collect()
+}
+
+/// Yaw in messages each of which may lack a part of the quaternion.
+#[test]
+fn angles_are_in_the_messages_that_hold_all_of_a_quaternion() {
+    let folder = tempfile::tempdir().unwrap();
+    let yaw = |k: u32| 0.01 * f64::from(k);
+    let lacks = |k: u32| ["x", "y", "z", "w"][k as usize / 50];
+    let message = |k: u32| {
+        let (z, w) = (yaw(k) / 2.0).sin_cos();
+        let text = format!("{{\"q\":{{\"x\":0.0,\"y\":0.0,\"z\":{z},\"w\":{w}}}}}");
+        let text = match k % 50 {
+            25 => text.replace(lacks(k), "other"),
+            _ => text,
+        };
+        (yaw(k), text)
+    };
+    let file = told(folder.path(), &[("/t", (0..200).map(message).collect())]);
+    let table = folder.path().join("x.csv");
+    let args = [&*file, "--format", "json", "--out", table.to_str().unwrap()];
+    assert_eq!(json(&args)["signals"]["/t.q.yaw"]["count"], 196);
+    let found = column(&table, "/t.q.yaw");
+    assert_eq!(found.len(), 200);
+    for (k, found) in (0..).zip(found) {
+        assert_eq!(found.is_none(), k % 50 == 25, "{k}");
+        assert!(
+            found.is_none_or(|found| (found - yaw(k)).abs() < 1e-9),
+            "{k}"
+        );
+    }
+}
+
+/// Fields that some messages lack do not make more rows of a thinned topic, nor uneven ones.
+#[test]
+fn a_topic_is_thinned_by_its_messages() {
+    let folder = tempfile::tempdir().unwrap();
+    let message = |k: u32| {
+        let text = match (k % 3, k % 5) {
+            (0, _) => format!("{{\"a\":{k}}}"),
+            (_, 0) => format!("{{\"a\":{k},\"b\":1}}"),
+            _ => format!("{{\"a\":{k},\"b\":1,\"c\":2}}"),
+        };
+        (0.01 * f64::from(k), text)
+    };
+    let slow = |k: u32| (0.002 + 0.1 * f64::from(k), "{\"s\":1}".to_owned());
+    let topics = [
+        ("/t", (0..600).map(message).collect()),
+        ("/s", (0..50).map(slow).collect()),
+    ];
+    let file = told(folder.path(), &topics);
+    let table = folder.path().join("x.csv");
+    let out = table.to_str().unwrap();
+    assert!(
+        analyze(&[&file, "--downsample", "10", "--out", out])
+            .status
+            .success()
+    );
+    let found: Vec<f64> = column(&table, "/t.a").into_iter().flatten().collect();
+    let expected: Vec<f64> = (0..60).map(|k| f64::from(10 * k)).collect();
+    assert_eq!(found, expected);
+    assert_eq!(column(&table, "/t.a").len(), 65);
+    // A message that has no row is counted once, however many fields it has.
+    let twice = |k: u32| (0.01 * f64::from(k / 2), message(k).1);
+    let file = told(folder.path(), &[("/t", (0..600).map(twice).collect())]);
+    let said = text(&analyze(&[&file, "--out", out]).stderr);
+    assert!(said.contains("300 messages have no row"), "{said}");
+}
+
+/// Messages that tell the angles of their quaternion themselves, in degrees; the first ones do not.
+#[test]
+fn fields_go_before_angles_of_their_name() {
+    let folder = tempfile::tempdir().unwrap();
+    let message = |k: u32| {
+        let (z, w) = (0.005 * f64::from(k)).sin_cos();
+        let own = format!(",\"yaw\":{}", 1000 + k);
+        let own = if k < 300 { "" } else { &own };
+        let text = format!("{{\"q\":{{\"x\":0.0,\"y\":0.0,\"z\":{z},\"w\":{w}{own}}}}}");
+        (0.01 * f64::from(k), text)
+    };
+    let file = told(folder.path(), &[("/t", (0..600).map(message).collect())]);
+    let table = folder.path().join("x.csv");
+    let out = analyze(&[&file, "--format", "json", "--out", table.to_str().unwrap()]);
+    let said = text(&out.stdout);
+    assert_eq!(said.matches("\"/t.q.yaw\"").count(), 1, "{said}");
+    let found: Value = serde_json::from_str(&said).unwrap();
+    let found = &found["signals"];
+    assert_eq!(found["/t.q.roll"]["count"], 600);
+    let yaw = &found["/t.q.yaw"];
+    assert_eq!((&yaw["count"], &yaw["min"]), (&300.into(), &1300.0.into()));
+    let found = column(&table, "/t.q.yaw");
+    assert_eq!((found[299], found[300]), (None, Some(1300.0)));
 }
 
 #[test]

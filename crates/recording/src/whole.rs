@@ -160,11 +160,59 @@ impl Write for Sink {
     }
 }
 
-/// That an output is none of the inputs, nor another output: whoever names one twice would lose it.
+/// A file that a program is told to write.
+#[derive(Clone, Copy, Debug)]
+pub struct Output<'a> {
+    /// The option that names it.
+    pub option: &'a str,
+    /// Its name; `-` is standard output.
+    pub path: &'a Path,
+    /// What the name of such a file may end in.
+    pub endings: &'a [&'a str],
+}
+
+/// What the names of files end in that hold something else each.
+const KINDS: [&str; 20] = [
+    "mcap", "bag", "db3", "rrd", "csv", "tsv", "parquet", "npz", "zip", "wav", "json", "toml",
+    "yaml", "yml", "html", "htm", "md", "txt", "svg", "png",
+];
+
+/// That every output is none of the inputs, nor another output, and is not named as what it will not hold: a pattern or a slip that names a file
+/// would lose it. What is there already is written over only where its name ends in what is written.
 ///
 /// # Errors
-/// A sentence with the path that was named twice.
-pub fn apart<'a>(
+/// A sentence with the path that must not be written.
+pub fn may_write<'a>(
+    outputs: &[Output<'a>],
+    inputs: impl IntoIterator<Item = &'a Path>,
+) -> Result<(), String> {
+    apart(outputs.iter().map(|output| output.path), inputs)?;
+    outputs.iter().try_for_each(named)
+}
+
+fn named(output: &Output<'_>) -> Result<(), String> {
+    let ending = output.path.extension().unwrap_or_default();
+    let is = |known: &&str| ending.eq_ignore_ascii_case(known);
+    let new = !output.path.exists() && !KINDS.iter().any(is);
+    if new || output.endings.iter().any(is) || keeps_nothing(output.path) {
+        return Ok(());
+    }
+    Err(format!(
+        "{} {}: expected a name that ends in .{}, so that no file of another kind is written over",
+        output.option,
+        output.path.display(),
+        output.endings.join(" or .")
+    ))
+}
+
+/// Standard output, a device, a pipe.
+fn keeps_nothing(path: &Path) -> bool {
+    path.as_os_str() == "-"
+        || fs::metadata(path).is_ok_and(|found| !found.is_file() && !found.is_dir())
+}
+
+/// That an output is none of the inputs, nor another output: whoever names one twice would lose it.
+fn apart<'a>(
     outputs: impl IntoIterator<Item = &'a Path>,
     inputs: impl IntoIterator<Item = &'a Path>,
 ) -> Result<(), String> {
@@ -188,8 +236,7 @@ pub fn apart<'a>(
                 path.display()
             ));
         }
-        // A device keeps nothing.
-        if place.is_file() || !place.exists() {
+        if !keeps_nothing(&place) {
             seen.push(place);
         }
     }
@@ -218,6 +265,40 @@ mod tests {
         );
         assert!(apart([&*y, &*round_about.join("y")], [&*x]).is_err());
         assert!(apart([Path::new("/dev/null"), Path::new("/dev/null")], []).is_ok());
+    }
+
+    #[test]
+    fn nothing_is_written_under_the_name_of_another_kind() {
+        let folder = tempfile::tempdir().unwrap();
+        let names = [
+            "a.mcap",
+            "b.mcap",
+            "a.html",
+            "B.HTM",
+            "walk.2026-11-27",
+            "new",
+        ];
+        let [a, b, html, htm, odd, new] = names.map(|name| folder.path().join(name));
+        fs::write(&a, "1").unwrap();
+        fs::write(&odd, "1").unwrap();
+        let report = |path| Output {
+            option: "--report",
+            path,
+            endings: &["html", "htm"],
+        };
+        for path in [&*html, &htm, &new, Path::new("-"), Path::new("/dev/null")] {
+            assert_eq!(may_write(&[report(path)], [&*b]), Ok(()), "{path:?}");
+        }
+        for path in [&a, &odd, &b] {
+            let said = may_write(&[report(path)], []).unwrap_err();
+            let expected = "expected a name that ends in .html or .htm";
+            assert!(
+                said.starts_with("--report ") && said.contains(expected),
+                "{said}"
+            );
+        }
+        let twice = may_write(&[report(&a)], [&*a]).unwrap_err();
+        assert!(twice.contains("twice"), "{twice}");
     }
 
     #[test]

@@ -10,7 +10,7 @@ use anyhow::{Context, anyhow, bail};
 use clap::Parser;
 use recording::Finding;
 use recording::read::{ReadError, Recording, STDIN};
-use recording::whole::write_whole;
+use recording::whole::{Output, may_write, write_whole};
 use view::load::{Detail, load, options};
 use view::store::{Encoded, Sink};
 use view::take::Take;
@@ -82,8 +82,12 @@ fn run(arguments: &Arguments) -> anyhow::Result<Vec<Finding>> {
         if path.as_os_str() == "-" {
             bail!("--save -: an .rrd is written to a file; give it a name");
         }
-        recording::whole::apart([path.as_path()], [arguments.file.as_path()])
-            .map_err(anyhow::Error::msg)?;
+        let output = Output {
+            option: "--save",
+            path,
+            endings: &["rrd"],
+        };
+        may_write(&[output], [arguments.file.as_path()]).map_err(anyhow::Error::msg)?;
         return save(&arguments.file, path);
     }
     if let Some(url) = &arguments.connect {

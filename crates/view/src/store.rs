@@ -83,6 +83,8 @@ pub struct Progress {
     next: u64,
     /// Latest time that was sent of each entity, ns.
     last_ns: HashMap<String, i64>,
+    /// Where topics and their parts have been placed.
+    places: HashMap<(String, String), String>,
     /// What was said to hold for all of time.
     fixed: HashMap<String, Vec<SerializedComponentBatch>>,
 }
@@ -163,6 +165,23 @@ impl<'s> Store<'s> {
     /// How far this has been sent.
     pub fn into_progress(self) -> Progress {
         self.progress
+    }
+
+    /// The place of a part of a topic: the one that is wanted, or one beside it where another has that. Who has been placed stays there.
+    pub fn place(&mut self, (topic, part): (&str, &str), wanted: String) -> String {
+        let places = &mut self.progress.places;
+        let key = (topic.to_owned(), part.to_owned());
+        if let Some(known) = places.get(&key) {
+            return known.clone();
+        }
+        let mut path = wanted.clone();
+        let mut next = 2;
+        while places.values().any(|taken| *taken == path) {
+            path = format!("{wanted}-{next}");
+            next += 1;
+        }
+        places.insert(key, path.clone());
+        path
     }
 
     /// Something that holds for all of time. What was said before in the same words is not said again.

@@ -317,6 +317,50 @@ fn values_that_are_none_are_counted() {
     assert_eq!(take.remarks, [expected]);
 }
 
+/// Names that the viewer's tree cannot tell apart, and one that is called as another's second plot.
+#[test]
+fn topics_of_like_names_are_all_drawn() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("names.mcap");
+    let mut writer = RecordingWriter::create(&path, &WriterOptions::default()).unwrap();
+    let topics = [
+        "/motor", "/motor/2", "a_b", "/a_b", "/a.b", "a.b", "/a//b", "a/b",
+    ];
+    for (i, topic) in topics.into_iter().enumerate() {
+        let channel = writer
+            .raw_channel(&RawChannel {
+                topic,
+                message_encoding: "json",
+                schema_name: "",
+                schema_encoding: "",
+                schema_data: b"",
+                metadata: &Default::default(),
+            })
+            .unwrap();
+        for k in 0..20 {
+            let message = format!("{{\"x\":{},\"y\":{k}}}", 1000 * (i + 1));
+            writer
+                .message(channel, k * 10_000_000, message.as_bytes())
+                .unwrap();
+        }
+    }
+    writer.finish().unwrap();
+    let (sent, _) = taken(&path);
+    let places: Vec<String> = (sent.rows().into_keys())
+        .filter(|entity| entity.starts_with("/topics/"))
+        .collect();
+    for i in 0..topics.len() {
+        let is = |entity: &&String| sent.scalars(entity)[0].1 as usize / 1000 == i + 1;
+        let found: Vec<_> = places.iter().filter(is).collect();
+        assert_eq!(found.len(), 1, "{}: {places:?}", topics[i]);
+        assert_eq!(sent.scalars(found[0]).len(), 20);
+    }
+    assert!(
+        places.contains(&"/topics/motor/f0".to_owned()),
+        "{places:?}"
+    );
+}
+
 /// Every other pair of messages is written in the wrong order, in bursts; the sine of 2 Hz that was measured is drawn.
 #[test]
 fn messages_that_overtake_each_other_are_drawn_when_they_were_taken() {

@@ -91,6 +91,10 @@ fn nothing_is_left_where_it_cannot_be_done() {
             "cannot be written",
         ),
         (
+            vec![path("run.mcap"), "--save".into(), path("not.mcap")],
+            "not.mcap: expected a name that ends in .rrd",
+        ),
+        (
             vec![path("run.mcap"), "--connect".into(), "nonsense".into()],
             "is no address of Rerun",
         ),

@@ -1,43 +1,50 @@
 //! `analyze FILE...`
 
 use std::io::Write;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 use analyze::examine::{Analysis, Request, examine};
 use analyze::field::DeviceClocks;
 use analyze::quality::Quality;
 use analyze::report;
-use analyze::roles::RolesFile;
+use analyze::roles::{RolesFile, matches, meant};
 use anyhow::{Context, bail};
+use recording::Kind;
 use recording::read::{ReadOptions, Recording, STDIN};
 use recording::text::counted;
-use recording::whole;
+use recording::whole::{self, Output};
 
 use super::{AnalyzeArgs, Done, Format, Limits, annotate, complain, print};
 
 pub(super) fn run(args: &AnalyzeArgs) -> anyhow::Result<Done> {
     let request = request(args)?;
-    let single = [
-        ("--out", &args.out),
-        ("--annotate", &args.annotate),
-        ("--report", &args.report),
+    let single: [(_, _, &[&str]); 3] = [
+        ("--out", &args.out, &["csv", "parquet"]),
+        ("--annotate", &args.annotate, &["mcap"]),
+        ("--report", &args.report, &["html", "htm"]),
     ];
-    for (option, value) in single {
-        if value.as_deref() == Some(Path::new("-")) {
+    let named = |(option, path, endings)| {
+        let path: &Option<PathBuf> = path;
+        path.as_deref().map(|path| Output {
+            option,
+            path,
+            endings,
+        })
+    };
+    let outputs: Vec<Output<'_>> = single.into_iter().filter_map(named).collect();
+    for Output { option, path, .. } in &outputs {
+        if *path == Path::new("-") {
             bail!("{option}: standard output holds the result; name a file");
         }
-        if value.is_some() && args.files.len() > 1 {
+        if args.files.len() > 1 {
             bail!(
                 "{option} takes one recording, but {} were given: run it once for each",
                 args.files.len()
             );
         }
     }
-    if let Some(path) = &args.annotate {
-        super::is_recording("--annotate", path)?;
-    }
-    let outputs = single.iter().filter_map(|(_, path)| path.as_deref());
-    whole::apart(outputs, args.files.iter().map(AsRef::as_ref)).map_err(anyhow::Error::msg)?;
+    let inputs = args.files.iter().chain(&args.roles).map(AsRef::as_ref);
+    whole::may_write(&outputs, inputs).map_err(anyhow::Error::msg)?;
     let mut analyses = Vec::new();
     let mut failed = false;
     for file in &args.files {
@@ -138,19 +145,31 @@ fn one(path: &Path, args: &AnalyzeArgs, request: &Request) -> anyhow::Result<Ana
     if analysis.is_empty() {
         bail!("{}", nothing(&analysis, request));
     }
+    for pattern in &request.topics {
+        let names = || analysis.topics.iter().map(|t| t.name.as_str());
+        if !names().any(|topic| matches(pattern, topic)) {
+            let hint = meant(pattern, names());
+            recording::note!("analyze: {name}: no topic fits {pattern}{hint}");
+        }
+    }
     for pattern in &request.signals {
-        if !(analysis.signals.iter()).any(|(path, _)| analyze::roles::matches(pattern, path)) {
+        if !(analysis.signals.iter()).any(|(path, _)| matches(pattern, path)) {
             recording::note!("analyze: {name}: no numeric signal fits {pattern}");
         }
     }
     if let Some(out) = &args.out {
-        let overlaid = analyze::table::write(&recording, request, args.downsample, out)?;
-        if overlaid > 0 {
+        let written = analyze::table::write(&recording, request, args.downsample, out)?;
+        let out = out.display();
+        if written.overlaid > 0 {
             recording::note!(
-                "analyze: {}: {} no row, because one of the same topic and time came after",
-                out.display(),
-                counted(overlaid, "message has", "messages have")
+                "analyze: {out}: {} no row, because one of the same topic and time came after",
+                counted(written.overlaid, "message has", "messages have")
             );
+        }
+        let limits = (written.findings.iter())
+            .filter(|f| matches!(f.kind, Kind::LongSequence | Kind::OddSchema));
+        for limit in limits.take(20) {
+            recording::note!("analyze: {out}: {limit}");
         }
     }
     if let Some(out) = &args.report {

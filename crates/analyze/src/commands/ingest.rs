@@ -1,11 +1,11 @@
 //! `analyze ingest FILE... --out FILE.mcap`
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 use anyhow::bail;
 use clap::Args;
 use recording::import::{self, ImportError};
-use recording::whole::apart;
+use recording::whole::{Output, may_write};
 use recording::write::{RecordingWriter, WriterOptions};
 
 use super::Done;
@@ -55,14 +55,20 @@ pub(super) fn run(args: &IngestArgs) -> anyhow::Result<Done> {
 }
 
 fn ingest(args: &IngestArgs) -> anyhow::Result<Done> {
-    apart([&*args.out], args.files.iter().map(AsRef::as_ref)).map_err(anyhow::Error::msg)?;
+    let output = Output {
+        option: "--out",
+        path: &args.out,
+        endings: &["mcap"],
+    };
+    let layout = args.layout.iter().map(Path::new);
+    let inputs = args.files.iter().map(AsRef::as_ref).chain(layout);
+    may_write(&[output], inputs).map_err(anyhow::Error::msg)?;
     if args.sound_start.abs() > 1e6 || args.sound_start.is_nan() {
         bail!(
             "--sound-start: found {}, expected seconds up to 1000000",
             args.sound_start
         );
     }
-    super::is_recording("--out", &args.out)?;
     let options = import::ImportOptions {
         layout: args.layout.as_deref(),
         sound_start_s: args.sound_start,

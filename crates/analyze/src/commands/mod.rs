@@ -6,10 +6,9 @@ mod ingest;
 mod window;
 
 use std::io::Write;
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 use std::process::ExitCode;
 
-use anyhow::bail;
 use clap::{Args, Parser, Subcommand, ValueEnum};
 use recording::read::ReadOptions;
 use recording::text::plain;
@@ -80,7 +79,7 @@ struct AnalyzeArgs {
     /// Write the signals to a table; columns are named by their paths (in CSV with their units)
     #[arg(long, value_name = "FILE.parquet|.csv")]
     out: Option<PathBuf>,
-    /// Write one row in so many, for --out
+    /// Write one row of each topic in so many, for --out
     #[arg(long, value_name = "N", default_value_t = 1, value_parser = clap::value_parser!(u64).range(1..))]
     downsample: u64,
     /// Write the recording again with what was found beside it
@@ -182,24 +181,6 @@ fn complain(error: &anyhow::Error) {
         }
         said = cause;
     }
-}
-
-/// Refuses to write a recording under the name of something else.
-fn is_recording(option: &str, path: &Path) -> anyhow::Result<()> {
-    const OTHERS: [&str; 9] = [
-        "csv", "tsv", "txt", "parquet", "json", "html", "zip", "npz", "wav",
-    ];
-    let extension = path.extension().unwrap_or_default().to_string_lossy();
-    if OTHERS
-        .iter()
-        .any(|other| extension.eq_ignore_ascii_case(other))
-    {
-        bail!(
-            "{option} {}: a recording is written, which is MCAP and no {extension}; expected a name that ends in .mcap",
-            path.display()
-        );
-    }
-    Ok(())
 }
 
 fn print(text: &str) -> anyhow::Result<()> {

@@ -18,6 +18,18 @@ const MOST_TRACES: usize = 24;
 pub(crate) const MOST_SERIES: usize = 7;
 
 impl Pass<'_> {
+    /// Leaves a name to the field that has it, where angles were taken under it before the first message with that field came.
+    pub(super) fn fields_before_angles(&mut self) {
+        let fields = self.by_column.iter().flatten();
+        let fields: HashSet<&str> = fields.map(|k| &*self.entries[*k].path).collect();
+        let doubled = |path: &String, _: &mut usize| fields.contains(path.as_str());
+        let doubled: Vec<usize> = (self.by_path.extract_if(doubled)).map(|(_, k)| k).collect();
+        for entry in doubled {
+            let entry = &mut self.entries[entry];
+            (entry.listed, entry.role, entry.outline) = (false, None, None);
+        }
+    }
+
     /// A line for every listed signal. Spectra of those that were asked for by name are added to `spectra`, which are named after f.
     pub(super) fn signals(
         &self,

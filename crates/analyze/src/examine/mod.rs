@@ -42,6 +42,7 @@ pub fn examine(
     let mut pass = Pass::new(recording, request, &roles);
     let select = |path: &str| wanted(path, request, &roles);
     let findings = recording.stream(&select, &mut |batch| pass.take(batch))?;
+    pass.fields_before_angles();
     let skipped_messages = recording.skipped_messages().max(info.skipped_messages);
     let mut quality: Vec<Quality> = findings.into_iter().map(Quality::from).collect();
     quality.sort_by(|a, b| (&a.topic, a.kind).cmp(&(&b.topic, b.kind)));

@@ -8,7 +8,7 @@ use super::pass::{Entry, Pass, field};
 use crate::field::{ACCEL, GYRO};
 use crate::inputs::Window;
 use crate::quality::Quality;
-use crate::roles::{Role, RolesFile, is_carrier, matches, stands_beside};
+use crate::roles::{Role, RolesFile, is_carrier, matches, meant, stands_beside};
 
 /// A topic that begins so late or ends so early is worth a word: this share of the window, and this long (s).
 const LEAST_ABSENT: f64 = 0.02;
@@ -205,11 +205,7 @@ impl Pass<'_> {
                 if names.iter().any(|name| matches(pattern, name)) {
                     continue;
                 }
-                let far = |name| (strsim::damerau_levenshtein(name, pattern), name);
-                let nearest = names.iter().copied().map(far).min_by_key(|(far, _)| *far);
-                let near = nearest.filter(|(far, _)| 3 * far <= pattern.len());
-                let hint =
-                    near.map_or(String::new(), |(_, name)| format!("; did you mean {name}?"));
+                let hint = meant(pattern, names.iter().copied());
                 out.push(format!(
                     "the roles file's {word}, {pattern}, is not in the recording{hint}"
                 ));

@@ -2,7 +2,7 @@
 
 use super::setting;
 use anyhow::{Context, Result, anyhow};
-use recording::whole::{apart, write_whole};
+use recording::whole::write_whole;
 use sim::model::Model;
 use sim::scene::load;
 use std::io::Write;
@@ -28,7 +28,7 @@ pub struct Args {
 /// Writes the sound; the file appears whole or not at all.
 pub fn run(args: &Args) -> Result<()> {
     super::is_file(&args.out)?;
-    apart([args.out.as_path()], [Path::new(&args.scene)]).map_err(anyhow::Error::msg)?;
+    super::may_write(&args.out, "wav", &[Path::new(&args.scene)])?;
     let mut scene = load(&args.scene, &args.set)?;
     if scene.effects.music.is_none() {
         return Err(anyhow!(

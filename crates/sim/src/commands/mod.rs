@@ -8,7 +8,9 @@ mod replay;
 mod scenes;
 
 use clap::{Subcommand, ValueEnum};
+use recording::whole::Output;
 use serde_json::{Value, json};
+use std::path::Path;
 use std::process::ExitCode;
 
 /// What `sim` can do.
@@ -57,13 +59,23 @@ fn seconds(text: &str) -> Result<f64, String> {
 }
 
 /// Refuses `-`, which only `sim record` takes for standard output.
-fn is_file(out: &std::path::Path) -> anyhow::Result<()> {
+fn is_file(out: &Path) -> anyhow::Result<()> {
     match out.as_os_str() == "-" {
         true => Err(anyhow::anyhow!(
             "--out -: this is written to a file; give it a name"
         )),
         false => Ok(()),
     }
+}
+
+/// That `--out` may be written: it is none of the inputs, nor named as something else.
+fn may_write(out: &Path, ending: &str, inputs: &[&Path]) -> anyhow::Result<()> {
+    let output = Output {
+        option: "--out",
+        path: out,
+        endings: &[ending],
+    };
+    recording::whole::may_write(&[output], inputs.iter().copied()).map_err(anyhow::Error::msg)
 }
 
 /// Runs a command; errors go to stderr, one sentence first, then the causes.

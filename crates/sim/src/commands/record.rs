@@ -3,7 +3,6 @@
 use super::{real, setting};
 use anyhow::{Context, Result, anyhow, bail};
 use indicatif::{ProgressBar, ProgressStyle};
-use recording::whole::apart;
 use recording::whole::remove_unfinished_files;
 use recording::write::{RecordingWriter, WriteError, WriterOptions};
 use sim::model::Model;
@@ -126,7 +125,7 @@ fn record(args: &Args) -> Result<()> {
         .out
         .clone()
         .unwrap_or_else(|| file_of(&scene.name, scene.seed));
-    apart([path.as_path()], [Path::new(&args.scene)]).map_err(anyhow::Error::msg)?;
+    super::may_write(&path, "mcap", &[Path::new(&args.scene)])?;
     let options = WriterOptions::beside();
     let writer = RecordingWriter::to(&path, &options)?;
 

@@ -4,7 +4,6 @@ use super::{Format, print, seconds, setting};
 use anyhow::{Context, Result, anyhow, bail};
 use recording::read::{ReadOptions, Recording};
 use recording::topics::{BEAT, FORCES, PHASES, STATE};
-use recording::whole::apart;
 use recording::write::{ChannelId, RawChannel, RecordingWriter, WriteError, WriterOptions};
 use sim::model::Model;
 use sim::record::Recorder;
@@ -143,8 +142,7 @@ pub fn run(args: &Args) -> Result<Input> {
         PathBuf::from(format!("{stem}-replay.mcap"))
     });
     super::is_file(&out)?;
-    let inputs = [args.file.as_path(), Path::new(&args.scene)];
-    apart([out.as_path()], inputs).map_err(anyhow::Error::msg)?;
+    super::may_write(&out, "mcap", &[&args.file, Path::new(&args.scene)])?;
     let model = Model::new(&replay.scene);
     let writer = RecordingWriter::create(&out, &WriterOptions::beside())?;
     let mut recorder = Recorder::at(&model, writer, replay.epoch_ns)?;

@@ -32,19 +32,18 @@ pub fn draw(store: &mut Store<'_>, take: &Take) -> anyhow::Result<Vec<Panel>> {
     Ok(out)
 }
 
-/// A topic's place in the entity tree.
-fn place(topic: &str) -> String {
-    let clean: String = topic
-        .chars()
-        .map(|c| {
-            if c.is_alphanumeric() || "/_-".contains(c) {
-                c
-            } else {
-                '_'
-            }
-        })
-        .collect();
-    format!("/topics/{}", clean.trim_matches('/'))
+/// The place in the entity tree of what is drawn of a topic, or of a part of that.
+fn place(store: &mut Store<'_>, topic: &str, part: &str) -> String {
+    let plain = |c: char| match c.is_alphanumeric() || "/_-".contains(c) {
+        true => c,
+        false => '_',
+    };
+    let clean: String = topic.chars().map(plain).collect();
+    let part_clean = part.replace(['/', '^', '.'], "_");
+    let levels = clean.split('/').chain([part_clean.as_str()]);
+    let levels = levels.filter(|level| !level.is_empty());
+    let wanted: String = levels.map(|level| format!("/{level}")).collect();
+    store.place((topic, part), format!("/topics{wanted}"))
 }
 
 fn sensor(
@@ -53,7 +52,6 @@ fn sensor(
     attitude: bool,
     take: &Take,
 ) -> anyhow::Result<Option<Panel>> {
-    let origin = place(&sensor.topic);
     let xyz = "x vermilion, y green, z blue";
     let mut plots: Vec<View> = Vec::new();
     let groups: [(&str, &[take::Curve], String); 3] = [
@@ -92,7 +90,7 @@ fn sensor(
         if made.is_empty() || (name == "attitude" && !attitude) {
             continue;
         }
-        let path = format!("{origin}/{name}");
+        let path = place(store, &sensor.topic, name);
         let range = spread(&made, take.growing);
         plots.push(plot(store, title, &path, made, range)?);
     }
@@ -125,7 +123,7 @@ fn sensor(
                 color,
             })
             .collect();
-        let path = format!("{origin}/{name}");
+        let path = place(store, &sensor.topic, name);
         // One reference for the three axes, so that they can be compared.
         let peak = curves
             .iter()
@@ -168,15 +166,10 @@ fn gait_line(spectra: &[Spectrum]) -> Option<f64> {
 fn topic(store: &mut Store<'_>, topic: &take::Topic, growing: bool) -> anyhow::Result<Panel> {
     let mut plots = Vec::new();
     for (k, (unit, curves)) in topic.plots.iter().enumerate() {
+        // Of several without a unit, each has a place of its own.
         let path = match unit.as_str() {
-            // Of several without a unit, each has a place of its own.
-            "" if k > 0 => format!("{}/{}", place(&topic.name), k + 1),
-            "" => place(&topic.name),
-            unit => format!(
-                "{}/{}",
-                place(&topic.name),
-                unit.replace(['/', '^', '.'], "_")
-            ),
+            "" if k > 0 => place(store, &topic.name, &(k + 1).to_string()),
+            unit => place(store, &topic.name, unit),
         };
         let mut names = Vec::new();
         let mut made = Vec::new();
