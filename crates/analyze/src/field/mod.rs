@@ -69,12 +69,22 @@ pub struct Field {
     /// Their numbers, where they have some.
     beat_number: Option<Vec<f64>>,
     beat_source: &'static str,
+    /// Whether nothing tells how the clock of the sound that they were heard in stands to the others.
+    sound_is_adrift: bool,
     judge: Option<Judge>,
     filled: Filled,
     quality: Vec<Quality>,
     /// By topic, when a sensor's first and last samples were taken (s), where the log does not tell.
     pub own_s: BTreeMap<String, (f64, f64)>,
 }
+
+/// What hangs on when a beat is heard beside a step, or on when the beat began.
+const BY_SOUNDS_CLOCK: [&str; 4] = [
+    "beat_lead_deg",
+    "detuning_rad_per_s",
+    "pull_rad_per_s",
+    "captured",
+];
 
 /// Which groups of columns came from here.
 #[derive(Default)]
@@ -277,7 +287,18 @@ impl Field {
         if let Some((topic, onset_s)) = sound
             && field.beat_source == "sound"
         {
-            clocks.put_sound_right(&topic, &onset_s, &mut field.beat_s);
+            let set = clocks.put_sound_right(&topic, &onset_s, &mut field.beat_s);
+            // Messages that were logged beside the sensors' came when the log says.
+            field.sound_is_adrift = !set && !one_clock && place::is_put_together(recording);
+            if field.sound_is_adrift {
+                let why = format!(
+                    "nothing tells when this sound began beside the steps: {} have no value; tap the sensors near the microphone or say --one-clock",
+                    BY_SOUNDS_CLOCK.join(", ")
+                );
+                field
+                    .quality
+                    .push(Quality::remark(&topic, "clocks_apart", why));
+            }
         }
         if !one_clock && !clocks.any_set {
             field.align(roles, leave);
@@ -503,6 +524,10 @@ impl Field {
                 &others,
                 by_taps,
             );
+            let adrift = |name: &&str| self.sound_is_adrift && BY_SOUNDS_CLOCK.contains(name);
+            for (_, value) in together.0.iter_mut().filter(|(name, _)| adrift(name)) {
+                value.withhold("nothing tells when the sound began beside the steps: tap the sensors near the microphone or say --one-clock");
+            }
             out.0.extend(together.0);
         }
         // Taps and talk before and behind the music are heard too.
