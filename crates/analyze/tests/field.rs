@@ -305,6 +305,33 @@ fn a_sound_that_nothing_dates_gives_no_lead() {
     assert!(!adrift(&one) && one.metrics.number("beat_lead_deg").is_some());
 }
 
+/// A walker's only phone tells steps too; a sensor that is said to sit on the load does not.
+#[test]
+fn a_sensor_on_the_load_does_not_walk() {
+    let (_folder, recording) = put_together(&[("rath.zip", "phone.zip")]);
+    let steps = |roles| {
+        examined(&recording, roles, DeviceClocks::PutRight)
+            .metrics
+            .number("step_rate_hz")
+    };
+    assert!(steps("").is_some());
+    assert_eq!(steps("imu_place_m = [0.5, 0.0, 0.3]"), None);
+}
+
+/// Sensors that are left aside because nothing says whose they are.
+#[test]
+fn sensors_without_a_role_are_named() {
+    let (_folder, recording) =
+        put_together(&[("rath.zip", "rath.zip"), ("carrier_1.zip", "ram.zip")]);
+    let said = |roles| {
+        let found = examined(&recording, roles, DeviceClocks::PutRight);
+        let mut without = found.quality.into_iter().filter(|q| q.kind == "no_role");
+        without.next().map(|q| q.text)
+    };
+    assert!(said("").unwrap().starts_with("/imu/ram is left aside"));
+    assert_eq!(said("carriers = [\"/imu/ram\"]"), None);
+}
+
 /// Real turns and jolts in short holes: how far roll and height come out otherwise than without holes, and how far it is said that they may.
 #[test]
 #[ignore = "needs recordings that are not shipped: see above"]
