@@ -248,6 +248,90 @@ fn raw_phone_files_become_the_papers_metrics() {
     assert!(turned.metrics.get("rms_roll_deg").unwrap().ci95.is_none());
 }
 
+/// A recording of sample files, each under a name.
+fn put_together(files: &[(&str, &str)]) -> (tempfile::TempDir, Recording) {
+    let folder = PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("../../data-samples/phones");
+    let out = tempfile::tempdir().unwrap();
+    let copied = files.iter().map(|(from, to)| {
+        let to = out.path().join(to);
+        std::fs::copy(folder.join(from), &to).unwrap();
+        to
+    });
+    let copied: Vec<PathBuf> = copied.collect();
+    let path = out.path().join("walk.mcap");
+    let mut writer = RecordingWriter::create(&path, &WriterOptions::default()).unwrap();
+    ingest(&copied, &ImportOptions::default(), &mut writer).unwrap();
+    writer.finish().unwrap();
+    let recording = Recording::open(&path, &ReadOptions::default()).unwrap();
+    (out, recording)
+}
+
+fn examined(recording: &Recording, roles: &str, clocks: DeviceClocks) -> Analysis {
+    let request = Request {
+        roles: Some(toml::from_str(roles).unwrap()),
+        window: (Some(27.0), Some(53.0)),
+        clocks,
+        ..Request::default()
+    };
+    examine("walk.mcap", recording, &request).unwrap()
+}
+
+/// A sound file does not know when it began. Without taps a lead over its beat would be any.
+#[test]
+fn a_sound_that_nothing_dates_gives_no_lead() {
+    let files = ["carrier_1.zip", "carrier_2.zip", "drum.wav"];
+    let (_folder, recording) = put_together(&files.map(|name| (name, name)));
+    let adrift = |found: &Analysis| {
+        let said = |q: &Quality| q.kind == "clocks_apart" && q.topic == "/audio/drum";
+        found.quality.iter().any(said)
+    };
+    let found = examined(&recording, "", DeviceClocks::PutRight);
+    assert!(adrift(&found));
+    for name in [
+        "beat_lead_deg",
+        "detuning_rad_per_s",
+        "pull_rad_per_s",
+        "captured",
+    ] {
+        let value = found.metrics.get(name).unwrap();
+        let why = value.reason.as_deref().unwrap();
+        assert!(why.contains("when the sound began"), "{name}: {why}");
+        assert!(value.as_f64().is_none() && value.as_bool().is_none() && value.ci95.is_none());
+    }
+    // How fast it beats, and whether they stay with it, hangs on no clock.
+    assert!((found.metrics.number("beat_hz").unwrap() - 2.1507).abs() < 5e-4);
+    assert!(found.metrics.number("beat_synchrony").unwrap() > 0.99);
+    let one = examined(&recording, "", DeviceClocks::One);
+    assert!(!adrift(&one) && one.metrics.number("beat_lead_deg").is_some());
+}
+
+/// A walker's only phone tells steps too; a sensor that is said to sit on the load does not.
+#[test]
+fn a_sensor_on_the_load_does_not_walk() {
+    let (_folder, recording) = put_together(&[("rath.zip", "phone.zip")]);
+    let steps = |roles| {
+        examined(&recording, roles, DeviceClocks::PutRight)
+            .metrics
+            .number("step_rate_hz")
+    };
+    assert!(steps("").is_some());
+    assert_eq!(steps("imu_place_m = [0.5, 0.0, 0.3]"), None);
+}
+
+/// Sensors that are left aside because nothing says whose they are.
+#[test]
+fn sensors_without_a_role_are_named() {
+    let (_folder, recording) =
+        put_together(&[("rath.zip", "rath.zip"), ("carrier_1.zip", "ram.zip")]);
+    let said = |roles| {
+        let found = examined(&recording, roles, DeviceClocks::PutRight);
+        let mut without = found.quality.into_iter().filter(|q| q.kind == "no_role");
+        without.next().map(|q| q.text)
+    };
+    assert!(said("").unwrap().starts_with("/imu/ram is left aside"));
+    assert_eq!(said("carriers = [\"/imu/ram\"]"), None);
+}
+
 /// Real turns and jolts in short holes: how far roll and height come out otherwise than without holes, and how far it is said that they may.
 #[test]
 #[ignore = "needs recordings that are not shipped: see above"]

@@ -97,6 +97,7 @@ pub fn beats_among(onsets: &Onsets) -> Result<Beats, BeatError> {
 mod tests {
     use super::synth::{Drums, drums};
     use super::*;
+    use crate::random::Random;
     use crate::steps::agreement;
 
     #[test]
@@ -131,6 +132,81 @@ mod tests {
             beats(&[0.0; 100], f64::NAN),
             Err(BeatError::TooSlow { .. })
         ));
+    }
+
+    /// Bursts of sound at random times, so many seconds apart on average.
+    fn bursts(length_s: f64, apart_s: f64, seed: u64) -> Vec<f32> {
+        let (mut random, mut sound) = (Random(seed), vec![0.0; (8000.0 * length_s) as usize]);
+        let mut t_s = 0.0;
+        loop {
+            t_s -= apart_s * (1.0 - random.uniform()).ln();
+            let (loud, hz) = (0.2 + random.uniform(), 150.0 + 350.0 * random.uniform());
+            let Some(rest) = sound.get_mut((8000.0 * t_s) as usize..) else {
+                return sound;
+            };
+            for (k, x) in rest.iter_mut().take(2000).enumerate() {
+                let t = k as f64 / 8000.0;
+                let wave = (-t / 0.05).exp() * (std::f64::consts::TAU * hz * t).sin();
+                *x += (loud * wave) as f32;
+            }
+        }
+    }
+
+    /// Irregular sound repeats by chance; the shorter it is, the more.
+    #[test]
+    fn what_begins_at_random_is_no_beat() {
+        for (length_s, apart_s) in [(6.0, 0.35), (20.0, 0.2), (20.0, 0.6), (60.0, 0.35)] {
+            for seed in 1..=4 {
+                let found = beats(&bursts(length_s, apart_s, seed), 8000.0);
+                assert_eq!(found, Err(BeatError::NoBeat), "{length_s} {apart_s} {seed}");
+            }
+        }
+    }
+
+    /// A drum that pauses, in silence and in noise, and one that stops while somebody talks.
+    #[test]
+    fn where_nothing_is_struck_no_beat_is_heard() {
+        let rate_hz = 22_050.0;
+        let (sound, truth) = drums(&Drums::default());
+        let talk = bursts(40.0, 0.35, 5);
+        let hush = |k: usize| 0.01 * ((k * 7919) % 1000) as f32 / 1000.0;
+        let other: [(f64, f64, &dyn Fn(usize) -> f32); 4] = [
+            (15.0, 23.0, &|_| 0.0),
+            (15.0, 18.0, &|_| 0.0),
+            (15.0, 23.0, &hush),
+            (25.0, 40.0, &|k| 0.1 * talk[k * 8000 / 22_050]),
+        ];
+        for (k, (from_s, to_s, instead)) in other.iter().enumerate() {
+            let mut sound = sound.clone();
+            let (from, to) = ((from_s * rate_hz) as usize, (to_s * rate_hz) as usize);
+            (from..to).for_each(|k| sound[k] = instead(k));
+            let found = beats(&sound, rate_hz).unwrap();
+            let silent = |t: &&f64| (from_s + 0.1..to_s - 0.1).contains(*t);
+            assert_eq!(found.beat_s.iter().find(silent), None, "{k}");
+            let struck: Vec<f64> = truth.iter().filter(|t| !silent(t)).copied().collect();
+            let f1 = agreement(&found.beat_s, &struck, 0.07).f1;
+            assert!(f1 > 0.97, "{k}: {f1}");
+            let off_hz = (found.tempo_hz - 2.0).abs();
+            assert!(off_hz < found.tempo_ci95_hz.max(5e-4), "{k}: {off_hz}");
+            let gaps = lock::beats_between(&found.beat_s, None);
+            assert_eq!(gaps.contains(&None), k == 0 || k == 2, "{k}");
+        }
+    }
+
+    /// Single beats that nobody strikes are beats all the same.
+    #[test]
+    fn a_beat_that_is_missed_is_no_pause() {
+        let (mut sound, truth) = drums(&Drums {
+            snr_db: 40.0,
+            ..Drums::default()
+        });
+        for t in truth.iter().skip(7).step_by(9) {
+            let at = ((t - 0.03) * 22_050.0) as usize;
+            sound[at..at + 5000].fill(0.0);
+        }
+        let found = beats(&sound, 22_050.0).unwrap();
+        let f1 = agreement(&found.beat_s, &truth, 0.07).f1;
+        assert!(f1 > 0.98 && !lock::beats_between(&found.beat_s, None).contains(&None));
     }
 
     #[test]

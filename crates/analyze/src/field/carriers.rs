@@ -1,6 +1,6 @@
 //! The carriers' own sensors: steps, gait phases on one clock, how sure they are.
 
-use super::align::{ALIGN_HZ, Match};
+use super::align::{ALIGN_HZ, Match, Matches};
 use crate::events::Event;
 use crate::filter::{Band, butter, sosfiltfilt};
 use crate::imu::Track;
@@ -21,8 +21,8 @@ use nalgebra::{UnitQuaternion, Vector3};
 const LEAST_OFFSET_S: f64 = 0.03;
 /// Half the 95 % interval of what is found, s, by twins.
 const OFFSET_ERROR_S: f64 = 0.02;
-/// J below which the heaves are not taken for the rath's: on twins it is 0.98 and more.
-const MATCH: f64 = 0.8;
+/// J below which the heaves are not taken for the rath's: on twins it is 0.96 and more, and mostly 0.85 to 0.94 where clocks part by more than is looked for.
+const MATCH: f64 = 0.95;
 /// Clocks are moved where that leaves at most this share of what is unexplained with the clocks as they are.
 const BETTER: f64 = 0.5;
 /// How far the clocks of two are looked for either way, s, or so much of what they share.
@@ -443,22 +443,26 @@ fn offsets(worn: [&Worn; 2], motion: &Motion) -> Result<Option<Offsets>, &'stati
     let cadence_hz = worn[0].steps.as_ref().map_or(1.0, |s| s.cadence_hz);
     let half_step = (0.5 * ALIGN_HZ / cadence_hz) as i64;
     let reach = (REACH_S.0.min(REACH_S.1 * (end - start)) * ALIGN_HZ) as i64;
-    let (all, as_they_are) = compared.best(reach, half_step).ok_or(short)?;
-    let best = all[0].0;
-    if best < 2.0 * -(1.0 - MATCH).ln() {
-        return Err("their heaves, put together, are not the load's");
-    }
-    let step_s = 2.0 * half_step as f64 / ALIGN_HZ;
+    let found = compared.best(reach, half_step).ok_or(short)?;
+    judged(found, 2.0 * half_step as f64 / ALIGN_HZ)
+}
+
+/// What matches of two clocks say of them, where a step takes so long (s): [`offsets`].
+fn judged((all, as_they_are): Matches, step_s: f64) -> Result<Option<Offsets>, &'static str> {
+    let enough = 2.0 * -(1.0 - MATCH).ln();
+    let not_the_loads = "their heaves, put together, are not the load's";
+    let best = all.first().map_or(0.0, |(told, _)| *told);
     let mut all = all.into_iter().map(|(_, found)| {
         // The load's lag is less than half a step and no clock's.
         let mean = 0.5 * (found[0] + found[1]);
         let lag = mean - (mean / step_s).round() * step_s;
         found.map(|o| o - lag)
     });
-    let first = all.next().ok_or(short)?;
+    let first = all.next().filter(|_| best >= enough).ok_or(not_the_loads)?;
     let little = (first[0] - first[1]).abs() < LEAST_OFFSET_S;
     if best - as_they_are < -BETTER.ln() || little {
-        return Ok(None);
+        // Where nothing within reach is right, nothing is much better either.
+        return (as_they_are >= enough).then_some(None).ok_or(not_the_loads);
     }
     Ok(Some((first, all.collect())))
 }
@@ -523,6 +527,28 @@ mod tests {
                     .contains("clocks agree")
             );
         }
+    }
+
+    /// What matches tell of clocks that are right, 0.2 s off, and further off than is looked for (music, one clock 8.3, 6.2 and 13.1 s off).
+    #[test]
+    fn clocks_are_right_only_where_the_load_moves_so() {
+        let of = |told: f64, found: [f64; 2], as_they_are| {
+            judged((vec![(told, found)], as_they_are), 0.46)
+        };
+        assert_eq!(of(7.66, [-0.103, -0.097], 7.66), Ok(None));
+        let (offsets, others) = of(7.67, [0.097, -0.097], 1.11).unwrap().unwrap();
+        assert!((offsets[0] - offsets[1] - 0.194).abs() < 1e-12 && others.is_empty());
+        for (told, found, as_they_are) in [
+            (3.91, [-2.068, -0.452], 3.41),
+            (5.43, [4.604, -4.954], 3.51),
+            (7.12, [4.965, 4.955], 5.81),
+        ] {
+            assert!(
+                of(told, found, as_they_are).is_err(),
+                "{told} {as_they_are}"
+            );
+        }
+        assert!(judged((Vec::new(), 9.0), 0.46).is_err());
     }
 
     const WALK_HZ: f64 = 2.0;

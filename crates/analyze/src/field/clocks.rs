@@ -111,10 +111,16 @@ impl Clocks {
         self.remarks.push(Quality::remark(topic, kind, text));
     }
 
-    /// Puts the beats that were heard on the rath's clock, and leaves out those that are taps; `onset_s` is everything that begins in the sound.
-    pub fn put_sound_right(&mut self, topic: &str, onset_s: &[f64], heard_s: &mut Vec<f64>) {
+    /// Puts the beats that were heard on the rath's clock, and leaves out those that are taps; `onset_s` is everything that begins in the sound. Says
+    /// whether that was done.
+    pub fn put_sound_right(
+        &mut self,
+        topic: &str,
+        onset_s: &[f64],
+        heard_s: &mut Vec<f64>,
+    ) -> bool {
         if self.tap_s.len() < FEWEST {
-            return;
+            return false;
         }
         // The other way round: the taps are few, and sound begins all the time.
         let fit = from_events(&self.tap_s, onset_s, SEARCH_S, TOLERANCE_S);
@@ -125,14 +131,16 @@ impl Clocks {
             };
             self.say(topic, &clock, clock.ahead().map(|of_rath| -of_rath));
             if self.leave {
-                return;
+                return false;
             }
             for t in &mut *heard_s {
                 *t = clock.device_s(*t);
             }
             let begins_s: Vec<f64> = onset_s.iter().map(|t| clock.device_s(*t)).collect();
             self.leave_taps_out(&begins_s, heard_s);
+            return true;
         }
+        false
     }
 
     /// Leaves out what was taken for beats while somebody tapped, before the walk or behind it, and in the silence between taps and music, where

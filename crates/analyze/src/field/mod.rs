@@ -35,7 +35,7 @@ use crate::imu::unloading::unloadings;
 use crate::inputs::{Inputs, Window};
 use crate::metrics::{Metrics, Value, metrics_of};
 use crate::quality::Quality;
-use crate::roles::{Role, Roles, Sensors, about_the_load};
+use crate::roles::{Role, Roles, Sensors, about_the_load, stands_beside};
 use carriers::Carriers;
 use clocks::Clocks;
 pub(crate) use columns::{ACCEL, GYRO};
@@ -69,12 +69,22 @@ pub struct Field {
     /// Their numbers, where they have some.
     beat_number: Option<Vec<f64>>,
     beat_source: &'static str,
+    /// Whether nothing tells how the clock of the sound that they were heard in stands to the others.
+    sound_is_adrift: bool,
     judge: Option<Judge>,
     filled: Filled,
     quality: Vec<Quality>,
     /// By topic, when a sensor's first and last samples were taken (s), where the log does not tell.
     pub own_s: BTreeMap<String, (f64, f64)>,
 }
+
+/// What hangs on when a beat is heard beside a step, or on when the beat began.
+const BY_SOUNDS_CLOCK: [&str; 4] = [
+    "beat_lead_deg",
+    "detuning_rad_per_s",
+    "pull_rad_per_s",
+    "captured",
+];
 
 /// Which groups of columns came from here.
 #[derive(Default)]
@@ -258,13 +268,18 @@ impl Field {
             if !feels {
                 continue;
             }
-            // The one sensor of a walker's phone plays the rath's role for want of another: steps tell.
-            if !is_rath || (roles.patterns(Role::Carriers).is_empty() && !about_the_load(topic)) {
+            // The one sensor of a walker's phone plays the rath's role for want of another: steps tell. Who says where it sits on the load says what
+            // it is.
+            let said = roles.sensors.place_m.is_some()
+                || roles.sensors.mounting_roll_pitch_yaw_deg.is_some();
+            let alone = roles.patterns(Role::Carriers).is_empty();
+            if !is_rath || (alone && !said && !about_the_load(topic)) {
                 field
                     .carriers
                     .add(topic, &track, options, gravity_m_per_s2, clock_sd_s);
             }
         }
+        field.quality.extend(without_a_role(recording, roles));
         if let Some(topic) = roles.topic(Role::Beats) {
             let (told, number, remark) = columns.beats(topic);
             if told.len() >= 3 {
@@ -277,7 +292,18 @@ impl Field {
         if let Some((topic, onset_s)) = sound
             && field.beat_source == "sound"
         {
-            clocks.put_sound_right(&topic, &onset_s, &mut field.beat_s);
+            let set = clocks.put_sound_right(&topic, &onset_s, &mut field.beat_s);
+            // Messages that were logged beside the sensors' came when the log says.
+            field.sound_is_adrift = !set && !one_clock && place::is_put_together(recording);
+            if field.sound_is_adrift {
+                let why = format!(
+                    "nothing tells when this sound began beside the steps: {} have no value; tap the sensors near the microphone or say --one-clock",
+                    BY_SOUNDS_CLOCK.join(", ")
+                );
+                field
+                    .quality
+                    .push(Quality::remark(&topic, "clocks_apart", why));
+            }
         }
         if !one_clock && !clocks.any_set {
             field.align(roles, leave);
@@ -503,6 +529,10 @@ impl Field {
                 &others,
                 by_taps,
             );
+            let adrift = |name: &&str| self.sound_is_adrift && BY_SOUNDS_CLOCK.contains(name);
+            for (_, value) in together.0.iter_mut().filter(|(name, _)| adrift(name)) {
+                value.withhold("nothing tells when the sound began beside the steps: tap the sensors near the microphone or say --one-clock");
+            }
             out.0.extend(together.0);
         }
         // Taps and talk before and behind the music are heard too.
@@ -567,6 +597,31 @@ impl Field {
         out.extend(self.carriers.quality());
         out
     }
+}
+
+/// Names the inertial sensors that play no role where nobody is known to carry: their names do not say so.
+fn without_a_role(recording: &Recording, roles: &Roles) -> Option<Quality> {
+    let played = roles.patterns(Role::Imu);
+    let told = |topic: &String| roles.chosen.iter().any(|(chosen, _)| chosen == topic);
+    if !roles.patterns(Role::Carriers).is_empty() || played.iter().any(told) {
+        return None;
+    }
+    let channels = recording.info().channels.iter();
+    let mut left: Vec<&str> = channels
+        .filter(|c| c.schema.replacen("/msg/", "/", 1) == "sensor_msgs/Imu")
+        .map(|c| c.topic.as_str())
+        .filter(|topic| !played.iter().any(|p| p == topic) && !stands_beside(topic))
+        .collect();
+    left.sort_unstable();
+    left.dedup();
+    (!left.is_empty()).then(|| {
+        let text = format!(
+            "{} {} left aside: no name says who carries; name them in a file for --roles, as `carriers` if they do",
+            left.join(", "),
+            if left.len() == 1 { "is" } else { "are" }
+        );
+        Quality::remark("", "no_role", text)
+    })
 }
 
 /// What the user says of the samples' age; else those of a simulated sensor are true at their stamps, and others as old as usual.

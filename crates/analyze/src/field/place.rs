@@ -51,6 +51,13 @@ pub fn is_simulated(recording: &Recording) -> bool {
         .is_some_and(|s| s == "sim")
 }
 
+/// Whether the recording was put together from devices' own files: a sound's does not know when it began.
+pub fn is_put_together(recording: &Recording) -> bool {
+    let rath = recording.info().metadata.get("rath");
+    rath.and_then(|m| m.get("source"))
+        .is_some_and(|s| s == "field")
+}
+
 /// Places by topic, from the attachment `scene.toml` (`effects.imu.sensors`: `on`, `name`, `place_m`, `mounting_roll_pitch_yaw_deg`; of all of them
 /// `accel_bias_sd_m_per_s2`).
 ///
