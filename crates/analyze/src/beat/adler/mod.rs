@@ -25,6 +25,7 @@ mod information;
 mod likelihood;
 #[cfg(test)]
 mod tests;
+pub(crate) mod turns;
 mod unknowns;
 mod walk;
 
