@@ -3,8 +3,8 @@
 use super::beat::carriers;
 use super::contact::mean;
 use super::{Context, Value};
+use crate::beat::adler::turns::{FOLDED, Turns};
 use crate::inputs::stretches;
-use crate::median::median;
 use crate::phase;
 use crate::steps::rate_of;
 use std::f64::consts::TAU;
@@ -82,19 +82,19 @@ pub fn beat_synchrony(c: &Context) -> Value {
 
 pub fn beat_hz(c: &Context) -> Value {
     let beat = c.beat_alone();
-    let steps = || beat.t_s.windows(2).zip(beat.x.windows(2));
-    let rate = |(t, psi): (&[f64], &[f64])| phase::wrap(psi[1] - psi[0]) / (t[1] - t[0]);
-    let mut rates: Vec<f64> = steps().map(rate).filter(|r| r.is_finite()).collect();
-    let Some(usual) = median(&mut rates) else {
+    let turns = Turns::of(&beat.t_s, &beat.x);
+    if turns.usual_rad_per_s.is_nan() {
         return Value::missing("the beat sounds at a single sample of the window");
-    };
+    }
+    if turns.folded() {
+        return Value::missing(FOLDED);
+    }
     // Over silence and over many lost messages nobody counted the turns; messages may be early and late.
     let (mut turned, mut sounds_s) = (0.0, 0.0);
     for part in stretches(&beat.t_s, 0.0) {
         for k in part.start + 1..part.end {
             let step_s = beat.t_s[k] - beat.t_s[k - 1];
-            let expected = usual * step_s;
-            turned += expected + phase::wrap(beat.x[k] - beat.x[k - 1] - expected);
+            turned += turns.over(step_s, beat.x[k] - beat.x[k - 1]);
             sounds_s += step_s;
         }
     }
@@ -165,6 +165,33 @@ mod tests {
             };
             let hz = metrics(&inputs, Window::ALL).number("beat_hz").unwrap();
             assert!((hz - 2.0).abs() < 0.005, "{late_s} {lost}: {hz}");
+        }
+    }
+
+    /// Of a beat of 2.1507 Hz at so many samples a second, its phase wrapped or not.
+    fn beat_at(rate_hz: f64, wrapped: bool) -> Option<f64> {
+        let t_s: Vec<f64> = (0..120).map(|k| f64::from(k) / rate_hz).collect();
+        let phase = t_s.iter().map(|t| TAU * 2.1507 * t);
+        let beat_phase_rad = match wrapped {
+            true => phase.map(crate::phase::wrap).collect(),
+            false => phase.collect(),
+        };
+        let inputs = Inputs {
+            t_s,
+            beat_phase_rad,
+            ..Inputs::default()
+        };
+        metrics(&inputs, Window::ALL).number("beat_hz")
+    }
+
+    #[test]
+    fn a_beat_that_turns_oftener_than_it_is_sampled_is_told_only_unwrapped() {
+        for rate_hz in [1.0, 2.0, 3.0, 4.0, 5.0, 30.0] {
+            let hz = beat_at(rate_hz, false).unwrap();
+            assert!((hz - 2.1507).abs() < 1e-9, "{rate_hz}: {hz}");
+            let hz = beat_at(rate_hz, true);
+            assert_eq!(hz.is_some(), rate_hz > 2.0 * 2.1507, "{rate_hz}: {hz:?}");
+            assert!(hz.is_none_or(|hz| (hz - 2.1507).abs() < 1e-9));
         }
     }
 

@@ -8,7 +8,6 @@ use super::unknowns::{
 use super::walk::{WINDOW, Walk};
 use crate::phase::wrap;
 use nalgebra::DVector;
-use std::f64::consts::TAU;
 
 type Dual = dual::Dual<N>;
 
@@ -43,6 +42,9 @@ struct Window {
     variance: Dual,
     with_phase: Dual,
 }
+
+/// No step tells so short a build-up from none, s.
+const AT_ONCE_S: f64 = 0.01;
 
 /// Weights of a cubic through the four ends of [`WINDOW`] steps, in the middle.
 const MIDDLE: [f64; WINDOW + 1] = [-0.0625, 0.5625, 0.5625, -0.0625];
@@ -123,22 +125,24 @@ impl Walk {
         let per_s = (shared(BUILD_UP) * -1.0).exp();
         let noise = shared(NOISE).exp() + self.least_noise;
         let error = shared(ERROR).exp() + self.least_error;
-        let to_come = match (self.begins, self.measured) {
-            (true, false) => pull,
-            (true, true) => {
-                let period_s = TAU / self.omega_rad_per_s;
-                let early_s = shared(BEGUN) * (period_s / 12.0f64.sqrt()) + 0.5 * period_s;
+        let to_come = match self.fresh {
+            true if self.unheard_s == 0.0 => pull,
+            true => {
+                let unheard_s = self.unheard_s;
+                let early_s = shared(BEGUN) * (unheard_s / 12.0f64.sqrt()) + 0.5 * unheard_s;
                 pull * (per_s * early_s * -1.0).exp()
             }
-            (false, _) => pull * shared(BEGUN).logistic(),
+            false => pull * shared(BEGUN).logistic(),
         };
-        // K m at the beginning, middle and end of every step: the same for all carriers.
-        let grown = |t: f64| pull - to_come * (per_s * -t.max(0.0)).exp();
-        let grown: Vec<[Dual; 3]> = self
-            .t_s
-            .windows(2)
-            .map(|t| [t[0], 0.5 * (t[0] + t[1]), t[1]].map(grown))
-            .collect();
+        // K m at the beginning, middle and end of every step: the same for all carriers. That at the beginning makes Simpson's rule, by which a step
+        // weighs them, the mean over the step: a pull that is soon all there grows within one.
+        let grown = |t: &[f64]| {
+            let left = |t: f64| to_come * (per_s * -t.max(0.0)).exp();
+            let mean = left(t[0]) * (per_s * (t[1] - t[0])).mean_of_decay();
+            let (middle, end) = (left(0.5 * (t[0] + t[1])), left(t[1]));
+            [mean * 6.0 - middle * 4.0 - end, middle, end].map(|left| pull - left)
+        };
+        let grown: Vec<[Dual; 3]> = self.t_s.windows(2).map(grown).collect();
         for (c, phase) in self.phase.iter().enumerate() {
             let own = |k: usize| Dual::unknown(x[place(k, c)], k);
             let drive = Drive {
@@ -160,16 +164,15 @@ impl Walk {
                 let psi = [self.beat[k], self.beat[k + 1]];
                 let from = state;
                 let mut kept = Dual::constant(1.0);
-                match psi.map(f64::is_finite) {
-                    [true, true] => {
+                match self.sounds[k] {
+                    Some(true) => {
                         (state, kept) = drive.step(state, &grown[k], psi, h);
                         state.variance.value = state.variance.value.max(1e-12);
                     }
                     sounds => {
                         state.mean = state.mean + drive.own * h;
                         state.variance = state.variance + noise * h;
-                        // A pause began or ended somewhere within the step: how much the beat pulled is not known.
-                        if sounds != [false, false] && self.t_s[k + 1] > 0.0 {
+                        if sounds.is_none() {
                             state.variance = state.variance + 1.0;
                         }
                     }
@@ -206,15 +209,24 @@ impl Walk {
                 BUILD_UP => (1.6, 1.5),
                 NOISE => (-6.0, 4.0),
                 ERROR => (-7.0, 4.0),
-                BEGUN if self.begins => (0.0, 1.0),
+                BEGUN if self.fresh => (0.0, 1.0),
                 BEGUN => (-1.0, 2.0),
                 _ if (k - SHARED).is_multiple_of(2) => (self.omega_rad_per_s, 5.0),
                 _ => (0.0, 10.0),
             };
-            let off = x[k] - middle;
-            out.value -= 0.5 * (off / sd).powi(2);
-            out.gradient[k] -= off / (sd * sd);
-            *out.information.diagonal(k) += 1.0 / (sd * sd);
+            // What builds up within [`AT_ONCE_S`] is there at once, and none of it less likely.
+            let (at, slope) = match k {
+                BUILD_UP => {
+                    let build_up_s = x[k].exp();
+                    let all_s = build_up_s + AT_ONCE_S;
+                    (all_s.ln(), build_up_s / all_s)
+                }
+                _ => (x[k], 1.0),
+            };
+            let off = (at - middle) / sd;
+            out.value -= 0.5 * off * off;
+            out.gradient[k] -= off * slope / sd;
+            *out.information.diagonal(k) += (slope / sd).powi(2);
         }
     }
 

@@ -2,7 +2,7 @@
 //!
 //! ```text
 //! dφ_i = (ω_i + K m(t) sin(ψ + Δ_i − φ_i)) dt + σ dW_i       y_i = φ_i + e,  e normal with SD ε       Δω_i = ω_i − Ω
-//! m    = 1 − a e^{−(t − t₀)/τ} while a beat sounds, else 0   a = e^{−s/τ}, s = 0 … a beat, where the beginning t₀ was heard; s = 0 if recorded
+//! m    = 1 − a e^{−(t − t₀)/τ} while a beat sounds, else 0   a = e^{−s/τ}, s = 0 … a beat, where the beginning t₀ was heard; s = 0 if recorded; else 0 < a < 1
 //! ```
 //! φ_i gait phase, ψ the beat's, y_i the phase as observed (rad); t₀ the first beat, τ how long the pull grows (s); ω_i own frequency, Ω the
 //! mean beat [rad/s]; K the pull once grown, the same for all [rad/s]; Δ_i where a carrier without detuning would settle (rad; a step
@@ -25,6 +25,7 @@ mod information;
 mod likelihood;
 #[cfg(test)]
 mod tests;
+pub(crate) mod turns;
 mod unknowns;
 mod walk;
 
@@ -85,6 +86,8 @@ impl Adler {
 const FALL: f64 = 1.9207;
 /// Intervals of ln K narrower than this are those of a normal distribution (standard error).
 const NARROW: f64 = 0.1;
+/// Log-likelihoods that differ by less are one summit, climbed from two sides.
+const SAME: f64 = 0.1;
 /// What a step detector bends the phase by within the stretch before the first beat, SD by twins, rad.
 const BENT_RAD: f64 = 0.01;
 
@@ -102,11 +105,17 @@ pub fn adler(
     measured: bool,
 ) -> Result<Adler, &'static str> {
     let walk = Walk::new(t_s, phase_rad, beat_rad, measured)?;
-    let [a, b] = walk.starts()?.map(|start| walk.climb(start, false));
-    let (x, best) = match b.1.value > a.1.value || !a.1.value.is_finite() {
+    let [a, b, others @ ..] = walk.starts()?.map(|start| walk.climb(start, false));
+    let mut highest = match b.1.value > a.1.value || !a.1.value.is_finite() {
         true => b,
         false => a,
     };
+    for other in others {
+        if other.1.value > highest.1.value + SAME {
+            highest = other;
+        }
+    }
+    let (x, best) = highest;
     let cover = best.information.variances().ok_or(walk::TOO_LITTLE)?;
     let carriers = walk.phase.len();
     let bent = match walk.before_s > 0.0 && measured {

@@ -11,6 +11,8 @@ struct Case {
     pull: f64,
     detuning: [f64; 2],
     onset_s: f64,
+    /// When it is silent again, s.
+    silent_s: (f64, f64),
     build_up_s: f64,
     noise: f64,
     /// Error of the steps, rad, its correlation falling to 1/e within 0.1 s; where there is one, phases are seen below 1 Hz only, as in a
@@ -22,6 +24,7 @@ const MUSIC: Case = Case {
     pull: 2.7,
     detuning: [0.35, -0.3],
     onset_s: 5.0,
+    silent_s: (0.0, 0.0),
     build_up_s: 11.0,
     noise: 0.01,
     error: 0.0,
@@ -49,18 +52,23 @@ fn found(case: &Case, seed: u64) -> Adler {
         true => (case.onset_s * omega / TAU).ceil() * TAU / omega,
         false => case.onset_s,
     };
+    let silent = |t: f64| (case.silent_s.0..case.silent_s.1).contains(&t);
     // From long before the record, so that a beat that sounds all the time has done its work.
     for k in -30_000..30_000 {
         let t = f64::from(k) * dt;
         if k >= 0 && k % every == 0 {
             t_s.push(t);
-            beat.push(if t >= heard_s { omega * t } else { f64::NAN });
+            let heard = t >= heard_s && !silent(t);
+            beat.push(if heard { omega * t } else { f64::NAN });
             for c in 0..2 {
                 error[c] = fade * error[c] + (1.0 - fade * fade).sqrt() * random.normal();
                 seen[c].push(phase[c] + case.error * error[c] - omega * t);
             }
         }
-        let m = -(-(t - case.onset_s).max(0.0) / case.build_up_s).exp_m1();
+        let m = match silent(t) {
+            true => 0.0,
+            false => -(-(t - case.onset_s).max(0.0) / case.build_up_s).exp_m1(),
+        };
         for c in 0..2 {
             let pull = case.pull * m * (omega * t + OFFSET_RAD - phase[c]).sin();
             let kick = case.noise * f64::sqrt(dt) * random.normal();
@@ -157,6 +165,56 @@ fn intervals_hold_what_they_promise() {
         assert!((0.88..=0.99).contains(&detuning), "{detuning}");
         assert!(open < 0.5, "{open}");
     }
+}
+
+/// The first stretch was taken for a walk without a beat: no interval held K.
+#[test]
+fn a_pause_soon_after_the_beginning_does_not_hide_the_pull() {
+    for silent_s in [(5.5, 6.5), (8.0, 12.0)] {
+        let [pull, detuning, open] = coverage(Case { silent_s, ..MUSIC }, 10);
+        assert!(pull >= 0.8 && detuning >= 0.8, "{silent_s:?}");
+        assert!(open == 0.0, "{silent_s:?}");
+    }
+}
+
+/// A pull that is all there at the first beat lost a sixth of what it does in the first step.
+#[test]
+fn a_pull_at_once_is_all_there_in_the_first_step() {
+    for build_up_s in [1e-9, 0.1] {
+        let at_once = Case {
+            build_up_s,
+            // The first sample that hears it is the first that it pulls.
+            onset_s: 5.099,
+            ..MUSIC
+        };
+        let [pull, detuning, open] = coverage(at_once, 10);
+        assert!(pull >= 0.8 && detuning >= 0.8, "{build_up_s}");
+        assert!(open == 0.0, "{build_up_s}");
+    }
+}
+
+/// Phases that come unwrapped, few samples a second.
+#[test]
+fn unwrapped_phases_need_no_two_samples_to_a_turn() {
+    let omega = TAU * 2.15;
+    for every in [8, 15, 30] {
+        let (t_s, beat, seen) = at_once(1.0, [0.7, -0.5, 0.3], 20.0, omega);
+        let thin = |x: &[f64]| -> Vec<f64> { x.iter().step_by(every).copied().collect() };
+        let seen = seen.map(|x| thin(&x));
+        let phases = [&seen[0][..], &seen[1], &seen[2]];
+        let a = adler(&thin(&t_s), &phases, &thin(&beat), false).unwrap();
+        let [low, high] = a.pull_ci95_rad_per_s;
+        assert!(low < 1.0 && 1.0 < high && high < 1.2, "{every} {a:?}");
+        for (found, true_) in a.detuning_rad_per_s.iter().zip([0.7, -0.5, 0.3]) {
+            assert!((found - true_).abs() < 0.02, "{every} {a:?}");
+        }
+    }
+    // Wrapped, 2 Hz at 3.75 samples a second.
+    let (t_s, beat, seen) = at_once(1.0, [0.7, -0.5, 0.3], 20.0, omega);
+    let thin = |x: &[f64]| -> Vec<f64> { x.iter().step_by(8).map(|x| wrap(*x)).collect() };
+    let t_s: Vec<f64> = t_s.iter().step_by(8).copied().collect();
+    let folded = adler(&t_s, &[&thin(&seen[0])], &thin(&beat), false);
+    assert_eq!(folded, Err(turns::FOLDED));
 }
 
 #[test]

@@ -1,7 +1,7 @@
 //! What Adler's test looks for, and where each stands in the vector of unknowns.
 
-/// Unknowns of one carrier, of which the first [`SHARED`] are those of all: ln K, ln τ, ln σ², ln ε², ln(1/a − 1) (where beats are
-/// heard from their beginning: how long before the first of them the pull began, from the middle of a beat, in SDs of an even spread over one), ω, Δ.
+/// Unknowns of one carrier, of which the first [`SHARED`] are those of all: ln K, ln τ, ln σ², ln ε², ln(1/a − 1) (where the
+/// beginning was heard: how long before the first beat the pull began, from the middle of what may be, in SDs of an even spread), ω, Δ.
 pub const PULL: usize = 0;
 pub const BUILD_UP: usize = 1;
 pub const NOISE: usize = 2;

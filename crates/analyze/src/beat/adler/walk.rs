@@ -1,11 +1,10 @@
 //! Phases and beat about the first beat, on the grid of Adler's equation.
 
+use super::turns::{FOLDED, Turns};
 use super::unknowns::{BUILD_UP, ERROR, NOISE, OFFSET, OWN, PULL, SHARED, place};
 use crate::beat::smooth::smooth;
 use crate::imu::track::period_s;
 use crate::inputs::placed;
-use crate::median::median;
-use crate::phase::{unwrap, wrap};
 use nalgebra::{DVector, Matrix3, Vector3};
 use std::f64::consts::TAU;
 
@@ -17,9 +16,9 @@ pub const WINDOW: usize = 3;
 /// What is looked at before and after the first beat, s.
 const BEFORE_S: f64 = 60.0;
 const AFTER_S: f64 = 90.0;
-/// A beat that lasts no longer is a tap or a trial, s.
+/// A beat that lasts no longer is a tap or a trial, of which nobody knows how it pulled, s.
 const SHORTEST_S: f64 = 4.0;
-/// As long before the first beat, and as long as a beat, nothing sounds where the pull begins with it, s.
+/// So long, and as long as a beat, it is silent before the first beat where carriers were seen alone, s.
 const SILENT_S: f64 = 1.0;
 /// Who is first seen so long after the first beat may have come to it unseen, s.
 const LATE_S: f64 = 5.0;
@@ -31,6 +30,10 @@ const LEAST: [f64; 2] = [5e-4, 5e-4];
 const LEAST_MEASURED: [f64; 2] = [0.01, 0.01];
 /// Over lost messages so long a steady beat's turns are still known, s.
 const COUNTED_S: f64 = 5.0;
+/// A pull that overshoots nothing, rad/s.
+const MODERATE: f64 = 2.0;
+/// Times so near to each other are the same, in steps.
+const ROUNDING: f64 = 1e-6;
 /// Fewer phases say nothing.
 const FEWEST: usize = 20;
 
@@ -44,10 +47,17 @@ pub struct Walk {
     pub beat: Vec<f64>,
     /// y of each carrier, NaN where it is not looked at, rad; a measured one is that in the middle of the window that ends there.
     pub phase: Vec<Vec<f64>>,
+    /// Whether a beat sounds over each step; `None` where nobody knows how much it pulled: it begins or ends there, or is a tap or a trial.
+    pub sounds: Vec<Option<bool>>,
     /// Whether phases were measured.
     pub measured: bool,
     /// Whether the beginning of the beat is in the recording.
     pub begins: bool,
+    /// Whether the pull begins there too: nothing had sounded before.
+    pub fresh: bool,
+    /// So long before the first beat the pull may have begun unheard, s: a beat where beats are heard, a sample where these are further apart
+    /// than steps.
+    pub unheard_s: f64,
     /// How long carriers are observed before it, s.
     pub before_s: f64,
     /// Ω, rad/s.
@@ -73,37 +83,70 @@ impl Walk {
         let onset = onset(t_s, beat_rad)?;
         let from = t_s.partition_point(|t| *t < t_s[onset] - BEFORE_S);
         let to = t_s.partition_point(|t| *t <= t_s[onset] + AFTER_S);
-        let step_s = period_s(&t_s[from..to]).ok_or(TOO_LITTLE)?;
-        if t_s[from..to].windows(2).any(|t| t[1] - t[0] > 1.5 * step_s) {
-            let (t_s, beat) = (&t_s[from..to], &beat_rad[from..to]);
-            if (t_s[t_s.len() - 1] - t_s[0]) / step_s + 1.0 > 2.0 * t_s.len() as f64 {
-                return Err(TOO_LITTLE);
+        let first_heard = !beat_rad[..onset].iter().any(|b| b.is_finite());
+        let t_s = &t_s[from..to];
+        let cut = |x: &[f64]| -> Result<(Vec<f64>, Turns), &'static str> {
+            let turns = Turns::of(t_s, &x[from..to]);
+            match turns.folded() {
+                true => Err(FOLDED),
+                false => Ok((turns.straightened(&x[from..to]), turns)),
             }
-            let phases: Vec<Vec<f64>> = phase_rad
-                .iter()
-                .map(|p| placed(t_s, &p[from..to], step_s, f64::NAN))
-                .collect();
-            let phases: Vec<&[f64]> = phases.iter().map(|p| &p[..]).collect();
-            let even: Vec<f64> = (0..phases[0].len())
-                .map(|k| t_s[0] + k as f64 * step_s)
-                .collect();
-            return Walk::new(&even, &phases, &played_on(t_s, beat, &even), measured);
+        };
+        let (beat, turns) = cut(beat_rad)?;
+        let phases: Result<Vec<Vec<f64>>, _> = phase_rad.iter().map(|p| Ok(cut(p)?.0)).collect();
+        let phases = phases?;
+        let step_s = period_s(t_s).ok_or(TOO_LITTLE)?;
+        let parts = (step_s / STEP_S).round().max(1.0);
+        if parts == 1.0 && t_s.windows(2).all(|t| t[1] - t[0] <= 1.5 * step_s) {
+            return Walk::on(t_s, &phases, beat, measured, first_heard, 0);
         }
-        let hop = (STEP_S / step_s).round().max(1.0) as usize;
-        let first = onset - (onset - from) / hop * hop;
-        let pick = |x: &[f64]| -> Vec<f64> { x.iter().step_by(hop).copied().collect() };
-        let t: Vec<f64> = pick(&t_s[first..to])
+        if (t_s[t_s.len() - 1] - t_s[0]) / step_s + 1.0 > 2.0 * t_s.len() as f64 {
+            return Err(TOO_LITTLE);
+        }
+        let step_s = step_s / parts;
+        let phases: Vec<Vec<f64>> = phases
             .iter()
-            .map(|t| t - t_s[onset])
+            .map(|p| placed(t_s, p, step_s, f64::NAN))
             .collect();
-        let mut beat = pick(&straightened(&beat_rad[first..to]));
+        let places = phases.first().map_or(0, Vec::len);
+        let even: Vec<f64> = (0..places).map(|k| t_s[0] + k as f64 * step_s).collect();
+        let beat = played_on(t_s, &beat, &turns, &even);
+        let unheard = if parts > 1.0 { parts as usize } else { 0 };
+        Walk::on(&even, &phases, beat, measured, first_heard, unheard)
+    }
+
+    /// On an even axis; phases straightened; over so many steps before the first beat nobody knows whether it sounds.
+    fn on(
+        t_s: &[f64],
+        phase_rad: &[Vec<f64>],
+        beat_rad: Vec<f64>,
+        measured: bool,
+        first_heard: bool,
+        unheard: usize,
+    ) -> Result<Self, &'static str> {
+        let onset = onset(t_s, &beat_rad)?;
+        let step_s = period_s(t_s).ok_or(TOO_LITTLE)?;
+        let hop = (STEP_S / step_s).round().max(1.0) as usize;
+        let first = onset % hop;
+        let pick = |x: &[f64]| -> Vec<f64> { x.iter().step_by(hop).copied().collect() };
+        let t: Vec<f64> = pick(&t_s[first..]).iter().map(|t| t - t_s[onset]).collect();
+        let mut beat = pick(&beat_rad[first..]);
         beat[..(onset - first) / hop].fill(f64::NAN);
-        let observed = |p: &&[f64]| -> Vec<f64> {
-            let whole = straightened(&p[first..to]);
-            match measured {
-                true => in_windows(&t_s[first..to], &whole, hop),
-                false => pick(&whole),
-            }
+        let sounds: Vec<Option<bool>> = (first..t_s.len().saturating_sub(hop))
+            .step_by(hop)
+            .map(|k| match k < onset {
+                true => sounding(&beat_rad[k..onset.min(k + hop + 1)])
+                    .filter(|sounds| !sounds && onset - k > unheard),
+                false => sounding(&beat_rad[k..=k + hop]),
+            })
+            .collect();
+        let tried_s: f64 = (t.windows(2).zip(&sounds))
+            .filter(|(t, sounds)| t[1] <= 0.0 && sounds.is_none())
+            .map(|(t, _)| t[1] - t[0])
+            .sum();
+        let observed = |p: &Vec<f64>| match measured {
+            true => in_windows(&t_s[first..], &p[first..], hop),
+            false => pick(&p[first..]),
         };
         let mut phase: Vec<Vec<f64>> = phase_rad.iter().map(observed).collect();
         if !measured {
@@ -122,8 +165,14 @@ impl Walk {
             .map(|p| p.iter().position(|y| y.is_finite()).map_or(0.0, |k| t[k]))
             .fold(f64::MIN, f64::max);
         let [noise, error] = if measured { LEAST_MEASURED } else { LEAST };
+        let begins = t[0] + tried_s <= -SILENT_S.max(TAU / omega_rad_per_s);
         Ok(Walk {
-            begins: t[0] <= -SILENT_S.max(TAU / omega_rad_per_s),
+            begins,
+            fresh: begins && first_heard,
+            unheard_s: match measured {
+                true => TAU / omega_rad_per_s,
+                false => unheard as f64 * step_s,
+            },
             before_s: -latest.min(0.0),
             omega_rad_per_s,
             least_noise: noise * noise,
@@ -131,6 +180,7 @@ impl Walk {
             measured,
             t_s: t,
             beat,
+            sounds,
             phase,
         })
     }
@@ -159,14 +209,22 @@ impl Walk {
     }
 
     /// Where the climb begins. Once near what the increments say; where a pull is soon all there, or carriers come from far behind, these lead to a summit
-    /// beside the highest, so once more without offsets and with so much noise that the phases may be anywhere.
-    pub fn starts(&self) -> Result<[DVector<f64>; 2], &'static str> {
+    /// beside the highest, so once more without offsets and with so much noise that the phases may be anywhere; and where even these overshoot, from a
+    /// moderate pull that is soon all there, or late.
+    pub fn starts(&self) -> Result<[DVector<f64>; 4], &'static str> {
         let near = self.start(&[2.0, 10.0])?;
         let mut anywhere = self.start(&[1.0])?;
         anywhere[NOISE] = 0.0;
         anywhere[ERROR] = 2.0 * 0.2f64.ln();
         (0..self.phase.len()).for_each(|c| anywhere[place(OFFSET, c)] = 0.0);
-        Ok([near, anywhere])
+        let [soon, late] = [0.1f64, 10.0].map(|build_up_s| {
+            let mut x = near.clone();
+            x[PULL] = MODERATE.ln();
+            x[BUILD_UP] = build_up_s.ln();
+            (0..self.phase.len()).for_each(|c| x[place(OFFSET, c)] = 0.0);
+            x
+        });
+        Ok([near, anywhere, soon, late])
     }
 
     /// Increments of each phase on the sines at their beginning, by least squares, for the build-up of these that fits best.
@@ -179,8 +237,10 @@ impl Walk {
             let (mut squares, mut pull) = (0.0, 0.0);
             for (c, phase) in self.phase.iter().enumerate() {
                 let seen: Vec<usize> = (0..phase.len()).filter(|k| phase[*k].is_finite()).collect();
+                let told = |k: &&[usize]| self.sounds[k[0]..k[1]].iter().all(Option::is_some);
                 let rows: Vec<(Vector3<f64>, f64, f64)> = seen
                     .windows(2)
+                    .filter(told)
                     .map(|k| {
                         let (a, b) = (k[0], k[1]);
                         let m = -(-self.t_s[a].max(0.0) / build_up_s).exp_m1();
@@ -238,6 +298,13 @@ fn onset(t_s: &[f64], beat_rad: &[f64]) -> Result<usize, &'static str> {
     Err("no beat that lasts for 4 s")
 }
 
+/// Whether a beat sounds at all samples or at none; `None` if only at some.
+fn sounding(beat_rad: &[f64]) -> Option<bool> {
+    let sounds = beat_rad.first().is_some_and(|psi| psi.is_finite());
+    let alike = |psi: &f64| psi.is_finite() == sounds;
+    beat_rad.iter().all(alike).then_some(sounds)
+}
+
 /// Recorded phases and the beat's share a message, and what it comes late by: the beat's phase off its slow course tells that.
 fn dated_by_the_beat(t_s: &[f64], beat: &mut [f64], phase: &mut [Vec<f64>]) {
     let mut start = 0;
@@ -257,20 +324,21 @@ fn dated_by_the_beat(t_s: &[f64], beat: &mut [f64], phase: &mut [Vec<f64>]) {
 }
 
 /// The beat's phase on an even axis, rad: through messages that were lost between two of a beat it goes on at its usual rate, to the nearest
-/// turn. NaN where none sounds, and in holes longer than [`COUNTED_S`].
-fn played_on(t_s: &[f64], beat_rad: &[f64], even: &[f64]) -> Vec<f64> {
-    let pairs = || t_s.windows(2).zip(beat_rad.windows(2));
-    let rate = |(t, b): (&[f64], &[f64])| wrap(b[1] - b[0]) / (t[1] - t[0]);
-    let mut rates: Vec<f64> = pairs().map(rate).filter(|r| r.is_finite()).collect();
-    let usual = median(&mut rates).unwrap_or(f64::NAN);
+/// turn, where it comes wrapped. NaN where none sounds, and in holes longer than [`COUNTED_S`].
+fn played_on(t_s: &[f64], beat_rad: &[f64], turns: &Turns, even: &[f64]) -> Vec<f64> {
     let mut out = vec![f64::NAN; even.len()];
     let mut k = 0;
-    for (t, b) in pairs() {
+    for (t, b) in t_s.windows(2).zip(beat_rad.windows(2)) {
         let width = t[1] - t[0];
-        let turned = usual * width + wrap(b[1] - b[0] - usual * width);
+        let turned = turns.over(width, b[1] - b[0]);
         while k < even.len() && even[k] <= t[1] {
             let share = (even[k] - t[0]) / width;
-            if width <= COUNTED_S {
+            // At a sample it is that sample, also where there is none beside it.
+            if share < ROUNDING {
+                out[k] = b[0];
+            } else if share > 1.0 - ROUNDING {
+                out[k] = b[1];
+            } else if width <= COUNTED_S {
                 out[k] = b[0] + share * turned;
             }
             k += 1;
@@ -297,12 +365,4 @@ fn in_windows(t_s: &[f64], phase: &[f64], hop: usize) -> Vec<f64> {
         }
     }
     out
-}
-
-/// Unwrapped over what is finite.
-fn straightened(x: &[f64]) -> Vec<f64> {
-    let finite: Vec<f64> = x.iter().copied().filter(|x| x.is_finite()).collect();
-    let mut whole = unwrap(&finite).into_iter();
-    let each = |x: &f64| x.is_finite().then(|| whole.next()).flatten();
-    x.iter().map(each).map(|x| x.unwrap_or(f64::NAN)).collect()
 }
