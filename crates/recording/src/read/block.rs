@@ -5,7 +5,7 @@ use std::{collections::BTreeMap, ops::Range, sync::Arc};
 use super::{
     ReadOptions, Recording, Tally,
     chunk::{self, Loss, Unpacker, WHOLE_BYTES},
-    container::{Block, Definitions, Fields, op},
+    container::{Block, Definitions, Fields, chunk_header, op},
     decode::{Decoder, Place, SchemaRef},
     decoders::{self, NoDecoder},
     rows::{Rows, Selection},
@@ -59,8 +59,8 @@ pub(super) struct BlockResult {
     pub messages: u64,
     /// The same by index of the channel, where it is known.
     pub per_channel: Vec<(usize, u64)>,
-    /// The earliest and the latest log time, ns.
-    pub times: Option<(i64, i64)>,
+    /// The earliest and the latest log time, of a lost chunk as its header says, ns.
+    pub times: Option<(u64, u64)>,
     /// Schemas and channels that are defined here otherwise than they are used.
     pub contradictions: u64,
     /// The chunk is too large to be decoded in one go, or cut off: the caller reads it in pieces.
@@ -79,8 +79,35 @@ impl BlockResult {
         self.batches.iter().map(batch).sum()
     }
 
+    /// Takes in that a chunk was left out, and why.
+    fn lose(
+        &mut self,
+        recording: &Recording,
+        body: &Range<usize>,
+        indexed: Option<u64>,
+        (kind, what): Loss,
+    ) {
+        let messages = match indexed {
+            Some(1) => "its only message was".to_owned(),
+            Some(count) => format!("its {count} messages were"),
+            None => "it was".to_owned(),
+        };
+        self.times = chunk_times(&recording.data[body.clone()]);
+        self.troubles.push(Trouble {
+            channel: None,
+            kind,
+            count: 1,
+            time: self.times.and_then(|(start, _)| i64::try_from(start).ok()),
+            text: format!(
+                "the chunk at byte {} {what}; {messages} left out",
+                body.start.saturating_sub(9)
+            ),
+            lost: indexed.unwrap_or(0),
+        });
+    }
+
     #[inline]
-    fn see(&mut self, time: i64) {
+    fn see(&mut self, time: u64) {
         let (first, last) = self.times.get_or_insert((time, time));
         *first = time.min(*first);
         *last = time.max(*last);
@@ -190,9 +217,7 @@ impl<'a> Worker<'a> {
                     }
                     Ok(header) => header,
                     Err(loss) => {
-                        result
-                            .troubles
-                            .push(lost_chunk(self.recording, body, *indexed, loss));
+                        result.lose(self.recording, body, *indexed, loss);
                         return result;
                     }
                 };
@@ -200,11 +225,7 @@ impl<'a> Worker<'a> {
                 let mut unpacker = std::mem::replace(&mut self.unpacker, Unpacker::new());
                 match unpacker.whole(&header) {
                     Ok(records) => self.records(records, &mut result),
-                    Err(loss) => {
-                        result
-                            .troubles
-                            .push(lost_chunk(self.recording, body, *indexed, loss))
-                    }
+                    Err(loss) => result.lose(self.recording, body, *indexed, loss),
                 }
                 self.unpacker = unpacker;
             }
@@ -232,7 +253,8 @@ impl<'a> Worker<'a> {
             }
             Block::CutChunk(_) => (chunk::beginning(packed, options, &mut read), None),
         };
-        let (trouble, messages) = match too_long {
+        let mut result = BlockResult::default();
+        match too_long {
             Ok(0) => return,
             Ok(count) => {
                 let text = format!(
@@ -241,23 +263,20 @@ impl<'a> Worker<'a> {
                     options.limit("--max-message-bytes"),
                     options.max_message_bytes
                 );
-                let trouble = Trouble {
+                result.messages = count;
+                result.times = chunk_times(packed);
+                result.troubles.push(Trouble {
                     channel: None,
                     kind: Kind::TooLarge,
                     count,
                     time: None,
                     text,
                     lost: count,
-                };
-                (trouble, count)
+                });
             }
-            Err(loss) => (lost_chunk(recording, block.range(), indexed, loss), 0),
-        };
-        give(BlockResult {
-            troubles: vec![trouble],
-            messages,
-            ..BlockResult::default()
-        });
+            Err(loss) => result.lose(recording, block.range(), indexed, loss),
+        }
+        give(result);
     }
 
     /// Reads records that stand one after the other.
@@ -337,6 +356,7 @@ impl<'a> Worker<'a> {
         };
         let id = u16::from_le_bytes([header[0], header[1]]);
         let time = u64::from_le_bytes(std::array::from_fn(|i| header[6 + i]));
+        result.see(time);
         let Some(index) = self.recording.by_id[usize::from(id)] else {
             self.unknown.entry(id).or_insert((0, time)).0 += 1;
             return;
@@ -352,7 +372,6 @@ impl<'a> Worker<'a> {
             channel.out_of_range += 1;
             return;
         };
-        result.see(time);
         let bytes = end - data.len()..end;
         channel.waiting.push(Place { bytes, time });
     }
@@ -571,30 +590,9 @@ impl<'a> Iterator for Records<'a> {
     }
 }
 
-fn lost_chunk(
-    recording: &Recording,
-    body: &Range<usize>,
-    indexed: Option<u64>,
-    (kind, what): Loss,
-) -> Trouble {
-    let time = super::container::chunk_header(&recording.data[body.clone()])
-        .and_then(|header| i64::try_from(header.start_time).ok());
-    let messages = match indexed {
-        Some(1) => "its only message was".to_owned(),
-        Some(count) => format!("its {count} messages were"),
-        None => "it was".to_owned(),
-    };
-    Trouble {
-        channel: None,
-        kind,
-        count: 1,
-        time,
-        text: format!(
-            "the chunk at byte {} {what}; {messages} left out",
-            body.start.saturating_sub(9)
-        ),
-        lost: indexed.unwrap_or(0),
-    }
+/// The log times of a chunk as its header says them.
+fn chunk_times(body: &[u8]) -> Option<(u64, u64)> {
+    chunk_header(body).map(|header| (header.start_time, header.end_time))
 }
 
 /// Looks through all blocks for definitions, counts and times, where there is no summary to say so.

@@ -36,7 +36,7 @@ use std::{
 };
 
 use crate::foreign;
-use container::{Container, Damage, Definitions};
+use container::{Container, Damage, Definitions, Statistics};
 use early::Early;
 
 pub use container::ends_whole;
@@ -232,8 +232,8 @@ pub struct Recording {
     definitions: Definitions,
     /// They come from a look through all blocks, not from the summary.
     searched: bool,
-    /// Messages that the summary promises.
-    promised: Option<u64>,
+    /// What the summary counts.
+    promised: Option<Statistics>,
     skipped: AtomicU64,
     /// How the last reading contradicted the summary.
     contradictions: Mutex<Vec<Finding>>,
@@ -324,9 +324,7 @@ impl Recording {
         options: &ReadOptions,
     ) -> Self {
         let summary = container.summary.take();
-        let promised = summary
-            .as_ref()
-            .and_then(|(_, statistics)| Some(statistics.as_ref()?.messages));
+        let promised = (summary.as_ref()).and_then(|(_, statistics)| statistics.clone());
         let searched = trusted.is_none();
         let (definitions, tally) = match (trusted, summary) {
             (Some(mut tally), Some((definitions, _))) => {
@@ -536,6 +534,8 @@ fn trusted(container: &Container) -> Option<Tally> {
             channel.schema == 0 || definitions.schemas.contains_key(&channel.schema)
         });
     let any = statistics.messages > 0;
+    // Times that cannot be held do not bound those of messages that are read.
+    let fits = fits && (!any || i64::try_from(statistics.start.max(statistics.end)).is_ok());
     fits.then(|| Tally {
         per_channel: statistics.per_channel.clone(),
         start: any.then_some(statistics.start),

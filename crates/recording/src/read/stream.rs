@@ -260,10 +260,13 @@ struct Taker<'a> {
     known: HashMap<(Option<usize>, Kind, String), usize>,
     messages: u64,
     lost: u64,
+    /// Some were not counted by channel, as in a lost chunk.
+    unread: bool,
     start_ns: i64,
     /// Messages by index of the channel.
     per_channel: Vec<u64>,
-    times: Option<(i64, i64)>,
+    /// The first and the last log time, of lost chunks as their headers say, ns.
+    times: Option<(u64, u64)>,
     contradictions: u64,
 }
 
@@ -315,6 +318,7 @@ impl<'a> Taker<'a> {
             known: HashMap::new(),
             messages: 0,
             lost: 0,
+            unread: false,
             start_ns: recording.info.start_ns,
         }
     }
@@ -337,6 +341,8 @@ impl<'a> Taker<'a> {
                 kind => (trouble.channel, kind, trouble.text.clone()),
             };
             self.lost += trouble.lost;
+            self.unread |=
+                trouble.channel.is_none() && (trouble.lost > 0 || trouble.kind != Kind::BadRecord);
             if let Some(&position) = self.known.get(&key) {
                 self.findings[position].count += trouble.count;
                 continue;
@@ -450,9 +456,6 @@ impl<'a> Taker<'a> {
     /// Holds the summary against what was found.
     fn judge_summary(&mut self) {
         let recording = self.recording;
-        if recording.searched {
-            return;
-        }
         let mut contradictions = Vec::new();
         let mut say = |topic: &str, kind, count, text| {
             contradictions.push(Finding {
@@ -463,17 +466,16 @@ impl<'a> Taker<'a> {
                 text,
             })
         };
-        if self.contradictions > 0 {
+        if self.contradictions > 0 && !recording.searched {
             let text = format!(
                 "the summary has other schemas or channels than the data, in {} places",
                 self.contradictions
             );
             say("", Kind::BadSummary, self.contradictions, text);
         }
-        // What a damaged chunk held cannot be held against the summary.
-        if self.lost == 0 && recording.damage().is_empty() {
-            let info = &recording.info;
-            for (channel, &found) in info.channels.iter().zip(&self.per_channel) {
+        // Of which channels a damaged chunk held how many, nobody knows.
+        if !self.unread && recording.damage().is_empty() && !recording.searched {
+            for (channel, &found) in recording.info.channels.iter().zip(&self.per_channel) {
                 if channel.messages != found {
                     let text = format!(
                         "the summary counts {} messages of channel {}, {found} were found",
@@ -482,27 +484,33 @@ impl<'a> Taker<'a> {
                     say(&channel.topic, Kind::BadSummary, 1, text);
                 }
             }
-            let told = (info.earliest_ns, info.end_ns);
-            if let Some(found) = self.times.filter(|found| *found != told) {
-                let text = format!(
-                    "the summary says that log times go from {:.3} s to {:.3} s after the first, they go from 0 s to {:.3} s",
-                    seconds(told.0, found.0),
-                    seconds(told.1, found.0),
-                    seconds(found.1, found.0),
-                );
-                say("", Kind::SummaryTimes, 1, text);
-            }
+        }
+        let told = recording.promised.as_ref().map(|s| (s.start, s.end));
+        if let (Some(told), Some(found)) = (told, self.times)
+            && told != found
+            && recording.damage().is_empty()
+        {
+            let after = |time: u64| (i128::from(time) - i128::from(found.0)) as f64 / 1e9;
+            let text = format!(
+                "the summary says that log times go from {:.3} s to {:.3} s after the first, they go from 0 s to {:.3} s",
+                after(told.0),
+                after(told.1),
+                after(found.1),
+            );
+            say("", Kind::SummaryTimes, 1, text);
         }
         self.findings.extend(contradictions.iter().cloned());
-        *recording.lock_contradictions() = contradictions;
+        if !recording.searched {
+            *recording.lock_contradictions() = contradictions;
+        }
     }
 
     fn findings(mut self) -> Vec<Finding> {
         let start_ns = self.start_ns;
         self.judge_summary();
-        if let Some(promised) = self.recording.promised
+        if let Some(promised) = self.recording.promised.as_ref().map(|s| s.messages)
             && promised != self.messages
-            && (self.recording.searched || self.lost > 0)
+            && (self.recording.searched || self.unread)
         {
             let lost = promised.saturating_sub(self.messages);
             // Chunks that were left out explain as many as their indexes name.
