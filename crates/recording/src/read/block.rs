@@ -144,6 +144,8 @@ struct ChannelState<'a> {
     index: usize,
     rows: Rows<'a>,
     state: State,
+    /// Nothing has been decoded yet.
+    fresh: bool,
     /// Messages of the block that wait to be decoded together.
     waiting: Vec<Place>,
     times: Vec<i64>,
@@ -300,7 +302,7 @@ impl<'a> Worker<'a> {
         }
         for &index in &self.touched {
             if let Some(channel) = &mut self.channels[index] {
-                channel.decode(block);
+                channel.decode(block, self.recording, self.select);
             }
         }
         let mut bad = |count, text, lost| {
@@ -416,6 +418,7 @@ impl<'a> ChannelState<'a> {
             index,
             rows,
             state,
+            fresh: true,
             waiting: Vec::new(),
             times: Vec::new(),
             failed: None,
@@ -430,11 +433,32 @@ impl<'a> ChannelState<'a> {
         self.seen > 0
     }
 
-    /// Decodes the messages that wait, which lie in `block`.
-    fn decode(&mut self, block: &[u8]) {
+    /// Decodes the messages that wait, which lie in `block`. What comes of them depends on the block alone: where columns were left out because others
+    /// were known from blocks before, it is decoded with none known.
+    fn decode(&mut self, block: &[u8], recording: &Recording, select: Selection<'a>) {
+        if self.rows.full {
+            self.begin_anew(recording, select);
+        }
+        let fresh = std::mem::replace(&mut self.fresh, false);
+        self.read(block);
+        if self.rows.full && !fresh {
+            self.begin_anew(recording, select);
+            self.read(block);
+        }
+        self.waiting.clear();
+    }
+
+    fn begin_anew(&mut self, recording: &Recording, select: Selection<'a>) {
+        let new = ChannelState::new(recording, self.index, select);
+        (self.rows, self.state) = (new.rows, new.state);
+        self.times.clear();
+        self.failed = None;
+    }
+
+    fn read(&mut self, block: &[u8]) {
         let State::Ready(decoder) = &mut self.state else {
-            // Messages without a decoder do not wait, they are counted.
-            self.closed += self.waiting.drain(..).len() as u64;
+            // Messages without a decoder are counted.
+            self.closed += self.waiting.len() as u64;
             return;
         };
         let rows = &mut self.rows;
@@ -464,7 +488,6 @@ impl<'a> ChannelState<'a> {
             }
             places = &places[1..];
         }
-        self.waiting.clear();
     }
 
     fn harvest(&mut self, result: &mut BlockResult, spare: &mut Spare) {
@@ -498,12 +521,10 @@ impl<'a> ChannelState<'a> {
         }
         let rows = self.rows.finish();
         if rows > 0 {
-            let columns = self
-                .rows
-                .columns
-                .iter_mut()
-                .filter(|column| !column.values.is_empty())
+            let order = std::mem::take(&mut self.rows.order);
+            let columns = (order.into_iter())
                 .map(|column| {
+                    let column = &mut self.rows.columns[column as usize];
                     let next = empty(&mut spare.values, column.values.len());
                     let values = std::mem::replace(&mut column.values, next);
                     let rows = std::mem::take(&mut column.rows);
@@ -516,6 +537,12 @@ impl<'a> ChannelState<'a> {
                     }
                 })
                 .collect();
+            let counted = |counts: &[(String, u64)]| -> Vec<_> {
+                let some = counts.iter().filter(|(_, count)| *count > 0);
+                some.cloned().collect()
+            };
+            let mut long = std::mem::take(&mut self.rows.long);
+            long.extend(counted(&self.rows.long_types));
             result.batches.push(ChannelBatch {
                 channel: self.index,
                 times: std::mem::replace(&mut self.times, empty(&mut spare.times, rows)),
@@ -523,14 +550,8 @@ impl<'a> ChannelState<'a> {
                     .rows
                     .take_stamps(|length| empty(&mut spare.times, length)),
                 columns,
-                absent: self
-                    .rows
-                    .absent
-                    .iter()
-                    .filter(|(_, count)| *count > 0)
-                    .cloned()
-                    .collect(),
-                long: std::mem::take(&mut self.rows.long),
+                absent: counted(&self.rows.absent),
+                long,
                 trailing: self.rows.trailing,
                 remark: self.rows.remark.take(),
             });

@@ -1,7 +1,7 @@
 //! The stream of batches: threads unpack and decode blocks, the caller's thread takes them in the order of the file.
 
 use std::{
-    collections::{BTreeMap, HashMap},
+    collections::{BTreeMap, HashMap, hash_map::Entry},
     sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError, atomic::Ordering},
 };
 
@@ -12,7 +12,7 @@ use super::{
     clock::{Clocks, Order, seconds},
     container::{Block, op},
     json::{ANY_KEY, MAX_KEYS},
-    rows::Selection,
+    rows::{MAX_COLUMNS, Selection, too_many_columns},
 };
 use crate::{Finding, Kind, text::counted};
 
@@ -245,8 +245,10 @@ struct Watch {
     long: Vec<(String, u64)>,
     trailing: u64,
     odd: Vec<(Arc<str>, u64, i64)>,
-    /// Path and number of the columns in the order of the last batch, which mostly is that of the next.
-    columns: Vec<(Arc<str>, usize)>,
+    /// Path and number of the columns in the order of the last batch, which mostly is that of the next; no number where there are too many.
+    columns: Vec<(Arc<str>, Option<usize>)>,
+    /// How many columns were numbered for it.
+    numbered: usize,
     messages: u64,
 }
 
@@ -396,22 +398,31 @@ impl<'a> Taker<'a> {
         add(&mut watch.absent, std::mem::take(&mut batch.absent));
         add(&mut watch.long, std::mem::take(&mut batch.long));
         watch.trailing += batch.trailing;
-        let info = &self.recording.info.channels[batch.channel];
-        if let Some(text) = batch.remark.take() {
-            let key = (Some(batch.channel), Kind::OddSchema, text.clone());
-            if !self.known.contains_key(&key) {
-                self.known.insert(key, self.findings.len());
-                self.findings.push(Finding {
-                    topic: info.topic.clone(),
-                    kind: Kind::OddSchema,
-                    count: 1,
-                    t_s: None,
-                    text,
-                });
-            }
-        }
+        let mut remark = batch.remark.take();
         let mut columns = Vec::with_capacity(batch.columns.len());
         for (position, column) in batch.columns.iter().enumerate() {
+            let id = match watch.columns.get(position) {
+                Some((path, id)) if *path == column.path => *id,
+                _ => {
+                    let next = self.ids.len();
+                    let id = match self.ids.entry(column.path.clone()) {
+                        Entry::Occupied(known) => Some(*known.get()),
+                        // Each block by itself has no more, all of them together may.
+                        Entry::Vacant(_) if watch.numbered >= MAX_COLUMNS => None,
+                        Entry::Vacant(new) => {
+                            watch.numbered += 1;
+                            Some(*new.insert(next))
+                        }
+                    };
+                    watch.columns.truncate(position);
+                    watch.columns.push((column.path.clone(), id));
+                    id
+                }
+            };
+            let Some(id) = id else {
+                remark.get_or_insert_with(too_many_columns);
+                continue;
+            };
             if let Some((count, row)) = column.odd {
                 match watch
                     .odd
@@ -424,16 +435,6 @@ impl<'a> Taker<'a> {
                         .push((column.path.clone(), count, batch.times[row as usize])),
                 }
             }
-            let id = match watch.columns.get(position) {
-                Some((path, id)) if *path == column.path => *id,
-                _ => {
-                    let next = self.ids.len();
-                    let id = *self.ids.entry(column.path.clone()).or_insert(next);
-                    watch.columns.truncate(position);
-                    watch.columns.push((column.path.clone(), id));
-                    id
-                }
-            };
             let rows = (column.values.len() != batch.times.len()).then_some(column.rows.as_slice());
             columns.push(Column {
                 id,
@@ -442,6 +443,20 @@ impl<'a> Taker<'a> {
                 values: &column.values,
                 finite: column.odd.is_none(),
             });
+        }
+        let info = &self.recording.info.channels[batch.channel];
+        if let Some(text) = remark {
+            let key = (Some(batch.channel), Kind::OddSchema, text.clone());
+            if !self.known.contains_key(&key) {
+                self.known.insert(key, self.findings.len());
+                self.findings.push(Finding {
+                    topic: info.topic.clone(),
+                    kind: Kind::OddSchema,
+                    count: 1,
+                    t_s: None,
+                    text,
+                });
+            }
         }
         sink(&Batch {
             channel: batch.channel,
