@@ -366,6 +366,8 @@ pub(super) fn begun_chunk_header(body: &[u8]) -> Option<(ChunkHeader<'_>, u64)> 
 pub(super) struct Attachment {
     pub name: String,
     pub media_type: String,
+    pub log_time: u64,
+    pub create_time: u64,
     pub data: Range<usize>,
     pub crc_ok: bool,
 }
@@ -391,7 +393,8 @@ pub(super) struct Container {
     pub library: String,
     pub blocks: Vec<Block>,
     pub attachments: Vec<Attachment>,
-    pub metadata: BTreeMap<String, BTreeMap<String, String>>,
+    /// In the order of the file; several may have one name.
+    pub metadata: Vec<(String, BTreeMap<String, String>)>,
     /// What the summary defines and counts, if there is a summary whose checksum holds.
     pub summary: Option<(Definitions, Option<Statistics>)>,
     pub damage: Vec<Damage>,
@@ -749,11 +752,7 @@ impl Walk<'_> {
             op::ATTACHMENT => self.attachment(body),
             op::METADATA => {
                 if let (Some(name), Some(map)) = (fields.text(), fields.map()) {
-                    self.found
-                        .metadata
-                        .entry(name.into_owned())
-                        .or_default()
-                        .extend(map);
+                    self.found.metadata.push((name.into_owned(), map));
                 } else {
                     self.damage(
                         Kind::BadRecord,
@@ -783,8 +782,7 @@ impl Walk<'_> {
         let bytes = &self.bytes[body.clone()];
         let mut fields = Fields::new(bytes);
         let parsed = (|| {
-            fields.u64()?;
-            fields.u64()?;
+            let (log_time, create_time) = (fields.u64()?, fields.u64()?);
             let (name, media_type) = (fields.text()?.into_owned(), fields.text()?.into_owned());
             let length = fields.u64()?;
             let start = body.start + (bytes.len() - fields.rest.len());
@@ -795,6 +793,8 @@ impl Walk<'_> {
             Some(Attachment {
                 name,
                 media_type,
+                log_time,
+                create_time,
                 data: start..start + data.len(),
                 crc_ok,
             })

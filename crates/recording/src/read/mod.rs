@@ -128,7 +128,7 @@ pub struct Info {
     pub library: String,
     /// The channels, by id.
     pub channels: Vec<ChannelInfo>,
-    /// Metadata records by name.
+    /// Metadata by name: of several records of one name all keys, with their last values.
     pub metadata: BTreeMap<String, BTreeMap<String, String>>,
     /// Names and media types of the attachments, with their sizes in bytes.
     pub attachments: Vec<AttachmentInfo>,
@@ -180,6 +180,21 @@ pub struct AttachmentInfo {
     pub media_type: String,
     /// Size in bytes.
     pub bytes: u64,
+}
+
+/// An attachment as it is in the file.
+#[derive(Clone, Copy, Debug)]
+pub struct RawAttachment<'a> {
+    /// Name.
+    pub name: &'a str,
+    /// Media type.
+    pub media_type: &'a str,
+    /// When it was attached, ns.
+    pub log_time_ns: u64,
+    /// When it was made, ns; 0 where that is not known.
+    pub create_time_ns: u64,
+    /// The content.
+    pub data: &'a [u8],
 }
 
 /// The file's bytes.
@@ -406,14 +421,28 @@ impl Recording {
         &self.info
     }
 
-    /// The content of an attachment.
+    /// All metadata records, in the order of the file.
+    pub fn metadata_records(&self) -> &[(String, BTreeMap<String, String>)] {
+        &self.container.metadata
+    }
+
+    /// All attachments, in the order of the file.
+    pub fn attachments(&self) -> impl Iterator<Item = RawAttachment<'_>> {
+        (self.container.attachments.iter()).filter_map(|attachment| {
+            Some(RawAttachment {
+                name: &attachment.name,
+                media_type: &attachment.media_type,
+                log_time_ns: attachment.log_time,
+                create_time_ns: attachment.create_time,
+                data: self.data.get(attachment.data.clone())?,
+            })
+        })
+    }
+
+    /// The content of the first attachment of a name.
     pub fn attachment(&self, name: &str) -> Option<Vec<u8>> {
-        let attachment = self
-            .container
-            .attachments
-            .iter()
-            .find(|attachment| attachment.name == name)?;
-        Some(self.data.get(attachment.data.clone())?.to_vec())
+        let found = self.attachments().find(|found| found.name == name)?;
+        Some(found.data.to_vec())
     }
 
     /// Messages that could not be used, as far as the last [`stream`](Self::stream) or [`signals`](Self::signals) found out.
@@ -567,11 +596,16 @@ fn info(container: &Container, definitions: &Definitions, tally: &Tally, trusted
     let time = |time: Option<u64>| time.and_then(|time| i64::try_from(time).ok()).unwrap_or(0);
     let messages = tally.per_channel.values().sum();
     let early = tally.early.before(messages, tally.end);
+    let mut metadata: BTreeMap<String, BTreeMap<String, String>> = BTreeMap::new();
+    for (name, values) in &container.metadata {
+        let known = metadata.entry(name.clone()).or_default();
+        known.extend(values.clone());
+    }
     Info {
         profile: container.profile.clone(),
         library: container.library.clone(),
         channels,
-        metadata: container.metadata.clone(),
+        metadata,
         attachments: container
             .attachments
             .iter()

@@ -59,8 +59,8 @@ pub struct RawMessage<'a> {
     pub sequence: u32,
     /// Log time, ns.
     pub log_time_ns: i64,
-    /// Publish time, ns.
-    pub publish_time_ns: i64,
+    /// Publish time as it stands there, ns.
+    pub publish_time_ns: u64,
     /// The encoded message.
     pub data: &'a [u8],
 }
@@ -693,10 +693,8 @@ pub(super) fn raw(
             else {
                 continue;
             };
-            let time = |at: usize| {
-                i64::try_from(u64::from_le_bytes(std::array::from_fn(|i| header[at + i])))
-            };
-            let (Ok(log_time_ns), publish) = (time(6), time(14)) else {
+            let time = |at: usize| u64::from_le_bytes(std::array::from_fn(|i| header[at + i]));
+            let Ok(log_time_ns) = i64::try_from(time(6)) else {
                 continue;
             };
             sink(&RawMessage {
@@ -704,7 +702,7 @@ pub(super) fn raw(
                 topic: &recording.info.channels[channel].topic,
                 sequence: u32::from_le_bytes(std::array::from_fn(|i| header[2 + i])),
                 log_time_ns,
-                publish_time_ns: publish.unwrap_or(log_time_ns),
+                publish_time_ns: time(14),
                 data,
             });
         }
