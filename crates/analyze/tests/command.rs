@@ -251,7 +251,7 @@ fn window_signal_and_topic_narrow_what_is_told() {
     let out = analyze(&[file, "--signal", "/nothing*"]);
     assert_eq!(out.status.code(), Some(1));
     assert!(
-        text(&out.stderr).contains("no numeric signal fits /nothing*"),
+        text(&out.stderr).contains("no numeric signal fits /nothing*; its topics are "),
         "{}",
         text(&out.stderr)
     );
@@ -463,6 +463,20 @@ fn annotate_copies_times_numbers_and_what_shares_a_name() {
         assert_eq!(beside.len(), 5);
         assert_eq!(found, (profile.to_owned(), beside));
     }
+}
+
+/// A file that was cut before its first message has no topic to name: what is wrong with it is said.
+#[test]
+fn no_signal_fits_where_all_is_lost() {
+    let folder = tempfile::tempdir().unwrap();
+    let file = recording(folder.path());
+    let bytes = std::fs::read(&file).unwrap();
+    std::fs::write(&file, &bytes[..40]).unwrap();
+    let out = analyze(&[file.to_str().unwrap(), "--signal", "/battery.data"]);
+    let said = text(&out.stderr);
+    let expected =
+        "no numeric signal fits /battery.data; it has no topics that can be read; the file ends ";
+    assert!(said.contains(expected), "{said}");
 }
 
 #[test]

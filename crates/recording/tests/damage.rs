@@ -842,6 +842,25 @@ fn bad_messages_and_chunks_leave_the_bounds_alone() {
     }
 }
 
+/// Files put one behind the other are no recording of both: what the first ends before is lost.
+#[test]
+fn recordings_behind_the_end_are_lost() {
+    let one = summarised(
+        &[topic(1, "/a"), message(1, 5, b"1"), message(1, 9, b"2")],
+        &[topic(1, "/a"), statistics(0, [5, 9], &[(1, 2)])],
+    );
+    let bytes = [&one[..], &one, &one].concat();
+    let read = read(bytes).expect("opens");
+    assert_eq!((read.content.len(), read.skipped), (2, 4));
+    let found: Vec<String> = read.findings.iter().map(ToString::to_string).collect();
+    let said = format!(
+        "another recording follows the end of this one, of 4 messages and {} bytes from byte {} on, and was left out: make it a file of its own",
+        2 * one.len(),
+        one.len()
+    );
+    assert_eq!(found, [said]);
+}
+
 #[test]
 fn a_second_definition_is_named_with_its_topic() {
     let (_, lines) = lines(file(&[

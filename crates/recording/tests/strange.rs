@@ -422,6 +422,25 @@ fn json_with_bare_words() {
     );
 }
 
+/// A message with such words is read again, and counted once.
+#[test]
+fn json_with_bare_words_is_counted_once() {
+    let found = recording(&WriterOptions::default(), |writer| {
+        let channel = writer.raw_channel(&JSON).expect("opens");
+        let long = vec!["1"; 65].join(",");
+        for t_ns in 0..10 {
+            let word = if t_ns % 2 == 0 { "NaN" } else { "1" };
+            let text = format!("{{\"y\":[{long}],\"x\":{word}}}");
+            let message = text.as_bytes();
+            writer.message(channel, t_ns, message).expect("writes");
+        }
+    });
+    assert_eq!(
+        lines(&found)[1],
+        "long_sequence /j: y has more than 64 items (the limit) in 10 messages; it is not among the signals there"
+    );
+}
+
 /// Everything that a recording gives, in the order in which it does.
 fn everything(bytes: &[u8], threads: usize) -> (Vec<String>, Vec<String>) {
     let options = ReadOptions {

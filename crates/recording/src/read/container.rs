@@ -12,7 +12,7 @@ use std::{
     path::Path,
 };
 
-use crate::finding::Kind;
+use crate::{finding::Kind, text::counted};
 
 pub(super) const MAGIC: &[u8; 8] = b"\x89MCAP0\r\n";
 
@@ -400,6 +400,8 @@ pub(super) struct Container {
     pub damage: Vec<Damage>,
     /// The file's end was reached in good order.
     pub complete: bool,
+    /// Messages of further recordings behind the end, as their summaries count them.
+    pub behind: u64,
 }
 
 /// Loose records are cut into stretches of this size, so that they can be read like chunks.
@@ -420,6 +422,8 @@ struct Walk<'a> {
     data_crc: u32,
     unchecked: bool,
     footer: Option<(usize, u64, u32)>,
+    /// Where what follows the footer begins.
+    end: Option<usize>,
     unknown: BTreeMap<u8, u64>,
 }
 
@@ -450,19 +454,7 @@ pub fn ends_whole(path: &Path) -> std::io::Result<bool> {
 /// are not needed for now.
 pub(super) fn walk(bytes: &[u8], forget: &dyn Fn(&Range<usize>)) -> Option<Container> {
     let magic = bytes.starts_with(MAGIC);
-    let mut walk = Walk {
-        bytes,
-        forget,
-        forgotten: 0,
-        found: Container::default(),
-        summary: Definitions::default(),
-        statistics: None,
-        data_end: None,
-        data_crc: 0,
-        unchecked: false,
-        footer: None,
-        unknown: BTreeMap::new(),
-    };
+    let mut walk = Walk::new(bytes, forget);
     if !magic {
         // The header record must be sound then.
         if !begins(bytes) || walk.possible(MAGIC.len()).is_none() {
@@ -475,11 +467,46 @@ pub(super) fn walk(bytes: &[u8], forget: &dyn Fn(&Range<usize>)) -> Option<Conta
         );
     }
     walk.records();
+    if let Some(end) = walk.end {
+        walk.closing(end);
+    }
     walk.close();
     Some(walk.found)
 }
 
-impl Walk<'_> {
+/// How many messages recordings that stand one after the other count in their summaries.
+fn messages_behind(mut bytes: &[u8]) -> u64 {
+    let mut messages = 0u64;
+    while bytes.starts_with(MAGIC) {
+        let mut walk = Walk::new(bytes, &|_| ());
+        walk.records();
+        walk.close();
+        let statistics = walk.found.summary.and_then(|(_, statistics)| statistics);
+        messages = messages.saturating_add(statistics.map_or(0, |counted| counted.messages));
+        let rest = walk.end.and_then(|end| bytes[end..].strip_prefix(MAGIC));
+        bytes = rest.unwrap_or_default();
+    }
+    messages
+}
+
+impl<'a> Walk<'a> {
+    fn new(bytes: &'a [u8], forget: &'a dyn Fn(&Range<usize>)) -> Self {
+        Walk {
+            bytes,
+            forget,
+            forgotten: 0,
+            found: Container::default(),
+            summary: Definitions::default(),
+            statistics: None,
+            data_end: None,
+            data_crc: 0,
+            unchecked: false,
+            footer: None,
+            end: None,
+            unknown: BTreeMap::new(),
+        }
+    }
+
     fn damage(&mut self, kind: Kind, count: u64, text: String) {
         self.found.damage.push((kind, count, text));
     }
@@ -578,7 +605,7 @@ impl Walk<'_> {
                 self.forgotten = at;
             }
             if self.footer.is_some() {
-                self.closing(at);
+                self.end = Some(at);
                 return;
             }
             let next = match self.possible(at) {
@@ -627,7 +654,7 @@ impl Walk<'_> {
         if self.footer.is_none() {
             self.cut(at);
         } else {
-            self.closing(at);
+            self.end = Some(at);
         }
     }
 
@@ -698,6 +725,15 @@ impl Walk<'_> {
         self.found.complete = rest == MAGIC;
         if !self.found.complete {
             let text = match rest.strip_prefix(MAGIC) {
+                Some(more) if more.starts_with(MAGIC) => {
+                    self.found.behind = messages_behind(more);
+                    format!(
+                        "another recording follows the end of this one, of {} and {} bytes from byte {} on, and was left out: make it a file of its own",
+                        counted(self.found.behind, "message", "messages"),
+                        more.len(),
+                        at + MAGIC.len()
+                    )
+                }
                 Some(more) => format!(
                     "{} bytes follow the end of the recording and were left out",
                     more.len()

@@ -48,7 +48,10 @@ impl Decoder for Json {
         let stamp = self.read(message, rows).or_else(|problem| {
             // Python's and other writers put bare words that JSON does not have.
             match quote_words(message) {
-                Some(quoted) => self.read(&quoted, rows),
+                Some(quoted) => {
+                    rows.take_back_counts();
+                    self.read(&quoted, rows)
+                }
                 None => Err(problem),
             }
         });

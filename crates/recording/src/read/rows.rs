@@ -246,6 +246,14 @@ impl<'a> Rows<'a> {
                 column.values.truncate(row as usize);
             }
         }
+        self.take_back_counts();
+        let columns = &self.columns;
+        self.order
+            .retain(|column| !columns[*column as usize].values.is_empty());
+    }
+
+    /// Takes back what was counted of the message in hand, which is read again.
+    pub fn take_back_counts(&mut self) {
         for noted in self.noted.drain(..) {
             match noted {
                 Noted::Absent(field, messages) => self.absent[field as usize].1 -= messages,
@@ -253,9 +261,6 @@ impl<'a> Rows<'a> {
                 Noted::LongType(field, messages) => self.long_types[field as usize].1 -= messages,
             }
         }
-        let columns = &self.columns;
-        self.order
-            .retain(|column| !columns[*column as usize].values.is_empty());
         self.long.retain(|(_, count)| *count > 0);
     }
 

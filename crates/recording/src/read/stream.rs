@@ -319,7 +319,7 @@ impl<'a> Taker<'a> {
             findings,
             known: HashMap::new(),
             messages: 0,
-            lost: 0,
+            lost: recording.container.behind,
             unread: false,
             start_ns: recording.info.start_ns,
         }
