@@ -441,6 +441,45 @@ fn json_with_bare_words_is_counted_once() {
     );
 }
 
+/// Topic and field together may spell what those of another topic do: they are two signals, and that is said.
+#[test]
+fn fields_of_two_topics_with_one_name_are_kept_apart() {
+    let found = recording(&WriterOptions::default(), |writer| {
+        let topics = ["robot", "robot.arm", "robot"];
+        let messages = [
+            r#"{"arm":{"x":1}}"#,
+            r#"{"x":100,"y":7}"#,
+            r#"{"arm":{"x":2}}"#,
+        ];
+        for (t_ns, (topic, text)) in topics.iter().zip(messages).enumerate() {
+            let parts = RawChannel { topic, ..JSON };
+            let channel = writer.raw_channel(&parts).expect("opens");
+            let message = text.as_bytes();
+            writer
+                .message(channel, t_ns as i64, message)
+                .expect("writes");
+        }
+    });
+    let (signals, _) = found.signals(&|_| true).expect("reads");
+    let told: Vec<_> = (signals.iter())
+        .map(|signal| (signal.path.as_str(), signal.values.as_slice()))
+        .collect();
+    assert_eq!(
+        told,
+        [
+            ("robot.arm.x", &[1.0, 2.0][..]),
+            ("robot.arm:x", &[100.0]),
+            ("robot.arm.y", &[7.0]),
+        ]
+    );
+    assert_eq!(
+        lines(&found),
+        [
+            "odd_schema robot.arm: robot.arm.x is a field of another topic before, so that this topic's is called robot.arm:x"
+        ]
+    );
+}
+
 /// Everything that a recording gives, in the order in which it does.
 fn everything(bytes: &[u8], threads: usize) -> (Vec<String>, Vec<String>) {
     let options = ReadOptions {

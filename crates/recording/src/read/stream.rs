@@ -38,7 +38,7 @@ pub struct Batch<'a> {
 pub struct Column<'a> {
     /// A number that stands for the path throughout the stream, counted from 0 in the order of first sight.
     pub id: usize,
-    /// `TOPIC.field.path`.
+    /// `TOPIC.field.path`; `TOPIC:field.path` where a field of a topic before is called so.
     pub path: &'a str,
     /// The messages that have a value, as indices into `times_ns`; `None` where all do.
     pub rows: Option<&'a [u32]>,
@@ -245,8 +245,8 @@ struct Watch {
     long: Vec<(String, u64)>,
     trailing: u64,
     odd: Vec<(Arc<str>, u64, i64)>,
-    /// Path and number of the columns in the order of the last batch, which mostly is that of the next; no number where there are too many.
-    columns: Vec<(Arc<str>, Option<usize>)>,
+    /// Path, name and number of the columns in the order of the last batch, which mostly is that of the next; no number where there are too many.
+    columns: Vec<(Arc<str>, Arc<str>, Option<usize>)>,
     /// How many columns were numbered for it.
     numbered: usize,
     messages: u64,
@@ -256,7 +256,10 @@ struct Watch {
 struct Taker<'a> {
     recording: &'a Recording,
     watches: Vec<Watch>,
-    ids: HashMap<Arc<str>, usize>,
+    /// By name: the number of a column, and the first channel of its topic.
+    ids: HashMap<Arc<str>, (usize, usize)>,
+    /// The first channel of each channel's topic.
+    topics: Vec<usize>,
     findings: Vec<Finding>,
     /// Position in `findings` of troubles that repeat.
     known: HashMap<(Option<usize>, Kind, String), usize>,
@@ -309,8 +312,14 @@ impl<'a> Taker<'a> {
                 text: text.clone(),
             });
         }
+        let mut first = HashMap::new();
+        let channels = info.channels.iter().enumerate();
+        let topics = channels
+            .map(|(index, channel)| *first.entry(&channel.topic).or_insert(index))
+            .collect();
         Taker {
             recording,
+            topics,
             per_channel: vec![0; watches.len()],
             times: None,
             contradictions: 0,
@@ -399,60 +408,78 @@ impl<'a> Taker<'a> {
         add(&mut watch.long, std::mem::take(&mut batch.long));
         watch.trailing += batch.trailing;
         let mut remark = batch.remark.take();
-        let mut columns = Vec::with_capacity(batch.columns.len());
+        let (info, topic) = (
+            &self.recording.info.channels[batch.channel],
+            self.topics[batch.channel],
+        );
+        let mut shared: Option<(String, u64)> = None;
         for (position, column) in batch.columns.iter().enumerate() {
-            let id = match watch.columns.get(position) {
-                Some((path, id)) if *path == column.path => *id,
-                _ => {
-                    let next = self.ids.len();
-                    let id = match self.ids.entry(column.path.clone()) {
-                        Entry::Occupied(known) => Some(*known.get()),
-                        // Each block by itself has no more, all of them together may.
-                        Entry::Vacant(_) if watch.numbered >= MAX_COLUMNS => None,
-                        Entry::Vacant(new) => {
-                            watch.numbered += 1;
-                            Some(*new.insert(next))
+            if matches!(watch.columns.get(position), Some((path, ..)) if *path == column.path) {
+                continue;
+            }
+            let (mut name, mut mark) = (column.path.clone(), ":".to_owned());
+            let id = loop {
+                let next = self.ids.len();
+                match self.ids.entry(name.clone()) {
+                    Entry::Occupied(known) if known.get().1 == topic => break Some(known.get().0),
+                    Entry::Occupied(_) => {
+                        // Another topic begins as this one does, and goes on in its fields as this one in its name.
+                        let field = column.path.get(info.topic.len() + 1..).unwrap_or_default();
+                        name = format!("{}{mark}{field}", info.topic).into();
+                        mark.push(':');
+                    }
+                    // Each block by itself has no more, all of them together may.
+                    Entry::Vacant(_) if watch.numbered >= MAX_COLUMNS => break None,
+                    Entry::Vacant(new) => {
+                        watch.numbered += 1;
+                        new.insert((next, topic));
+                        if name != column.path {
+                            let text = format!(
+                                "{} is a field of another topic before, so that this topic's is called {name}",
+                                column.path
+                            );
+                            shared.get_or_insert((text, 0)).1 += 1;
                         }
-                    };
-                    watch.columns.truncate(position);
-                    watch.columns.push((column.path.clone(), id));
-                    id
+                        break Some(next);
+                    }
                 }
             };
+            watch.columns.truncate(position);
+            watch.columns.push((column.path.clone(), name, id));
+        }
+        let mut columns = Vec::with_capacity(batch.columns.len());
+        for (column, (_, name, id)) in batch.columns.iter().zip(&watch.columns) {
+            let id = *id;
             let Some(id) = id else {
                 remark.get_or_insert_with(too_many_columns);
                 continue;
             };
             if let Some((count, row)) = column.odd {
-                match watch
-                    .odd
-                    .iter_mut()
-                    .find(|(path, _, _)| *path == column.path)
-                {
+                match watch.odd.iter_mut().find(|(path, _, _)| path == name) {
                     Some((_, known, _)) => *known += count,
                     None => watch
                         .odd
-                        .push((column.path.clone(), count, batch.times[row as usize])),
+                        .push((name.clone(), count, batch.times[row as usize])),
                 }
             }
             let rows = (column.values.len() != batch.times.len()).then_some(column.rows.as_slice());
             columns.push(Column {
                 id,
-                path: &column.path,
+                path: name,
                 rows,
                 values: &column.values,
                 finite: column.odd.is_none(),
             });
         }
-        let info = &self.recording.info.channels[batch.channel];
-        if let Some(text) = remark {
+        let remarks = remark.map(|text| (text, 1)).into_iter().chain(shared);
+        for (text, count) in remarks {
             let key = (Some(batch.channel), Kind::OddSchema, text.clone());
             if !self.known.contains_key(&key) {
                 self.known.insert(key, self.findings.len());
                 self.findings.push(Finding {
                     topic: info.topic.clone(),
                     kind: Kind::OddSchema,
-                    count: 1,
+                    count,
                     t_s: None,
                     text,
                 });
@@ -572,7 +599,7 @@ impl<'a> Taker<'a> {
                 let field = path
                     .strip_prefix(topic.as_str())
                     .unwrap_or(path)
-                    .trim_start_matches('.');
+                    .trim_start_matches(['.', ':']);
                 say(
                     Kind::Nan,
                     *count,
