@@ -1,6 +1,6 @@
 //! Which signal is what: named by the user, inferred from schemas otherwise, printed always.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 use std::path::Path;
 
 use serde::Deserialize;
@@ -300,6 +300,8 @@ const BY_SCHEMA: &[(&str, Role, &str)] = &[
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Roles {
     patterns: BTreeMap<Role, Vec<String>>,
+    /// Roles that the user gave.
+    said: BTreeSet<Role>,
     /// What the user says of the sensors themselves.
     pub sensors: Sensors,
     /// Topics that were taken out of several that could have been, with a sentence each.
@@ -417,6 +419,7 @@ impl Roles {
                 let said = user.patterns(role);
                 if !said.is_empty() {
                     roles.patterns.insert(role, said);
+                    roles.said.insert(role);
                 }
             }
         }
@@ -440,6 +443,11 @@ impl Roles {
     /// The patterns of a role: paths of signals, or topics, `*` standing for anything.
     pub fn patterns(&self, role: Role) -> &[String] {
         self.patterns.get(&role).map_or(&[], |p| &p[..])
+    }
+
+    /// Whether the user said who plays a role.
+    pub fn is_said(&self, role: Role) -> bool {
+        self.said.contains(&role)
     }
 
     /// The topic that plays a role.

@@ -6,6 +6,7 @@ use std::path::{Path, PathBuf};
 use std::process::{Command, Output};
 
 use recording::cdr::Float64;
+use recording::read::{RawAttachment, RawMessage, ReadOptions, Recording};
 use recording::schema::rath;
 use recording::topics::{self, MessageKind};
 use recording::write::{RecordingWriter, WriterOptions};
@@ -258,7 +259,7 @@ fn window_signal_and_topic_narrow_what_is_told() {
     let out = analyze(&[file, "--signal", "/nothing*"]);
     assert_eq!(out.status.code(), Some(1));
     assert!(
-        text(&out.stderr).contains("no numeric signal fits /nothing*"),
+        text(&out.stderr).contains("no numeric signal fits /nothing*; its topics are "),
         "{}",
         text(&out.stderr)
     );
@@ -405,6 +406,85 @@ fn annotate_keeps_every_message_and_adds_findings() {
         messages(&after, "/findings/events"),
         Some(before["events"].as_array().unwrap().len() as u64)
     );
+}
+
+/// Times, numbers, attachments and metadata records of a recording, each as it is.
+fn as_it_is(path: &Path, mut keep: impl FnMut(&RawMessage<'_>)) -> (String, Vec<String>) {
+    let recording = Recording::open(path, &ReadOptions::default()).unwrap();
+    let beside = |topic: &str| !topic.starts_with("/findings/");
+    recording.messages(&beside, &mut |raw| keep(raw)).unwrap();
+    let attached = recording.attachments().map(|a| format!("{a:?}"));
+    let records = recording.metadata_records().iter();
+    let noted = records.filter(|(name, _)| name != "findings");
+    let kept = attached.chain(noted.map(|record| format!("{record:?}")));
+    (recording.info().profile.clone(), kept.collect())
+}
+
+#[test]
+fn annotate_copies_times_numbers_and_what_shares_a_name() {
+    let folder = tempfile::tempdir().unwrap();
+    let [from, to] = ["from.mcap", "to.mcap"].map(|name| folder.path().join(name));
+    for profile in ["x-own", "ros1"] {
+        let options = WriterOptions {
+            profile: profile.into(),
+            ..WriterOptions::default()
+        };
+        let mut w = RecordingWriter::create(&from, &options).unwrap();
+        for (name, key, value) in [("b", "k", "1"), ("a", "k", "2"), ("b", "k", "3")] {
+            let values = [(key.to_owned(), value.to_owned())].into();
+            w.metadata(name, &values).unwrap();
+        }
+        for (log_time_ns, data) in [(5, &b"first"[..]), (7, b"second")] {
+            w.copy_attachment(&RawAttachment {
+                name: "calibration",
+                media_type: "text/plain",
+                log_time_ns,
+                create_time_ns: 3,
+                data,
+            })
+            .unwrap();
+        }
+        let number = w.channel("/x", MessageKind::Float64).unwrap();
+        for k in 0..100i64 {
+            let raw = RawMessage {
+                channel: 0,
+                topic: "/x",
+                sequence: 7 * k as u32,
+                log_time_ns: k * 10_000_000,
+                publish_time_ns: u64::MAX - k as u64,
+                data: &[0, 1, 0, 0, 0, 0, 0, 0, 0, 0, 0, k as u8],
+            };
+            w.copy(number, &raw).unwrap();
+        }
+        w.finish().unwrap();
+        let out = analyze(&[from.to_str().unwrap(), "--annotate", to.to_str().unwrap()]);
+        assert!(out.status.success(), "{}", text(&out.stderr));
+        let told = |raw: &RawMessage<'_>| {
+            let times = (raw.log_time_ns, raw.publish_time_ns);
+            (times, raw.sequence, raw.data.to_vec())
+        };
+        let (mut before, mut after) = (Vec::new(), Vec::new());
+        let (_, beside) = as_it_is(&from, |raw| before.push(told(raw)));
+        let found = as_it_is(&to, |raw| after.push(told(raw)));
+        assert_eq!(before.len(), 100);
+        assert_eq!(before, after);
+        assert_eq!(beside.len(), 5);
+        assert_eq!(found, (profile.to_owned(), beside));
+    }
+}
+
+/// A file that was cut before its first message has no topic to name: what is wrong with it is said.
+#[test]
+fn no_signal_fits_where_all_is_lost() {
+    let folder = tempfile::tempdir().unwrap();
+    let file = recording(folder.path());
+    let bytes = std::fs::read(&file).unwrap();
+    std::fs::write(&file, &bytes[..40]).unwrap();
+    let out = analyze(&[file.to_str().unwrap(), "--signal", "/battery.data"]);
+    let said = text(&out.stderr);
+    let expected =
+        "no numeric signal fits /battery.data; it has no topics that can be read; the file ends ";
+    assert!(said.contains(expected), "{said}");
 }
 
 #[test]
@@ -1274,7 +1354,7 @@ fn signals_share_a_panel_where_one_scale_shows_them() {
         (t, format!("{{{}}}", fields.join(",")))
     };
     let file = told(folder.path(), &[("/m", (0..500).map(message).collect())]);
-    let opened = recording::read::Recording::open(Path::new(&file), &Default::default()).unwrap();
+    let opened = Recording::open(Path::new(&file), &Default::default()).unwrap();
     let request = analyze::examine::Request {
         traces: true,
         ..Default::default()

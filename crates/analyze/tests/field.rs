@@ -316,6 +316,7 @@ fn a_sensor_on_the_load_does_not_walk() {
     };
     assert!(steps("").is_some());
     assert_eq!(steps("imu_place_m = [0.5, 0.0, 0.3]"), None);
+    assert_eq!(steps("imu = \"/imu/phone\""), None);
 }
 
 /// Sensors that are left aside because nothing says whose they are.

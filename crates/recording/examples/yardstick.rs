@@ -52,7 +52,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
         chunk_bytes: 1 << 20,
         chunk_ns: i64::MAX,
         zstd_level: 3,
-        own_thread: false,
+        ..WriterOptions::default()
     };
     let mut writer = RecordingWriter::create(Path::new(path), &options)?;
     let mut channels = Vec::new();

@@ -20,7 +20,11 @@ use std::{
 use mcap::records::MessageHeader;
 
 use crate::whole::Sink;
-use crate::{cdr, read::ChannelInfo, topics::MessageKind};
+use crate::{
+    cdr,
+    read::{ChannelInfo, RawAttachment, RawMessage},
+    topics::MessageKind,
+};
 use beside::{Batch, Beside};
 use container::Container;
 pub use options::WriterOptions;
@@ -134,7 +138,7 @@ pub struct RawChannel<'a> {
     pub topic: &'a str,
     /// Encoding of the messages.
     pub message_encoding: &'a str,
-    /// Name of the schema; with an empty `schema_encoding` and no data the channel has no schema.
+    /// Name of the schema; without name, `schema_encoding` and data the channel has no schema.
     pub schema_name: &'a str,
     /// Encoding of the schema.
     pub schema_encoding: &'a str,
@@ -266,19 +270,30 @@ impl RecordingWriter {
         result.map_err(|error| failed(&self.target, error))
     }
 
-    /// Attaches a file.
+    /// Attaches a file, without times.
     pub fn attachment(
         &mut self,
         name: &str,
         media_type: &str,
         bytes: &[u8],
     ) -> Result<(), WriteError> {
+        self.copy_attachment(&RawAttachment {
+            name,
+            media_type,
+            log_time_ns: 0,
+            create_time_ns: 0,
+            data: bytes,
+        })
+    }
+
+    /// Attaches a file with the times that it has.
+    pub fn copy_attachment(&mut self, attachment: &RawAttachment<'_>) -> Result<(), WriteError> {
         let record = mcap::Attachment {
-            log_time: 0,
-            create_time: 0,
-            name: name.to_owned(),
-            media_type: media_type.to_owned(),
-            data: bytes.into(),
+            log_time: attachment.log_time_ns,
+            create_time: attachment.create_time_ns,
+            name: attachment.name.to_owned(),
+            media_type: attachment.media_type.to_owned(),
+            data: attachment.data.into(),
         };
         let container = self.at_hand()?;
         container.chunk_start_ns = None;
@@ -303,7 +318,8 @@ impl RecordingWriter {
     /// Opens a channel that is given by its parts.
     pub fn raw_channel(&mut self, channel: &RawChannel<'_>) -> Result<ChannelId, WriteError> {
         let writer = &mut self.at_hand()?.writer;
-        let schema = if channel.schema_encoding.is_empty() && channel.schema_data.is_empty() {
+        let parts = [channel.schema_name, channel.schema_encoding];
+        let schema = if parts == ["", ""] && channel.schema_data.is_empty() {
             Ok(0)
         } else {
             writer.add_schema(
@@ -337,11 +353,31 @@ impl RecordingWriter {
         t_ns: i64,
         message: &M,
     ) -> Result<(), WriteError> {
-        let channel = &mut self.channels[channel.0];
+        let sequence = self.channels[channel.0].sequence;
+        self.put(channel, t_ns, t_ns.cast_unsigned(), sequence, message)?;
+        self.channels[channel.0].sequence = sequence.wrapping_add(1);
+        Ok(())
+    }
+
+    /// Writes a message of another recording as it is there.
+    pub fn copy(&mut self, channel: ChannelId, raw: &RawMessage<'_>) -> Result<(), WriteError> {
+        let (t_ns, publish_ns) = (raw.log_time_ns, raw.publish_time_ns);
+        self.put(channel, t_ns, publish_ns, raw.sequence, raw.data)
+    }
+
+    fn put<M: Encode + ?Sized>(
+        &mut self,
+        channel: ChannelId,
+        t_ns: i64,
+        publish_time: u64,
+        sequence: u32,
+        message: &M,
+    ) -> Result<(), WriteError> {
+        let channel = &self.channels[channel.0];
         let begin = self.batch.end();
         self.batch.bytes.truncate(begin);
         message.encode_into(&mut self.batch.bytes);
-        let Ok(time) = u64::try_from(t_ns) else {
+        let Ok(log_time) = u64::try_from(t_ns) else {
             return Err(WriteError::NegativeTime {
                 target: self.target.clone(),
                 topic: channel.topic.clone(),
@@ -359,11 +395,10 @@ impl RecordingWriter {
         }
         self.batch.close(MessageHeader {
             channel_id: channel.id,
-            sequence: channel.sequence,
-            log_time: time,
-            publish_time: time,
+            sequence,
+            log_time,
+            publish_time,
         });
-        channel.sequence = channel.sequence.wrapping_add(1);
         if !self.own_thread || self.batch.is_full() {
             self.hand_over()?;
         }

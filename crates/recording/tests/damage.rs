@@ -800,6 +800,67 @@ fn a_summary_that_lies_is_found_out() {
     }
 }
 
+/// Beside messages that cannot be used, a recording lasts as long as the others do, whatever its summary says.
+#[test]
+fn bad_messages_and_chunks_leave_the_bounds_alone() {
+    let whole = |inner: &[u8], times: [u64; 2]| {
+        let header = times.map(u64::to_le_bytes).concat();
+        let mut chunk = chunk("", inner.len() as u64, crc32fast::hash(inner), inner);
+        chunk[9..25].copy_from_slice(&header);
+        chunk
+    };
+    let sound = [topic(1, "/a"), message(1, 5, b"1"), message(1, 9, b"2")].concat();
+    let sound = whole(&sound, [5, 9]);
+    let beyond = whole(&message(1, 1 << 63, b"3"), [1 << 63; 2]);
+    let undecodable = whole(&message(1, 7, b"?"), [7; 2]);
+    let mut broken = whole(&message(1, 12, b"3"), [12; 2]);
+    *broken.last_mut().expect("has bytes") ^= 1;
+    let lies = "summary_times";
+    for (bad, times, end_ns, said) in [
+        (&beyond, [5, 1 << 63], 9, vec!["time_out_of_range"]),
+        (&beyond, [0, 0], 9, vec![lies, "time_out_of_range"]),
+        (&undecodable, [5, 9], 9, vec!["undecodable"]),
+        (&undecodable, [0, 0], 9, vec![lies, "undecodable"]),
+        (&undecodable, [5, 1 << 63], 9, vec![lies, "undecodable"]),
+        // What a lost chunk's header says is all that is known of its times.
+        (&broken, [5, 12], 12, vec!["bad_crc", "bad_summary"]),
+        (&broken, [0, 0], 9, vec![lies, "bad_crc"]),
+    ] {
+        let summary = [topic(1, "/a"), statistics(2, times, &[(1, 3)])];
+        let bytes = summarised(&[sound.clone(), bad.clone()], &summary);
+        let mut recording = Recording::from_bytes(bytes, &options()).expect("opens");
+        recording.stream(&|_| true, &mut |_| ()).expect("reads");
+        if recording.contradicts_its_summary() {
+            recording = recording.searched();
+        }
+        let findings = recording.stream(&|_| true, &mut |_| ()).expect("reads");
+        let mut kinds: Vec<String> = findings.iter().map(|f| f.kind.to_string()).collect();
+        kinds.sort_unstable_by_key(|kind| kind != lies);
+        let info = recording.info();
+        assert_eq!((info.start_ns, info.end_ns), (5, end_ns), "{times:?}");
+        assert_eq!(kinds, said, "{times:?}");
+    }
+}
+
+/// Files put one behind the other are no recording of both: what the first ends before is lost.
+#[test]
+fn recordings_behind_the_end_are_lost() {
+    let one = summarised(
+        &[topic(1, "/a"), message(1, 5, b"1"), message(1, 9, b"2")],
+        &[topic(1, "/a"), statistics(0, [5, 9], &[(1, 2)])],
+    );
+    let bytes = [&one[..], &one, &one].concat();
+    let read = read(bytes).expect("opens");
+    assert_eq!((read.content.len(), read.skipped), (2, 4));
+    let found: Vec<String> = read.findings.iter().map(ToString::to_string).collect();
+    let said = format!(
+        "another recording follows the end of this one, of 4 messages and {} bytes from byte {} on, and was left out: make it a file of its own",
+        2 * one.len(),
+        one.len()
+    );
+    assert_eq!(found, [said]);
+}
+
 #[test]
 fn a_second_definition_is_named_with_its_topic() {
     let (_, lines) = lines(file(&[

@@ -422,8 +422,209 @@ fn json_with_bare_words() {
     );
 }
 
-/// A set of one file with `message`, in a channel of its own.
-fn one_message(syntax: &str, message: DescriptorProto, bytes: &[u8]) -> Recording {
+/// A message with such words is read again, and counted once.
+#[test]
+fn json_with_bare_words_is_counted_once() {
+    let found = recording(&WriterOptions::default(), |writer| {
+        let channel = writer.raw_channel(&JSON).expect("opens");
+        let long = vec!["1"; 65].join(",");
+        for t_ns in 0..10 {
+            let word = if t_ns % 2 == 0 { "NaN" } else { "1" };
+            let text = format!("{{\"y\":[{long}],\"x\":{word}}}");
+            let message = text.as_bytes();
+            writer.message(channel, t_ns, message).expect("writes");
+        }
+    });
+    assert_eq!(
+        lines(&found)[1],
+        "long_sequence /j: y has more than 64 items (the limit) in 10 messages; it is not among the signals there"
+    );
+}
+
+/// Topic and field together may spell what those of another topic do: they are two signals, and that is said.
+#[test]
+fn fields_of_two_topics_with_one_name_are_kept_apart() {
+    let found = recording(&WriterOptions::default(), |writer| {
+        let topics = ["robot", "robot.arm", "robot"];
+        let messages = [
+            r#"{"arm":{"x":1}}"#,
+            r#"{"x":100,"y":7}"#,
+            r#"{"arm":{"x":2}}"#,
+        ];
+        for (t_ns, (topic, text)) in topics.iter().zip(messages).enumerate() {
+            let parts = RawChannel { topic, ..JSON };
+            let channel = writer.raw_channel(&parts).expect("opens");
+            let message = text.as_bytes();
+            writer
+                .message(channel, t_ns as i64, message)
+                .expect("writes");
+        }
+    });
+    let (signals, _) = found.signals(&|_| true).expect("reads");
+    let told: Vec<_> = (signals.iter())
+        .map(|signal| (signal.path.as_str(), signal.values.as_slice()))
+        .collect();
+    assert_eq!(
+        told,
+        [
+            ("robot.arm.x", &[1.0, 2.0][..]),
+            ("robot.arm:x", &[100.0]),
+            ("robot.arm.y", &[7.0]),
+        ]
+    );
+    assert_eq!(
+        lines(&found),
+        [
+            "odd_schema robot.arm: robot.arm.x is a field of another topic before, so that this topic's is called robot.arm:x"
+        ]
+    );
+}
+
+/// Everything that a recording gives, in the order in which it does.
+fn everything(bytes: &[u8], threads: usize) -> (Vec<String>, Vec<String>) {
+    let options = ReadOptions {
+        threads,
+        ..ReadOptions::default()
+    };
+    let recording = Recording::from_bytes(bytes.to_vec(), &options).expect("opens");
+    let mut batches = Vec::new();
+    let findings = recording.stream(&|_| true, &mut |batch| {
+        for c in batch.columns {
+            let rows = c.rows.map_or(c.values.len(), <[u32]>::len);
+            let values: f64 = c.values.iter().sum();
+            batches.push(format!("{} {} {rows} {values}", c.id, c.path));
+        }
+    });
+    let told = findings.expect("reads").into_iter();
+    (batches, told.map(|f| format!("{} {f}", f.kind)).collect())
+}
+
+/// A recording of one channel in many chunks; whatever the number of threads, it gives the same: so many columns, and what is said.
+fn same_for_all_threads(channel: &RawChannel<'_>, messages: &[Vec<u8>]) -> (usize, Vec<String>) {
+    let shared = Shared::default();
+    let options = WriterOptions {
+        chunk_bytes: 400,
+        ..WriterOptions::default()
+    };
+    let mut writer = RecordingWriter::to_stream(shared.clone(), &options).expect("begins");
+    let id = writer.raw_channel(channel).expect("opens");
+    for (t_ns, message) in messages.iter().enumerate() {
+        let message = message.as_slice();
+        writer.message(id, t_ns as i64, message).expect("writes");
+    }
+    writer.finish().expect("finishes");
+    let bytes = shared.take();
+    let (batches, told) = everything(&bytes, 1);
+    for threads in [2, 5] {
+        let again = everything(&bytes, threads);
+        assert!(again.0 == batches, "{}: {threads} threads", channel.topic);
+        assert_eq!(again.1, told, "{}: {threads} threads", channel.topic);
+    }
+    let id = |line: &String| line.split(' ').next().map(str::to_owned);
+    let ids: std::collections::BTreeSet<_> = batches.iter().filter_map(id).collect();
+    (ids.len(), told)
+}
+
+const JSON: RawChannel<'static> = RawChannel {
+    topic: "/j",
+    message_encoding: "json",
+    schema_name: "",
+    schema_encoding: "",
+    schema_data: b"",
+    metadata: &BTreeMap::new(),
+};
+
+/// Limits hold for a message, or for the recording in its order, never for what a thread happened to see.
+#[test]
+fn limits_do_not_depend_on_threads() {
+    let object = |keys: std::ops::Range<usize>| {
+        let keys: Vec<String> = keys.map(|k| format!("\"k{k}\":1")).collect();
+        format!("{{{}}}", keys.join(",")).into_bytes()
+    };
+    // Few keys at a time, many over time, in changing order.
+    let few = |m: usize| 3 * (7 * m % 1667)..3 * (7 * m % 1667) + 3;
+    let mut messages: Vec<_> = (0..1667).map(|m| object(few(m))).collect();
+    assert_eq!(same_for_all_threads(&JSON, &messages), (5001, vec![]));
+    messages.push(object(0..5000));
+    let said = "long_sequence /j: the message itself has more keys than the 4096 that become signals, in 1 message; what has further ones is left out";
+    assert_eq!(
+        same_for_all_threads(&JSON, &messages),
+        (5001, vec![said.into()])
+    );
+    let grid = |key: usize| {
+        let line = format!("[{}]", vec!["1"; 64].join(","));
+        format!("{{\"k{key}\":[{}]}}", vec![line; 64].join(",")).into_bytes()
+    };
+    let messages: Vec<_> = (0..24).map(|m| grid(m * 7 % 20)).collect();
+    let said = "odd_schema /j: it has more than 65536 numeric fields; the others are left out";
+    assert_eq!(
+        same_for_all_threads(&JSON, &messages),
+        (65536, vec![said.into()])
+    );
+
+    let mut map = field("m", 1, Type::Message, Some(".a.P.MEntry"));
+    map.label = Some(Label::Repeated as i32);
+    let entry = DescriptorProto {
+        name: Some("MEntry".into()),
+        field: vec![
+            field("key", 1, Type::Uint32, None),
+            field("value", 2, Type::Uint32, None),
+        ],
+        options: Some(MessageOptions {
+            map_entry: Some(true),
+            ..MessageOptions::default()
+        }),
+        ..DescriptorProto::default()
+    };
+    let (name, set) = set_of(
+        "proto3",
+        DescriptorProto {
+            name: Some("P".into()),
+            field: vec![map],
+            nested_type: vec![entry],
+            ..DescriptorProto::default()
+        },
+    );
+    let protobuf = RawChannel {
+        topic: "/p",
+        message_encoding: "protobuf",
+        schema_name: &name,
+        schema_encoding: "protobuf",
+        schema_data: &set,
+        metadata: &BTreeMap::new(),
+    };
+    let entries = |keys: std::ops::Range<u8>| -> Vec<u8> {
+        keys.flat_map(|key| [10, 4, 8, key, 16, 1]).collect()
+    };
+    let mut messages: Vec<_> = (0..900)
+        .map(|m| entries(m as u8 % 100..m as u8 % 100 + 2))
+        .collect();
+    assert_eq!(same_for_all_threads(&protobuf, &messages).0, 101);
+    messages.push(entries(0..65));
+    let said = "long_sequence /p: m has more than 64 items (the limit) in 1 message; it is not among the signals there";
+    assert_eq!(
+        same_for_all_threads(&protobuf, &messages),
+        (101, vec![said.into()])
+    );
+
+    let array = RawChannel {
+        topic: "/a",
+        message_encoding: "cdr",
+        schema_name: "a/msg/A",
+        schema_encoding: "ros2msg",
+        schema_data: b"uint8 x\nuint8[65] y",
+        metadata: &BTreeMap::new(),
+    };
+    let message = [&[0, 1, 0, 0][..], &[1; 66]].concat();
+    let said = "long_sequence /a: y has more than 64 items (the limit) in 30 messages; it is not among the signals there";
+    assert_eq!(
+        same_for_all_threads(&array, &vec![message; 30]),
+        (1, vec![said.into()])
+    );
+}
+
+/// The name of a message and a set of one file that defines it.
+fn set_of(syntax: &str, message: DescriptorProto) -> (String, Vec<u8>) {
     let name = format!("a.{}", message.name());
     let set = FileDescriptorSet {
         file: vec![FileDescriptorProto {
@@ -434,6 +635,12 @@ fn one_message(syntax: &str, message: DescriptorProto, bytes: &[u8]) -> Recordin
             ..FileDescriptorProto::default()
         }],
     };
+    (name, set.encode_to_vec())
+}
+
+/// A recording of one message of that type.
+fn one_message(syntax: &str, message: DescriptorProto, bytes: &[u8]) -> Recording {
+    let (name, set) = set_of(syntax, message);
     recording(&WriterOptions::default(), |writer| {
         let channel = writer
             .raw_channel(&RawChannel {
@@ -441,7 +648,7 @@ fn one_message(syntax: &str, message: DescriptorProto, bytes: &[u8]) -> Recordin
                 message_encoding: "protobuf",
                 schema_name: &name,
                 schema_encoding: "protobuf",
-                schema_data: &set.encode_to_vec(),
+                schema_data: &set,
                 metadata: &BTreeMap::new(),
             })
             .expect("opens");

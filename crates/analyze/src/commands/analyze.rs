@@ -244,21 +244,6 @@ fn command_line() -> String {
 
 /// Why there is nothing to analyse.
 fn nothing(a: &Analysis, request: &Request) -> String {
-    if !request.signals.is_empty() || !request.topics.is_empty() {
-        let asked: Vec<&str> = request
-            .signals
-            .iter()
-            .chain(&request.topics)
-            .map(String::as_str)
-            .collect();
-        let topics: Vec<&str> = a.topics.iter().map(|t| t.name.as_str()).take(20).collect();
-        return format!(
-            "{}: no numeric signal fits {}; its topics are {}",
-            a.file,
-            asked.join(", "),
-            topics.join(", ")
-        );
-    }
     let why: Vec<String> = (a.quality.iter())
         .filter(|q| q.loss || ["no_decoder", "long_sequence"].contains(&q.kind))
         .take(20)
@@ -269,6 +254,24 @@ fn nothing(a: &Analysis, request: &Request) -> String {
     } else {
         format!("; {}", why.join("; "))
     };
+    if !request.signals.is_empty() || !request.topics.is_empty() {
+        let asked: Vec<&str> = request
+            .signals
+            .iter()
+            .chain(&request.topics)
+            .map(String::as_str)
+            .collect();
+        let topics: Vec<&str> = a.topics.iter().map(|t| t.name.as_str()).take(20).collect();
+        let found = match topics.is_empty() {
+            true => "it has no topics that can be read".to_owned(),
+            false => format!("its topics are {}", topics.join(", ")),
+        };
+        return format!(
+            "{}: no numeric signal fits {}; {found}{why}",
+            a.file,
+            asked.join(", ")
+        );
+    }
     if a.messages == 0 {
         return format!("{}: holds no messages{why}", a.file);
     }

@@ -18,42 +18,47 @@ fn is_found(topic: &str) -> bool {
     topic.starts_with("/findings/")
 }
 
-/// Copies every message as it is and adds `/findings/...`; the file appears whole or not at all.
+/// Copies every message, attachment and metadata record as it is and adds `/findings/...`; the file appears whole or not at all.
 pub(super) fn write(recording: &Recording, analysis: &Analysis, out: &Path) -> anyhow::Result<()> {
-    let mut writer = RecordingWriter::create(out, &WriterOptions::default())?;
-    for (name, values) in &recording.info().metadata {
-        if name == "findings" {
-            continue;
-        }
-        writer.metadata(name, values)?;
-    }
-    writer.metadata("findings", &findings(analysis))?;
-    for attachment in &recording.info().attachments {
-        if let Some(bytes) = recording.attachment(&attachment.name) {
-            writer.attachment(&attachment.name, &attachment.media_type, &bytes)?;
-        }
-    }
-    let mut channels = Vec::new();
-    for c in &recording.info().channels {
-        channels.push(match is_found(&c.topic) {
-            true => None,
-            false => Some(writer.raw_channel(&RawChannel::from(c))?),
-        });
-    }
-    let start_ns = recording.info().start_ns;
-    let mut own = own(analysis, start_ns);
+    let info = recording.info();
+    let mut own = own(analysis, info.start_ns);
     own.sort_by_key(|m| m.t_ns);
-    let mut topics: Vec<(&'static str, _)> = Vec::new();
+    let mut kinds: Vec<(&'static str, MessageKind)> = Vec::new();
     for message in &own {
-        if topics.iter().all(|(t, _)| *t != message.topic) {
+        if kinds.iter().all(|(t, _)| *t != message.topic) {
             let kind = match message.content {
                 Content::Text(..) => MessageKind::Log,
                 Content::Number(_) => MessageKind::Float64,
                 Content::State(_) => MessageKind::RathState,
                 Content::Phases(_) => MessageKind::Phases,
             };
-            topics.push((message.topic, writer.channel(message.topic, kind)?));
+            kinds.push((message.topic, kind));
         }
+    }
+    let options = WriterOptions {
+        profile: profile(&info.profile, kinds.iter().map(|(_, kind)| *kind)),
+        ..WriterOptions::default()
+    };
+    let mut writer = RecordingWriter::create(out, &options)?;
+    for (name, values) in recording.metadata_records() {
+        if name != "findings" {
+            writer.metadata(name, values)?;
+        }
+    }
+    writer.metadata("findings", &findings(analysis))?;
+    for attachment in recording.attachments() {
+        writer.copy_attachment(&attachment)?;
+    }
+    let mut channels = Vec::new();
+    for c in &info.channels {
+        channels.push(match is_found(&c.topic) {
+            true => None,
+            false => Some(writer.raw_channel(&RawChannel::from(c))?),
+        });
+    }
+    let mut topics: Vec<(&'static str, _)> = Vec::new();
+    for (topic, kind) in kinds {
+        topics.push((topic, writer.channel(topic, kind)?));
     }
     let mut own = own.into_iter().peekable();
     let mut result = Ok(());
@@ -63,7 +68,7 @@ pub(super) fn write(recording: &Recording, analysis: &Analysis, out: &Path) -> a
                 put(&mut writer, &topics, &message)?;
             }
             if let Some(channel) = channels[raw.channel] {
-                writer.message(channel, raw.log_time_ns, raw.data)?;
+                writer.copy(channel, raw)?;
             }
             Ok(())
         };
@@ -76,6 +81,16 @@ pub(super) fn write(recording: &Recording, analysis: &Analysis, out: &Path) -> a
         put(&mut writer, &topics, &message)?;
     }
     Ok(writer.finish()?)
+}
+
+/// The recording's profile, but for one that allows encodings which what is added does not have.
+fn profile(profile: &str, mut added: impl Iterator<Item = MessageKind>) -> String {
+    let holds = match profile {
+        "ros1" => added.next().is_none(),
+        "ros2" => added.all(|kind| kind.encoding() == "cdr"),
+        _ => true,
+    };
+    if holds { profile } else { "" }.to_owned()
 }
 
 struct Message {
@@ -262,4 +277,24 @@ fn gait(i: &Inputs) -> Vec<(f64, &'static str, Content)> {
         .enumerate()
         .filter_map(message)
         .collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A profile holds of the copy where what is added keeps its encoding.
+    #[test]
+    fn a_profile_is_kept_while_it_holds() {
+        let (cdr, protobuf) = (MessageKind::Log, MessageKind::RathState);
+        for (name, added, kept) in [
+            ("ros2", vec![cdr, MessageKind::Float64], "ros2"),
+            ("ros2", vec![cdr, protobuf], ""),
+            ("ros1", vec![cdr], ""),
+            ("ros1", vec![], "ros1"),
+            ("x-own", vec![protobuf], "x-own"),
+        ] {
+            assert_eq!(profile(name, added.into_iter()), kept);
+        }
+    }
 }

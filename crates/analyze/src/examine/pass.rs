@@ -336,7 +336,14 @@ impl<'a> Pass<'a> {
         }
         let mut found: Vec<Vec<(i64, f64)>> = vec![Vec::new(); self.entries.len()];
         let mut quaternions = Quaternions::default();
-        let select = |path: &str| with_angles(path, |path| tangled.contains_key(path));
+        // What is called otherwise, because another topic has a field of its name, is asked for by that.
+        let named = |k: &usize| {
+            let (topic, field) = self.names(&self.entries[*k]);
+            format!("{topic}.{field}")
+        };
+        let names: BTreeSet<String> = tangled.values().map(named).collect();
+        let asked = |path: &str| tangled.contains_key(path) || names.contains(path);
+        let select = |path: &str| with_angles(path, asked);
         self.recording.stream(&select, &mut |batch| {
             let mut keep = |path: &str, rows: Option<&[u32]>, values: &[f64]| {
                 if let Some(entry) = tangled.get(path) {
@@ -393,5 +400,5 @@ fn with_angles(path: &str, wants: impl Fn(&str) -> bool) -> bool {
 pub(super) fn field<'a>(topic: &str, path: &'a str) -> &'a str {
     path.strip_prefix(topic)
         .unwrap_or(path)
-        .trim_start_matches('.')
+        .trim_start_matches(['.', ':'])
 }

@@ -268,9 +268,10 @@ impl Field {
             if !feels {
                 continue;
             }
-            // The one sensor of a walker's phone plays the rath's role for want of another: steps tell. Who says where it sits on the load says what
-            // it is.
-            let said = roles.sensors.place_m.is_some()
+            // The one sensor of a walker's phone plays the rath's role for want of another: steps tell. Who names it, or says where it sits on the load,
+            // says what it is.
+            let said = roles.is_said(Role::Imu)
+                || roles.sensors.place_m.is_some()
                 || roles.sensors.mounting_roll_pitch_yaw_deg.is_some();
             let alone = roles.patterns(Role::Carriers).is_empty();
             if !is_rath || (alone && !said && !about_the_load(topic)) {

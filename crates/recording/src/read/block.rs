@@ -5,7 +5,7 @@ use std::{collections::BTreeMap, ops::Range, sync::Arc};
 use super::{
     ReadOptions, Recording, Tally,
     chunk::{self, Loss, Unpacker, WHOLE_BYTES},
-    container::{Block, Definitions, Fields, op},
+    container::{Block, Definitions, Fields, chunk_header, op},
     decode::{Decoder, Place, SchemaRef},
     decoders::{self, NoDecoder},
     rows::{Rows, Selection},
@@ -59,8 +59,8 @@ pub(super) struct BlockResult {
     pub messages: u64,
     /// The same by index of the channel, where it is known.
     pub per_channel: Vec<(usize, u64)>,
-    /// The earliest and the latest log time, ns.
-    pub times: Option<(i64, i64)>,
+    /// The earliest and the latest log time, of a lost chunk as its header says, ns.
+    pub times: Option<(u64, u64)>,
     /// Schemas and channels that are defined here otherwise than they are used.
     pub contradictions: u64,
     /// The chunk is too large to be decoded in one go, or cut off: the caller reads it in pieces.
@@ -79,8 +79,35 @@ impl BlockResult {
         self.batches.iter().map(batch).sum()
     }
 
+    /// Takes in that a chunk was left out, and why.
+    fn lose(
+        &mut self,
+        recording: &Recording,
+        body: &Range<usize>,
+        indexed: Option<u64>,
+        (kind, what): Loss,
+    ) {
+        let messages = match indexed {
+            Some(1) => "its only message was".to_owned(),
+            Some(count) => format!("its {count} messages were"),
+            None => "it was".to_owned(),
+        };
+        self.times = chunk_times(&recording.data[body.clone()]);
+        self.troubles.push(Trouble {
+            channel: None,
+            kind,
+            count: 1,
+            time: self.times.and_then(|(start, _)| i64::try_from(start).ok()),
+            text: format!(
+                "the chunk at byte {} {what}; {messages} left out",
+                body.start.saturating_sub(9)
+            ),
+            lost: indexed.unwrap_or(0),
+        });
+    }
+
     #[inline]
-    fn see(&mut self, time: i64) {
+    fn see(&mut self, time: u64) {
         let (first, last) = self.times.get_or_insert((time, time));
         *first = time.min(*first);
         *last = time.max(*last);
@@ -117,6 +144,8 @@ struct ChannelState<'a> {
     index: usize,
     rows: Rows<'a>,
     state: State,
+    /// Nothing has been decoded yet.
+    fresh: bool,
     /// Messages of the block that wait to be decoded together.
     waiting: Vec<Place>,
     times: Vec<i64>,
@@ -190,9 +219,7 @@ impl<'a> Worker<'a> {
                     }
                     Ok(header) => header,
                     Err(loss) => {
-                        result
-                            .troubles
-                            .push(lost_chunk(self.recording, body, *indexed, loss));
+                        result.lose(self.recording, body, *indexed, loss);
                         return result;
                     }
                 };
@@ -200,11 +227,7 @@ impl<'a> Worker<'a> {
                 let mut unpacker = std::mem::replace(&mut self.unpacker, Unpacker::new());
                 match unpacker.whole(&header) {
                     Ok(records) => self.records(records, &mut result),
-                    Err(loss) => {
-                        result
-                            .troubles
-                            .push(lost_chunk(self.recording, body, *indexed, loss))
-                    }
+                    Err(loss) => result.lose(self.recording, body, *indexed, loss),
                 }
                 self.unpacker = unpacker;
             }
@@ -232,7 +255,8 @@ impl<'a> Worker<'a> {
             }
             Block::CutChunk(_) => (chunk::beginning(packed, options, &mut read), None),
         };
-        let (trouble, messages) = match too_long {
+        let mut result = BlockResult::default();
+        match too_long {
             Ok(0) => return,
             Ok(count) => {
                 let text = format!(
@@ -241,23 +265,20 @@ impl<'a> Worker<'a> {
                     options.limit("--max-message-bytes"),
                     options.max_message_bytes
                 );
-                let trouble = Trouble {
+                result.messages = count;
+                result.times = chunk_times(packed);
+                result.troubles.push(Trouble {
                     channel: None,
                     kind: Kind::TooLarge,
                     count,
                     time: None,
                     text,
                     lost: count,
-                };
-                (trouble, count)
+                });
             }
-            Err(loss) => (lost_chunk(recording, block.range(), indexed, loss), 0),
-        };
-        give(BlockResult {
-            troubles: vec![trouble],
-            messages,
-            ..BlockResult::default()
-        });
+            Err(loss) => result.lose(recording, block.range(), indexed, loss),
+        }
+        give(result);
     }
 
     /// Reads records that stand one after the other.
@@ -281,7 +302,7 @@ impl<'a> Worker<'a> {
         }
         for &index in &self.touched {
             if let Some(channel) = &mut self.channels[index] {
-                channel.decode(block);
+                channel.decode(block, self.recording, self.select);
             }
         }
         let mut bad = |count, text, lost| {
@@ -337,6 +358,7 @@ impl<'a> Worker<'a> {
         };
         let id = u16::from_le_bytes([header[0], header[1]]);
         let time = u64::from_le_bytes(std::array::from_fn(|i| header[6 + i]));
+        result.see(time);
         let Some(index) = self.recording.by_id[usize::from(id)] else {
             self.unknown.entry(id).or_insert((0, time)).0 += 1;
             return;
@@ -352,7 +374,6 @@ impl<'a> Worker<'a> {
             channel.out_of_range += 1;
             return;
         };
-        result.see(time);
         let bytes = end - data.len()..end;
         channel.waiting.push(Place { bytes, time });
     }
@@ -397,6 +418,7 @@ impl<'a> ChannelState<'a> {
             index,
             rows,
             state,
+            fresh: true,
             waiting: Vec::new(),
             times: Vec::new(),
             failed: None,
@@ -411,11 +433,32 @@ impl<'a> ChannelState<'a> {
         self.seen > 0
     }
 
-    /// Decodes the messages that wait, which lie in `block`.
-    fn decode(&mut self, block: &[u8]) {
+    /// Decodes the messages that wait, which lie in `block`. What comes of them depends on the block alone: where columns were left out because others
+    /// were known from blocks before, it is decoded with none known.
+    fn decode(&mut self, block: &[u8], recording: &Recording, select: Selection<'a>) {
+        if self.rows.full {
+            self.begin_anew(recording, select);
+        }
+        let fresh = std::mem::replace(&mut self.fresh, false);
+        self.read(block);
+        if self.rows.full && !fresh {
+            self.begin_anew(recording, select);
+            self.read(block);
+        }
+        self.waiting.clear();
+    }
+
+    fn begin_anew(&mut self, recording: &Recording, select: Selection<'a>) {
+        let new = ChannelState::new(recording, self.index, select);
+        (self.rows, self.state) = (new.rows, new.state);
+        self.times.clear();
+        self.failed = None;
+    }
+
+    fn read(&mut self, block: &[u8]) {
         let State::Ready(decoder) = &mut self.state else {
-            // Messages without a decoder do not wait, they are counted.
-            self.closed += self.waiting.drain(..).len() as u64;
+            // Messages without a decoder are counted.
+            self.closed += self.waiting.len() as u64;
             return;
         };
         let rows = &mut self.rows;
@@ -445,7 +488,6 @@ impl<'a> ChannelState<'a> {
             }
             places = &places[1..];
         }
-        self.waiting.clear();
     }
 
     fn harvest(&mut self, result: &mut BlockResult, spare: &mut Spare) {
@@ -479,12 +521,10 @@ impl<'a> ChannelState<'a> {
         }
         let rows = self.rows.finish();
         if rows > 0 {
-            let columns = self
-                .rows
-                .columns
-                .iter_mut()
-                .filter(|column| !column.values.is_empty())
+            let order = std::mem::take(&mut self.rows.order);
+            let columns = (order.into_iter())
                 .map(|column| {
+                    let column = &mut self.rows.columns[column as usize];
                     let next = empty(&mut spare.values, column.values.len());
                     let values = std::mem::replace(&mut column.values, next);
                     let rows = std::mem::take(&mut column.rows);
@@ -497,6 +537,12 @@ impl<'a> ChannelState<'a> {
                     }
                 })
                 .collect();
+            let counted = |counts: &[(String, u64)]| -> Vec<_> {
+                let some = counts.iter().filter(|(_, count)| *count > 0);
+                some.cloned().collect()
+            };
+            let mut long = std::mem::take(&mut self.rows.long);
+            long.extend(counted(&self.rows.long_types));
             result.batches.push(ChannelBatch {
                 channel: self.index,
                 times: std::mem::replace(&mut self.times, empty(&mut spare.times, rows)),
@@ -504,14 +550,8 @@ impl<'a> ChannelState<'a> {
                     .rows
                     .take_stamps(|length| empty(&mut spare.times, length)),
                 columns,
-                absent: self
-                    .rows
-                    .absent
-                    .iter()
-                    .filter(|(_, count)| *count > 0)
-                    .cloned()
-                    .collect(),
-                long: std::mem::take(&mut self.rows.long),
+                absent: counted(&self.rows.absent),
+                long,
                 trailing: self.rows.trailing,
                 remark: self.rows.remark.take(),
             });
@@ -571,30 +611,9 @@ impl<'a> Iterator for Records<'a> {
     }
 }
 
-fn lost_chunk(
-    recording: &Recording,
-    body: &Range<usize>,
-    indexed: Option<u64>,
-    (kind, what): Loss,
-) -> Trouble {
-    let time = super::container::chunk_header(&recording.data[body.clone()])
-        .and_then(|header| i64::try_from(header.start_time).ok());
-    let messages = match indexed {
-        Some(1) => "its only message was".to_owned(),
-        Some(count) => format!("its {count} messages were"),
-        None => "it was".to_owned(),
-    };
-    Trouble {
-        channel: None,
-        kind,
-        count: 1,
-        time,
-        text: format!(
-            "the chunk at byte {} {what}; {messages} left out",
-            body.start.saturating_sub(9)
-        ),
-        lost: indexed.unwrap_or(0),
-    }
+/// The log times of a chunk as its header says them.
+fn chunk_times(body: &[u8]) -> Option<(u64, u64)> {
+    chunk_header(body).map(|header| (header.start_time, header.end_time))
 }
 
 /// Looks through all blocks for definitions, counts and times, where there is no summary to say so.

@@ -12,7 +12,7 @@ use std::{
     path::Path,
 };
 
-use crate::finding::Kind;
+use crate::{finding::Kind, text::counted};
 
 pub(super) const MAGIC: &[u8; 8] = b"\x89MCAP0\r\n";
 
@@ -366,6 +366,8 @@ pub(super) fn begun_chunk_header(body: &[u8]) -> Option<(ChunkHeader<'_>, u64)> 
 pub(super) struct Attachment {
     pub name: String,
     pub media_type: String,
+    pub log_time: u64,
+    pub create_time: u64,
     pub data: Range<usize>,
     pub crc_ok: bool,
 }
@@ -391,12 +393,15 @@ pub(super) struct Container {
     pub library: String,
     pub blocks: Vec<Block>,
     pub attachments: Vec<Attachment>,
-    pub metadata: BTreeMap<String, BTreeMap<String, String>>,
+    /// In the order of the file; several may have one name.
+    pub metadata: Vec<(String, BTreeMap<String, String>)>,
     /// What the summary defines and counts, if there is a summary whose checksum holds.
     pub summary: Option<(Definitions, Option<Statistics>)>,
     pub damage: Vec<Damage>,
     /// The file's end was reached in good order.
     pub complete: bool,
+    /// Messages of further recordings behind the end, as their summaries count them.
+    pub behind: u64,
 }
 
 /// Loose records are cut into stretches of this size, so that they can be read like chunks.
@@ -417,6 +422,8 @@ struct Walk<'a> {
     data_crc: u32,
     unchecked: bool,
     footer: Option<(usize, u64, u32)>,
+    /// Where what follows the footer begins.
+    end: Option<usize>,
     unknown: BTreeMap<u8, u64>,
 }
 
@@ -447,19 +454,7 @@ pub fn ends_whole(path: &Path) -> std::io::Result<bool> {
 /// are not needed for now.
 pub(super) fn walk(bytes: &[u8], forget: &dyn Fn(&Range<usize>)) -> Option<Container> {
     let magic = bytes.starts_with(MAGIC);
-    let mut walk = Walk {
-        bytes,
-        forget,
-        forgotten: 0,
-        found: Container::default(),
-        summary: Definitions::default(),
-        statistics: None,
-        data_end: None,
-        data_crc: 0,
-        unchecked: false,
-        footer: None,
-        unknown: BTreeMap::new(),
-    };
+    let mut walk = Walk::new(bytes, forget);
     if !magic {
         // The header record must be sound then.
         if !begins(bytes) || walk.possible(MAGIC.len()).is_none() {
@@ -472,11 +467,46 @@ pub(super) fn walk(bytes: &[u8], forget: &dyn Fn(&Range<usize>)) -> Option<Conta
         );
     }
     walk.records();
+    if let Some(end) = walk.end {
+        walk.closing(end);
+    }
     walk.close();
     Some(walk.found)
 }
 
-impl Walk<'_> {
+/// How many messages recordings that stand one after the other count in their summaries.
+fn messages_behind(mut bytes: &[u8]) -> u64 {
+    let mut messages = 0u64;
+    while bytes.starts_with(MAGIC) {
+        let mut walk = Walk::new(bytes, &|_| ());
+        walk.records();
+        walk.close();
+        let statistics = walk.found.summary.and_then(|(_, statistics)| statistics);
+        messages = messages.saturating_add(statistics.map_or(0, |counted| counted.messages));
+        let rest = walk.end.and_then(|end| bytes[end..].strip_prefix(MAGIC));
+        bytes = rest.unwrap_or_default();
+    }
+    messages
+}
+
+impl<'a> Walk<'a> {
+    fn new(bytes: &'a [u8], forget: &'a dyn Fn(&Range<usize>)) -> Self {
+        Walk {
+            bytes,
+            forget,
+            forgotten: 0,
+            found: Container::default(),
+            summary: Definitions::default(),
+            statistics: None,
+            data_end: None,
+            data_crc: 0,
+            unchecked: false,
+            footer: None,
+            end: None,
+            unknown: BTreeMap::new(),
+        }
+    }
+
     fn damage(&mut self, kind: Kind, count: u64, text: String) {
         self.found.damage.push((kind, count, text));
     }
@@ -575,7 +605,7 @@ impl Walk<'_> {
                 self.forgotten = at;
             }
             if self.footer.is_some() {
-                self.closing(at);
+                self.end = Some(at);
                 return;
             }
             let next = match self.possible(at) {
@@ -624,7 +654,7 @@ impl Walk<'_> {
         if self.footer.is_none() {
             self.cut(at);
         } else {
-            self.closing(at);
+            self.end = Some(at);
         }
     }
 
@@ -695,6 +725,15 @@ impl Walk<'_> {
         self.found.complete = rest == MAGIC;
         if !self.found.complete {
             let text = match rest.strip_prefix(MAGIC) {
+                Some(more) if more.starts_with(MAGIC) => {
+                    self.found.behind = messages_behind(more);
+                    format!(
+                        "another recording follows the end of this one, of {} and {} bytes from byte {} on, and was left out: make it a file of its own",
+                        counted(self.found.behind, "message", "messages"),
+                        more.len(),
+                        at + MAGIC.len()
+                    )
+                }
                 Some(more) => format!(
                     "{} bytes follow the end of the recording and were left out",
                     more.len()
@@ -749,11 +788,7 @@ impl Walk<'_> {
             op::ATTACHMENT => self.attachment(body),
             op::METADATA => {
                 if let (Some(name), Some(map)) = (fields.text(), fields.map()) {
-                    self.found
-                        .metadata
-                        .entry(name.into_owned())
-                        .or_default()
-                        .extend(map);
+                    self.found.metadata.push((name.into_owned(), map));
                 } else {
                     self.damage(
                         Kind::BadRecord,
@@ -783,8 +818,7 @@ impl Walk<'_> {
         let bytes = &self.bytes[body.clone()];
         let mut fields = Fields::new(bytes);
         let parsed = (|| {
-            fields.u64()?;
-            fields.u64()?;
+            let (log_time, create_time) = (fields.u64()?, fields.u64()?);
             let (name, media_type) = (fields.text()?.into_owned(), fields.text()?.into_owned());
             let length = fields.u64()?;
             let start = body.start + (bytes.len() - fields.rest.len());
@@ -795,6 +829,8 @@ impl Walk<'_> {
             Some(Attachment {
                 name,
                 media_type,
+                log_time,
+                create_time,
                 data: start..start + data.len(),
                 crc_ok,
             })

@@ -1,10 +1,12 @@
 //! JSON messages (`json`), with a JSON Schema or none: every number and truth value is a signal.
 
+use std::collections::HashMap;
+
 use serde::de::{DeserializeSeed, IgnoredAny, MapAccess, SeqAccess, Visitor};
 
 use super::{
     decode::{Decoder, SchemaRef},
-    rows::{Rows, UNWANTED},
+    rows::{MAX_PLACES, Rows, UNWANTED},
 };
 
 struct Json {
@@ -18,6 +20,8 @@ struct Node {
     field: String,
     column: Option<u32>,
     children: Vec<(String, Node)>,
+    /// Places among the children.
+    by_key: HashMap<String, usize>,
     items: Vec<Node>,
 }
 
@@ -37,10 +41,17 @@ pub(super) fn open(schema: &SchemaRef<'_>, rows: &mut Rows) -> Result<Box<dyn De
 
 impl Decoder for Json {
     fn decode(&mut self, message: &[u8], rows: &mut Rows) -> Result<(), String> {
+        if rows.places > MAX_PLACES {
+            rows.places = 0;
+            self.root = Node::default();
+        }
         let stamp = self.read(message, rows).or_else(|problem| {
             // Python's and other writers put bare words that JSON does not have.
             match quote_words(message) {
-                Some(quoted) => self.read(&quoted, rows),
+                Some(quoted) => {
+                    rows.take_back_counts();
+                    self.read(&quoted, rows)
+                }
                 None => Err(problem),
             }
         });
@@ -218,37 +229,35 @@ impl<'de> Visitor<'de> for Place<'_, '_> {
             stamp,
         } = self;
         // Keys mostly come in the same order, so the next one is tried first.
-        let (mut hint, mut too_many) = (0, false);
+        let (mut hint, mut keys) = (0, 0);
         while let Some(key) = map.next_key::<std::borrow::Cow<'_, str>>()? {
-            let position = match node.children.get(hint) {
+            keys += 1;
+            if keys > MAX_KEYS {
+                map.next_value::<IgnoredAny>()?;
+                if keys == MAX_KEYS + 1 {
+                    rows.note_long(&format!("{}{ANY_KEY}", node.field));
+                }
+                continue;
+            }
+            let known = match node.children.get(hint) {
                 Some((known, _)) if *known == key => Some(hint),
-                _ => node.children.iter().position(|(known, _)| *known == key),
+                _ => node.by_key.get(&*key).copied(),
             };
-            let position = match position {
-                Some(position) => position,
-                None if node.children.len() >= MAX_KEYS => {
-                    map.next_value::<IgnoredAny>()?;
-                    if !std::mem::replace(&mut too_many, true) {
-                        rows.note_long(&format!("{}{ANY_KEY}", node.field));
-                    }
-                    continue;
-                }
-                None => {
-                    let field = if node.field.is_empty() {
-                        key.to_string()
-                    } else {
-                        format!("{}.{key}", node.field)
-                    };
-                    node.children.push((
-                        key.into_owned(),
-                        Node {
-                            field,
-                            ..Node::default()
-                        },
-                    ));
-                    node.children.len() - 1
-                }
-            };
+            let position = known.unwrap_or_else(|| {
+                let field = if node.field.is_empty() {
+                    key.to_string()
+                } else {
+                    format!("{}.{key}", node.field)
+                };
+                let child = Node {
+                    field,
+                    ..Node::default()
+                };
+                rows.places += 1;
+                node.by_key.insert(key.to_string(), node.children.len());
+                node.children.push((key.into_owned(), child));
+                node.children.len() - 1
+            });
             hint = position + 1;
             let child = &mut node.children[position].1;
             map.next_value_seed(Place {
@@ -281,6 +290,7 @@ impl<'de> Visitor<'de> for Place<'_, '_> {
                 }
             } else {
                 if node.items.len() <= item {
+                    rows.places += 1;
                     node.items.push(Node {
                         field: format!("{}[{item}]", node.field),
                         ..Node::default()
@@ -302,7 +312,7 @@ impl<'de> Visitor<'de> for Place<'_, '_> {
     }
 }
 
-/// A document that never stops inventing keys would otherwise grow without end.
+/// Keys of one object that become signals.
 pub(super) const MAX_KEYS: usize = 4096;
 /// Stands behind the name of a field that has more.
 pub(super) const ANY_KEY: &str = ".*";

@@ -52,6 +52,8 @@ enum Sink {
     StampNanoseconds,
     /// First element of a covariance: −1 says that the field is not given. The number under which the rows count it.
     Covariance(u32),
+    /// First element of an array that is too long to become signals. The number under which the rows count it.
+    Long(u32),
 }
 
 #[derive(Clone, Debug)]
@@ -199,6 +201,7 @@ impl Flat {
                         .filter(|start| self::load::<8, BIG>(block, start + offset) == absent);
                     rows.note_absent(field, marked.count() as u64);
                 }
+                Sink::Long(field) => rows.note_long_type(field, places.len() as u64),
                 Sink::Nowhere => {}
             }
         }
@@ -488,8 +491,11 @@ impl Compiler<'_, '_> {
                 if count > 0 {
                     self.number(*prim, count, field, Role::Plain);
                 }
-                if self.take && self.rows.column(&format!("{field}[0]")) != UNWANTED {
-                    self.rows.note_long_type(field);
+                if self.take
+                    && self.rows.column(&format!("{field}[0]")) != UNWANTED
+                    && let Some(array) = self.run.fields.last_mut()
+                {
+                    array.sinks[0] = Sink::Long(self.rows.long_type(field));
                 }
                 return Ok(());
             }
@@ -634,6 +640,7 @@ impl Load {
             Sink::StampSeconds => stamp((value as i64).wrapping_mul(1_000_000_000), rows),
             Sink::StampNanoseconds => stamp(value as i64, rows),
             Sink::Covariance(field) if value == -1.0 => rows.note_absent(field, 1),
+            Sink::Long(field) => rows.note_long_type(field, 1),
             Sink::Covariance(_) | Sink::Nowhere => {}
         }
     }

@@ -36,7 +36,7 @@ use std::{
 };
 
 use crate::foreign;
-use container::{Container, Damage, Definitions};
+use container::{Container, Damage, Definitions, Statistics};
 use early::Early;
 
 pub use container::ends_whole;
@@ -128,7 +128,7 @@ pub struct Info {
     pub library: String,
     /// The channels, by id.
     pub channels: Vec<ChannelInfo>,
-    /// Metadata records by name.
+    /// Metadata by name: of several records of one name all keys, with their last values.
     pub metadata: BTreeMap<String, BTreeMap<String, String>>,
     /// Names and media types of the attachments, with their sizes in bytes.
     pub attachments: Vec<AttachmentInfo>,
@@ -182,6 +182,21 @@ pub struct AttachmentInfo {
     pub bytes: u64,
 }
 
+/// An attachment as it is in the file.
+#[derive(Clone, Copy, Debug)]
+pub struct RawAttachment<'a> {
+    /// Name.
+    pub name: &'a str,
+    /// Media type.
+    pub media_type: &'a str,
+    /// When it was attached, ns.
+    pub log_time_ns: u64,
+    /// When it was made, ns; 0 where that is not known.
+    pub create_time_ns: u64,
+    /// The content.
+    pub data: &'a [u8],
+}
+
 /// The file's bytes.
 enum Data {
     Mapped(memmap2::Mmap),
@@ -232,8 +247,8 @@ pub struct Recording {
     definitions: Definitions,
     /// They come from a look through all blocks, not from the summary.
     searched: bool,
-    /// Messages that the summary promises.
-    promised: Option<u64>,
+    /// What the summary counts.
+    promised: Option<Statistics>,
     skipped: AtomicU64,
     /// How the last reading contradicted the summary.
     contradictions: Mutex<Vec<Finding>>,
@@ -324,9 +339,7 @@ impl Recording {
         options: &ReadOptions,
     ) -> Self {
         let summary = container.summary.take();
-        let promised = summary
-            .as_ref()
-            .and_then(|(_, statistics)| Some(statistics.as_ref()?.messages));
+        let promised = (summary.as_ref()).and_then(|(_, statistics)| statistics.clone());
         let searched = trusted.is_none();
         let (definitions, tally) = match (trusted, summary) {
             (Some(mut tally), Some((definitions, _))) => {
@@ -408,14 +421,28 @@ impl Recording {
         &self.info
     }
 
-    /// The content of an attachment.
+    /// All metadata records, in the order of the file.
+    pub fn metadata_records(&self) -> &[(String, BTreeMap<String, String>)] {
+        &self.container.metadata
+    }
+
+    /// All attachments, in the order of the file.
+    pub fn attachments(&self) -> impl Iterator<Item = RawAttachment<'_>> {
+        (self.container.attachments.iter()).filter_map(|attachment| {
+            Some(RawAttachment {
+                name: &attachment.name,
+                media_type: &attachment.media_type,
+                log_time_ns: attachment.log_time,
+                create_time_ns: attachment.create_time,
+                data: self.data.get(attachment.data.clone())?,
+            })
+        })
+    }
+
+    /// The content of the first attachment of a name.
     pub fn attachment(&self, name: &str) -> Option<Vec<u8>> {
-        let attachment = self
-            .container
-            .attachments
-            .iter()
-            .find(|attachment| attachment.name == name)?;
-        Some(self.data.get(attachment.data.clone())?.to_vec())
+        let found = self.attachments().find(|found| found.name == name)?;
+        Some(found.data.to_vec())
     }
 
     /// Messages that could not be used, as far as the last [`stream`](Self::stream) or [`signals`](Self::signals) found out.
@@ -536,6 +563,8 @@ fn trusted(container: &Container) -> Option<Tally> {
             channel.schema == 0 || definitions.schemas.contains_key(&channel.schema)
         });
     let any = statistics.messages > 0;
+    // Times that cannot be held do not bound those of messages that are read.
+    let fits = fits && (!any || i64::try_from(statistics.start.max(statistics.end)).is_ok());
     fits.then(|| Tally {
         per_channel: statistics.per_channel.clone(),
         start: any.then_some(statistics.start),
@@ -567,11 +596,16 @@ fn info(container: &Container, definitions: &Definitions, tally: &Tally, trusted
     let time = |time: Option<u64>| time.and_then(|time| i64::try_from(time).ok()).unwrap_or(0);
     let messages = tally.per_channel.values().sum();
     let early = tally.early.before(messages, tally.end);
+    let mut metadata: BTreeMap<String, BTreeMap<String, String>> = BTreeMap::new();
+    for (name, values) in &container.metadata {
+        let known = metadata.entry(name.clone()).or_default();
+        known.extend(values.clone());
+    }
     Info {
         profile: container.profile.clone(),
         library: container.library.clone(),
         channels,
-        metadata: container.metadata.clone(),
+        metadata,
         attachments: container
             .attachments
             .iter()

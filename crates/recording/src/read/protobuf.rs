@@ -3,28 +3,28 @@
 //! A plan per message type says what each field number holds. Values wait in the plan until the message is whole, because fields may
 //! come in any order and more than once (the last one counts), and fields that are not there have the value zero where proto3 says so.
 
-use std::collections::HashSet;
+use std::collections::{HashMap, HashSet};
 
 use prost::Message as _;
 use prost_reflect::{DescriptorPool, FieldDescriptor, Kind as FieldKind, MessageDescriptor};
 
 use super::{
     decode::{Decoder, SchemaRef},
-    rows::{Rows, UNWANTED},
+    rows::{MAX_PLACES, Rows, UNWANTED},
 };
 
 /// Messages nested deeper than this are refused.
 const MAX_DEPTH: usize = 64;
 
 struct Protobuf {
+    descriptor: MessageDescriptor,
     root: Node,
 }
 
 pub(super) fn open(schema: &SchemaRef<'_>, rows: &mut Rows) -> Result<Box<dyn Decoder>, String> {
     let descriptor = descriptor(schema)?;
-    Ok(Box::new(Protobuf {
-        root: Node::new(&descriptor, "", rows),
-    }))
+    let root = Node::new(&descriptor, "", rows);
+    Ok(Box::new(Protobuf { descriptor, root }))
 }
 
 /// The message's descriptor out of the set in the file.
@@ -250,12 +250,22 @@ enum Plan {
     Map {
         entry: MessageDescriptor,
         field: String,
-        entries: Vec<(String, Plan)>,
-        seen: usize,
-        long: bool,
+        entries: Entries,
     },
     /// Text and bytes.
     Opaque,
+}
+
+/// The entries of a map.
+#[derive(Default)]
+struct Entries {
+    plans: Vec<Plan>,
+    /// Places among the plans.
+    by_key: HashMap<String, usize>,
+    /// Those in the message, in its order.
+    present: Vec<usize>,
+    /// The message has further ones.
+    long: bool,
 }
 
 impl Plan {
@@ -274,9 +284,7 @@ impl Plan {
             return Plan::Map {
                 entry,
                 field,
-                entries: Vec::new(),
-                seen: 0,
-                long: false,
+                entries: Entries::default(),
             };
         }
         match (kind, descriptor.is_list()) {
@@ -499,14 +507,11 @@ impl Plan {
                 entry,
                 field,
                 entries,
-                seen,
-                long,
             } => {
                 if wire != 2 {
                     return Err(WRONG);
                 }
-                *seen += 1;
-                read_entry(entry, field, entries, long, input.bytes()?, depth, rows)?;
+                read_entry(entry, field, entries, input.bytes()?, depth, rows)?;
             }
             Plan::Opaque => input.skip(wire, tag, depth)?,
         }
@@ -571,20 +576,13 @@ impl Plan {
                 }
                 *count = 0;
             }
-            Plan::Map {
-                field,
-                entries,
-                seen,
-                long,
-                ..
-            } => {
-                if std::mem::take(long) && keep {
+            Plan::Map { field, entries, .. } => {
+                let fits = !std::mem::take(&mut entries.long);
+                if !fits && keep {
                     rows.note_long(field);
                 }
-                if std::mem::take(seen) > 0 {
-                    for (_, plan) in entries {
-                        plan.flush(rows, keep);
-                    }
+                for position in entries.present.drain(..) {
+                    entries.plans[position].flush(rows, keep && fits);
                 }
             }
         }
@@ -617,8 +615,7 @@ fn read_message(
 fn read_entry(
     entry: &MessageDescriptor,
     field: &str,
-    entries: &mut Vec<(String, Plan)>,
-    long: &mut bool,
+    entries: &mut Entries,
     bytes: &[u8],
     depth: usize,
     rows: &mut Rows,
@@ -657,23 +654,27 @@ fn read_entry(
             }
         }
     }
-    let position = match entries.iter().position(|(known, _)| *known == key) {
-        Some(position) => position,
-        None if entries.len() >= rows.max_items => {
-            *long = true;
-            return Ok(());
+    let known = entries.by_key.get(&key).copied();
+    let present = known.is_some_and(|known| entries.present.contains(&known));
+    if !present && entries.present.len() >= rows.max_items {
+        entries.long = true;
+        return Ok(());
+    }
+    let position = known.unwrap_or_else(|| {
+        let mut plan = Plan::new(&value_field, format!("{field}[{key}]"), rows);
+        // An entry that is not there has no value, unlike a field.
+        if let Plan::Number { implied, .. } = &mut plan {
+            *implied = false;
         }
-        None => {
-            let mut plan = Plan::new(&value_field, format!("{field}[{key}]"), rows);
-            // An entry that is not there has no value, unlike a field.
-            if let Plan::Number { implied, .. } = &mut plan {
-                *implied = false;
-            }
-            entries.push((key, plan));
-            entries.len() - 1
-        }
-    };
-    let plan = &mut entries[position].1;
+        rows.places += 1;
+        entries.by_key.insert(key, entries.plans.len());
+        entries.plans.push(plan);
+        entries.plans.len() - 1
+    });
+    if !present {
+        entries.present.push(position);
+    }
+    let plan = &mut entries.plans[position];
     if values.is_empty()
         && let Plan::Number { value, .. } = plan
     {
@@ -687,6 +688,10 @@ fn read_entry(
 
 impl Decoder for Protobuf {
     fn decode(&mut self, message: &[u8], rows: &mut Rows) -> Result<(), String> {
+        if rows.places > MAX_PLACES {
+            rows.places = 0;
+            self.root = Node::new(&self.descriptor, "", rows);
+        }
         let read = self.root.read(&mut Input { rest: message }, None, 0, rows);
         self.root.flush(rows, read.is_ok());
         read.map_err(|problem| format!("protobuf message of {} bytes: {problem}", message.len()))

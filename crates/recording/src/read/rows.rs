@@ -6,7 +6,15 @@ use std::{collections::HashMap, sync::Arc};
 pub(super) const UNWANTED: u32 = u32::MAX;
 
 /// More columns than this in one channel are refused: items of items of items would otherwise fill the memory.
-const MAX_COLUMNS: usize = 1 << 16;
+pub(super) const MAX_COLUMNS: usize = 1 << 16;
+
+/// A decoder that remembers more places than this forgets them: messages that never stop inventing keys would otherwise fill the memory.
+pub(super) const MAX_PLACES: usize = 1 << 16;
+
+/// What is said where there are more columns.
+pub(super) fn too_many_columns() -> String {
+    format!("it has more than {MAX_COLUMNS} numeric fields; the others are left out")
+}
 
 /// One numeric field while a batch is decoded.
 #[derive(Debug, Default)]
@@ -27,6 +35,12 @@ pub(super) struct Rows<'a> {
     /// All columns that somebody wants, in the order of first sight.
     pub columns: Vec<RowColumn>,
     index: HashMap<Arc<str>, u32>,
+    /// Columns with values, in the order of their first ones: that of `columns` is of all batches that this thread happened to decode.
+    pub order: Vec<u32>,
+    /// There were more columns than are taken.
+    pub full: bool,
+    /// Keys and items that the decoder remembers because messages had them.
+    pub places: usize,
     row: u32,
     /// Header stamp of the message that is being decoded.
     pub stamp_ns: Option<i64>,
@@ -36,9 +50,11 @@ pub(super) struct Rows<'a> {
     pub absent: Vec<(String, u64)>,
     /// Sequences that were too long to become signals: field and count.
     pub long: Vec<(String, u64)>,
+    /// The same for arrays that their type makes too long.
+    pub long_types: Vec<(String, u64)>,
     /// What the decoder has to say about the schema.
     pub remark: Option<String>,
-    /// What the message in hand added to `absent` and `long`, to be taken back with it.
+    /// What the message in hand added to these counts, to be taken back with it.
     noted: Vec<Noted>,
     /// Messages with bytes left over.
     pub trailing: u64,
@@ -46,11 +62,12 @@ pub(super) struct Rows<'a> {
     pub max_items: usize,
 }
 
-/// A count in `absent` or `long`, by its place there.
+/// A count in `absent`, `long` or `long_types`, by its place there.
 #[derive(Clone, Copy)]
 enum Noted {
     Absent(u32, u64),
     Long(usize),
+    LongType(u32, u64),
 }
 
 /// Which signals are wanted, by path.
@@ -63,11 +80,15 @@ impl<'a> Rows<'a> {
             select,
             columns: Vec::new(),
             index: HashMap::new(),
+            order: Vec::new(),
+            full: false,
+            places: 0,
             row: 0,
             stamp_ns: None,
             stamps: Vec::new(),
             absent: Vec::new(),
             long: Vec::new(),
+            long_types: Vec::new(),
             remark: None,
             noted: Vec::new(),
             trailing: 0,
@@ -92,9 +113,8 @@ impl<'a> Rows<'a> {
             return known;
         }
         if self.columns.len() >= MAX_COLUMNS {
-            self.remark = Some(format!(
-                "it has more than {MAX_COLUMNS} numeric fields; the others are left out"
-            ));
+            self.remark = Some(too_many_columns());
+            self.full = true;
             return UNWANTED;
         }
         // Every row so far is without this field.
@@ -116,13 +136,16 @@ impl<'a> Rows<'a> {
     pub fn push(&mut self, column: u32, value: f64) {
         let row = self.row;
         // OK because callers only pass what `column` gave them; UNWANTED is checked by them or falls through here.
-        let Some(column) = self.columns.get_mut(column as usize) else {
+        let Some(known) = self.columns.get_mut(column as usize) else {
             return;
         };
-        if !column.sparse && column.values.len() == row as usize {
-            column.values.push(value);
+        if !known.sparse && row > 0 && known.values.len() == row as usize {
+            known.values.push(value);
         } else {
-            column.push_slowly(row, value);
+            if known.values.is_empty() {
+                self.order.push(column);
+            }
+            known.push_slowly(row, value);
         }
     }
 
@@ -132,14 +155,17 @@ impl<'a> Rows<'a> {
     #[inline]
     pub fn extend(&mut self, column: u32, values: impl ExactSizeIterator<Item = f64>) {
         let row = self.row;
-        let Some(column) = self.columns.get_mut(column as usize) else {
+        let Some(known) = self.columns.get_mut(column as usize) else {
             return;
         };
-        if !column.sparse && column.values.len() == row as usize {
-            column.values.extend(values);
+        if known.values.is_empty() {
+            self.order.push(column);
+        }
+        if !known.sparse && known.values.len() == row as usize {
+            known.values.extend(values);
         } else {
             for (row, value) in (row..).zip(values) {
-                column.push_slowly(row, value);
+                known.push_slowly(row, value);
             }
         }
     }
@@ -167,19 +193,23 @@ impl<'a> Rows<'a> {
         self.noted.push(Noted::Long(place));
     }
 
-    /// Counts an array that its type makes too long, whatever becomes of the message in hand.
-    pub fn note_long_type(&mut self, field: &str) {
-        count(&mut self.long, field);
+    /// The number under which an array is counted that its type makes too long to become signals.
+    pub fn long_type(&mut self, field: &str) -> u32 {
+        numbered(&mut self.long_types, field)
+    }
+
+    /// Counts messages with such an array.
+    #[inline]
+    pub fn note_long_type(&mut self, field: u32, messages: u64) {
+        if let Some((_, count)) = self.long_types.get_mut(field as usize) {
+            *count += messages;
+            self.noted.push(Noted::LongType(field, messages));
+        }
     }
 
     /// The number under which a field is counted that messages may declare as not given.
     pub fn absent_field(&mut self, field: &str) -> u32 {
-        let known = self.absent.iter().position(|(known, _)| known == field);
-        // OK because there are at most as many as columns.
-        known.unwrap_or_else(|| {
-            self.absent.push((field.to_owned(), 0));
-            self.absent.len() - 1
-        }) as u32
+        numbered(&mut self.absent, field)
     }
 
     /// Counts messages that declare a field as not given.
@@ -216,10 +246,19 @@ impl<'a> Rows<'a> {
                 column.values.truncate(row as usize);
             }
         }
+        self.take_back_counts();
+        let columns = &self.columns;
+        self.order
+            .retain(|column| !columns[*column as usize].values.is_empty());
+    }
+
+    /// Takes back what was counted of the message in hand, which is read again.
+    pub fn take_back_counts(&mut self) {
         for noted in self.noted.drain(..) {
             match noted {
                 Noted::Absent(field, messages) => self.absent[field as usize].1 -= messages,
                 Noted::Long(place) => self.long[place].1 -= 1,
+                Noted::LongType(field, messages) => self.long_types[field as usize].1 -= messages,
             }
         }
         self.long.retain(|(_, count)| *count > 0);
@@ -239,9 +278,10 @@ impl<'a> Rows<'a> {
     /// Empties everything for the next batch but keeps the columns and their memory.
     pub fn clear(&mut self) {
         self.row = 0;
-        for (_, count) in &mut self.absent {
+        for (_, count) in self.absent.iter_mut().chain(&mut self.long_types) {
             *count = 0;
         }
+        self.order.clear();
         self.stamps.clear();
         self.long.clear();
         self.noted.clear();
@@ -264,6 +304,10 @@ impl RowColumn {
     #[cold]
     fn push_slowly(&mut self, row: u32, value: f64) {
         if !self.sparse {
+            if self.values.len() == row as usize {
+                self.values.push(value);
+                return;
+            }
             if self.values.len() == row as usize + 1 {
                 // Twice in one message: the last one counts, as in protobuf.
                 self.values[row as usize] = value;
@@ -280,6 +324,16 @@ impl RowColumn {
             self.values.push(value);
         }
     }
+}
+
+/// The number of a field among those that are counted.
+fn numbered(counts: &mut Vec<(String, u64)>, field: &str) -> u32 {
+    let known = counts.iter().position(|(known, _)| known == field);
+    // OK because there are at most as many as columns.
+    known.unwrap_or_else(|| {
+        counts.push((field.to_owned(), 0));
+        counts.len() - 1
+    }) as u32
 }
 
 /// Counts a field and returns its place.

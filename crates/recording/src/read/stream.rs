@@ -1,7 +1,7 @@
 //! The stream of batches: threads unpack and decode blocks, the caller's thread takes them in the order of the file.
 
 use std::{
-    collections::{BTreeMap, HashMap},
+    collections::{BTreeMap, HashMap, hash_map::Entry},
     sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError, atomic::Ordering},
 };
 
@@ -12,7 +12,7 @@ use super::{
     clock::{Clocks, Order, seconds},
     container::{Block, op},
     json::{ANY_KEY, MAX_KEYS},
-    rows::Selection,
+    rows::{MAX_COLUMNS, Selection, too_many_columns},
 };
 use crate::{Finding, Kind, text::counted};
 
@@ -38,7 +38,7 @@ pub struct Batch<'a> {
 pub struct Column<'a> {
     /// A number that stands for the path throughout the stream, counted from 0 in the order of first sight.
     pub id: usize,
-    /// `TOPIC.field.path`.
+    /// `TOPIC.field.path`; `TOPIC:field.path` where a field of a topic before is called so.
     pub path: &'a str,
     /// The messages that have a value, as indices into `times_ns`; `None` where all do.
     pub rows: Option<&'a [u32]>,
@@ -59,8 +59,8 @@ pub struct RawMessage<'a> {
     pub sequence: u32,
     /// Log time, ns.
     pub log_time_ns: i64,
-    /// Publish time, ns.
-    pub publish_time_ns: i64,
+    /// Publish time as it stands there, ns.
+    pub publish_time_ns: u64,
     /// The encoded message.
     pub data: &'a [u8],
 }
@@ -245,8 +245,10 @@ struct Watch {
     long: Vec<(String, u64)>,
     trailing: u64,
     odd: Vec<(Arc<str>, u64, i64)>,
-    /// Path and number of the columns in the order of the last batch, which mostly is that of the next.
-    columns: Vec<(Arc<str>, usize)>,
+    /// Path, name and number of the columns in the order of the last batch, which mostly is that of the next; no number where there are too many.
+    columns: Vec<(Arc<str>, Arc<str>, Option<usize>)>,
+    /// How many columns were numbered for it.
+    numbered: usize,
     messages: u64,
 }
 
@@ -254,16 +256,22 @@ struct Watch {
 struct Taker<'a> {
     recording: &'a Recording,
     watches: Vec<Watch>,
-    ids: HashMap<Arc<str>, usize>,
+    /// By name: the number of a column, and the first channel of its topic.
+    ids: HashMap<Arc<str>, (usize, usize)>,
+    /// The first channel of each channel's topic.
+    topics: Vec<usize>,
     findings: Vec<Finding>,
     /// Position in `findings` of troubles that repeat.
     known: HashMap<(Option<usize>, Kind, String), usize>,
     messages: u64,
     lost: u64,
+    /// Some were not counted by channel, as in a lost chunk.
+    unread: bool,
     start_ns: i64,
     /// Messages by index of the channel.
     per_channel: Vec<u64>,
-    times: Option<(i64, i64)>,
+    /// The first and the last log time, of lost chunks as their headers say, ns.
+    times: Option<(u64, u64)>,
     contradictions: u64,
 }
 
@@ -304,8 +312,14 @@ impl<'a> Taker<'a> {
                 text: text.clone(),
             });
         }
+        let mut first = HashMap::new();
+        let channels = info.channels.iter().enumerate();
+        let topics = channels
+            .map(|(index, channel)| *first.entry(&channel.topic).or_insert(index))
+            .collect();
         Taker {
             recording,
+            topics,
             per_channel: vec![0; watches.len()],
             times: None,
             contradictions: 0,
@@ -314,7 +328,8 @@ impl<'a> Taker<'a> {
             findings,
             known: HashMap::new(),
             messages: 0,
-            lost: 0,
+            lost: recording.container.behind,
+            unread: false,
             start_ns: recording.info.start_ns,
         }
     }
@@ -337,6 +352,8 @@ impl<'a> Taker<'a> {
                 kind => (trouble.channel, kind, trouble.text.clone()),
             };
             self.lost += trouble.lost;
+            self.unread |=
+                trouble.channel.is_none() && (trouble.lost > 0 || trouble.kind != Kind::BadRecord);
             if let Some(&position) = self.known.get(&key) {
                 self.findings[position].count += trouble.count;
                 continue;
@@ -390,52 +407,83 @@ impl<'a> Taker<'a> {
         add(&mut watch.absent, std::mem::take(&mut batch.absent));
         add(&mut watch.long, std::mem::take(&mut batch.long));
         watch.trailing += batch.trailing;
-        let info = &self.recording.info.channels[batch.channel];
-        if let Some(text) = batch.remark.take() {
+        let mut remark = batch.remark.take();
+        let (info, topic) = (
+            &self.recording.info.channels[batch.channel],
+            self.topics[batch.channel],
+        );
+        let mut shared: Option<(String, u64)> = None;
+        for (position, column) in batch.columns.iter().enumerate() {
+            if matches!(watch.columns.get(position), Some((path, ..)) if *path == column.path) {
+                continue;
+            }
+            let (mut name, mut mark) = (column.path.clone(), ":".to_owned());
+            let id = loop {
+                let next = self.ids.len();
+                match self.ids.entry(name.clone()) {
+                    Entry::Occupied(known) if known.get().1 == topic => break Some(known.get().0),
+                    Entry::Occupied(_) => {
+                        // Another topic begins as this one does, and goes on in its fields as this one in its name.
+                        let field = column.path.get(info.topic.len() + 1..).unwrap_or_default();
+                        name = format!("{}{mark}{field}", info.topic).into();
+                        mark.push(':');
+                    }
+                    // Each block by itself has no more, all of them together may.
+                    Entry::Vacant(_) if watch.numbered >= MAX_COLUMNS => break None,
+                    Entry::Vacant(new) => {
+                        watch.numbered += 1;
+                        new.insert((next, topic));
+                        if name != column.path {
+                            let text = format!(
+                                "{} is a field of another topic before, so that this topic's is called {name}",
+                                column.path
+                            );
+                            shared.get_or_insert((text, 0)).1 += 1;
+                        }
+                        break Some(next);
+                    }
+                }
+            };
+            watch.columns.truncate(position);
+            watch.columns.push((column.path.clone(), name, id));
+        }
+        let mut columns = Vec::with_capacity(batch.columns.len());
+        for (column, (_, name, id)) in batch.columns.iter().zip(&watch.columns) {
+            let id = *id;
+            let Some(id) = id else {
+                remark.get_or_insert_with(too_many_columns);
+                continue;
+            };
+            if let Some((count, row)) = column.odd {
+                match watch.odd.iter_mut().find(|(path, _, _)| path == name) {
+                    Some((_, known, _)) => *known += count,
+                    None => watch
+                        .odd
+                        .push((name.clone(), count, batch.times[row as usize])),
+                }
+            }
+            let rows = (column.values.len() != batch.times.len()).then_some(column.rows.as_slice());
+            columns.push(Column {
+                id,
+                path: name,
+                rows,
+                values: &column.values,
+                finite: column.odd.is_none(),
+            });
+        }
+        let remarks = remark.map(|text| (text, 1)).into_iter().chain(shared);
+        for (text, count) in remarks {
             let key = (Some(batch.channel), Kind::OddSchema, text.clone());
             if !self.known.contains_key(&key) {
                 self.known.insert(key, self.findings.len());
                 self.findings.push(Finding {
                     topic: info.topic.clone(),
                     kind: Kind::OddSchema,
-                    count: 1,
+                    count,
                     t_s: None,
                     text,
                 });
             }
-        }
-        let mut columns = Vec::with_capacity(batch.columns.len());
-        for (position, column) in batch.columns.iter().enumerate() {
-            if let Some((count, row)) = column.odd {
-                match watch
-                    .odd
-                    .iter_mut()
-                    .find(|(path, _, _)| *path == column.path)
-                {
-                    Some((_, known, _)) => *known += count,
-                    None => watch
-                        .odd
-                        .push((column.path.clone(), count, batch.times[row as usize])),
-                }
-            }
-            let id = match watch.columns.get(position) {
-                Some((path, id)) if *path == column.path => *id,
-                _ => {
-                    let next = self.ids.len();
-                    let id = *self.ids.entry(column.path.clone()).or_insert(next);
-                    watch.columns.truncate(position);
-                    watch.columns.push((column.path.clone(), id));
-                    id
-                }
-            };
-            let rows = (column.values.len() != batch.times.len()).then_some(column.rows.as_slice());
-            columns.push(Column {
-                id,
-                path: &column.path,
-                rows,
-                values: &column.values,
-                finite: column.odd.is_none(),
-            });
         }
         sink(&Batch {
             channel: batch.channel,
@@ -450,9 +498,6 @@ impl<'a> Taker<'a> {
     /// Holds the summary against what was found.
     fn judge_summary(&mut self) {
         let recording = self.recording;
-        if recording.searched {
-            return;
-        }
         let mut contradictions = Vec::new();
         let mut say = |topic: &str, kind, count, text| {
             contradictions.push(Finding {
@@ -463,17 +508,16 @@ impl<'a> Taker<'a> {
                 text,
             })
         };
-        if self.contradictions > 0 {
+        if self.contradictions > 0 && !recording.searched {
             let text = format!(
                 "the summary has other schemas or channels than the data, in {} places",
                 self.contradictions
             );
             say("", Kind::BadSummary, self.contradictions, text);
         }
-        // What a damaged chunk held cannot be held against the summary.
-        if self.lost == 0 && recording.damage().is_empty() {
-            let info = &recording.info;
-            for (channel, &found) in info.channels.iter().zip(&self.per_channel) {
+        // Of which channels a damaged chunk held how many, nobody knows.
+        if !self.unread && recording.damage().is_empty() && !recording.searched {
+            for (channel, &found) in recording.info.channels.iter().zip(&self.per_channel) {
                 if channel.messages != found {
                     let text = format!(
                         "the summary counts {} messages of channel {}, {found} were found",
@@ -482,27 +526,33 @@ impl<'a> Taker<'a> {
                     say(&channel.topic, Kind::BadSummary, 1, text);
                 }
             }
-            let told = (info.earliest_ns, info.end_ns);
-            if let Some(found) = self.times.filter(|found| *found != told) {
-                let text = format!(
-                    "the summary says that log times go from {:.3} s to {:.3} s after the first, they go from 0 s to {:.3} s",
-                    seconds(told.0, found.0),
-                    seconds(told.1, found.0),
-                    seconds(found.1, found.0),
-                );
-                say("", Kind::SummaryTimes, 1, text);
-            }
+        }
+        let told = recording.promised.as_ref().map(|s| (s.start, s.end));
+        if let (Some(told), Some(found)) = (told, self.times)
+            && told != found
+            && recording.damage().is_empty()
+        {
+            let after = |time: u64| (i128::from(time) - i128::from(found.0)) as f64 / 1e9;
+            let text = format!(
+                "the summary says that log times go from {:.3} s to {:.3} s after the first, they go from 0 s to {:.3} s",
+                after(told.0),
+                after(told.1),
+                after(found.1),
+            );
+            say("", Kind::SummaryTimes, 1, text);
         }
         self.findings.extend(contradictions.iter().cloned());
-        *recording.lock_contradictions() = contradictions;
+        if !recording.searched {
+            *recording.lock_contradictions() = contradictions;
+        }
     }
 
     fn findings(mut self) -> Vec<Finding> {
         let start_ns = self.start_ns;
         self.judge_summary();
-        if let Some(promised) = self.recording.promised
+        if let Some(promised) = self.recording.promised.as_ref().map(|s| s.messages)
             && promised != self.messages
-            && (self.recording.searched || self.lost > 0)
+            && (self.recording.searched || self.unread)
         {
             let lost = promised.saturating_sub(self.messages);
             // Chunks that were left out explain as many as their indexes name.
@@ -549,7 +599,7 @@ impl<'a> Taker<'a> {
                 let field = path
                     .strip_prefix(topic.as_str())
                     .unwrap_or(path)
-                    .trim_start_matches('.');
+                    .trim_start_matches(['.', ':']);
                 say(
                     Kind::Nan,
                     *count,
@@ -670,10 +720,8 @@ pub(super) fn raw(
             else {
                 continue;
             };
-            let time = |at: usize| {
-                i64::try_from(u64::from_le_bytes(std::array::from_fn(|i| header[at + i])))
-            };
-            let (Ok(log_time_ns), publish) = (time(6), time(14)) else {
+            let time = |at: usize| u64::from_le_bytes(std::array::from_fn(|i| header[at + i]));
+            let Ok(log_time_ns) = i64::try_from(time(6)) else {
                 continue;
             };
             sink(&RawMessage {
@@ -681,7 +729,7 @@ pub(super) fn raw(
                 topic: &recording.info.channels[channel].topic,
                 sequence: u32::from_le_bytes(std::array::from_fn(|i| header[2 + i])),
                 log_time_ns,
-                publish_time_ns: publish.unwrap_or(log_time_ns),
+                publish_time_ns: time(14),
                 data,
             });
         }

@@ -22,7 +22,7 @@ impl Container {
             .compression_threads(0)
             .chunk_size(Some(options.chunk_bytes))
             .disable_seeking(true)
-            .profile("")
+            .profile(&options.profile)
             .library(concat!("rath ", env!("CARGO_PKG_VERSION")))
             .create(NoSeek::new(sink))?;
         Ok(Self {

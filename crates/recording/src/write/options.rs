@@ -3,6 +3,8 @@
 /// How a recording is written.
 #[derive(Clone, Debug)]
 pub struct WriterOptions {
+    /// The profile that the header names: conventions that all of the recording keeps, such as `ros2`; empty where it keeps none.
+    pub profile: String,
     /// A chunk is closed when it holds this many bytes before compression.
     pub chunk_bytes: u64,
     /// A chunk is closed when it spans this much log time, ns, so that a program that is killed loses little.
@@ -27,6 +29,7 @@ impl WriterOptions {
 impl Default for WriterOptions {
     fn default() -> Self {
         WriterOptions {
+            profile: String::new(),
             chunk_bytes: 512 << 10,
             chunk_ns: 10_000_000_000,
             zstd_level: 1,
