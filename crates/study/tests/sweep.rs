@@ -171,6 +171,13 @@ fn summary_of(metric: &str, values: &[Option<f64>]) -> (Found, String) {
     (found, String::from_utf8(csv).unwrap())
 }
 
+/// One run shows no spread: its SD is blank, between its mean and its quantiles.
+#[test]
+fn one_run_has_no_spread() {
+    let (_, csv) = summary_of("rms_roll_deg", &[Some(2.5)]);
+    assert!(csv.contains(",2.5,,2.5,2.5,2.5,1\n"), "{csv}");
+}
+
 #[test]
 fn angles_are_taken_about_their_circular_mean() {
     // Mean and SD by hand, about 180: -2, 0.4, -1, 3.
