@@ -430,6 +430,13 @@ fn what_coupled_carriers_take_back_of_their_noise_is_put_back() {
 }
 
 #[test]
+fn who_has_no_noise_is_said_to() {
+    let found = found_in("music effects.noise=false", false);
+    let why = reason(&found, "phase noise");
+    assert!(why.starts_with("next to none"), "{why}");
+}
+
+#[test]
 fn a_beat_that_changes_its_tempo_has_none() {
     let found = found_in("tempo-change", false);
     assert!(

@@ -627,6 +627,11 @@ impl Increments {
         let half = (1.96 * sigma / (2.0 * count).sqrt()).max(0.5 * sparse) + even + mutual;
         out.push(match half < sigma {
             true => estimate("phase noise", "rad/√s", sigma, half),
+            // Most of it would have been left.
+            false if found.misses_nothing(step_s, pull) && found.kept_white > 0.5 * rows => Err((
+                "phase noise".into(),
+                format!("next to none (at most {:.0e} rad/√s): what is missed is as small as the error of the increments themselves", sigma + half),
+            )),
             false => Err((
                 "phase noise".into(),
                 format!("samples {step_s:.2} s apart are too few for a pull that takes noise back so soon"),
