@@ -103,6 +103,8 @@ pub(crate) struct Belief {
     /// What straps may give back though no account calls it stored, J.
     lent_j: f64,
     most_work_j: f64,
+    /// K + P at the start, J, where nobody keeps the account.
+    begun_j: Option<f64>,
 }
 
 /// What is wrong with a run.
@@ -133,7 +135,19 @@ impl Belief {
             start: None,
             lent_j: 0.0,
             most_work_j: 0.0,
+            begun_j: None,
         }
+    }
+
+    /// Whether laws might be found to give too much, were the account kept, from K and P alone. What is given goes into the motion,
+    ///
+    /// ```text
+    /// S₀ − S − ∫ dissipation = (K + P) − (K + P)₀ − ∫ work − unexplained,        −∫ work < supplied
+    /// ```
+    /// so that nobody has given too much while K + P has not risen by the unit; half of it, because of what the ledger would not explain.
+    pub(crate) fn might_doubt(&mut self, [kinetic_j, potential_j]: [f64; 2]) -> bool {
+        let held_j = kinetic_j + potential_j;
+        held_j - *self.begun_j.get_or_insert(held_j) > 0.5 * self.unit_j
     }
 
     /// What speaks against the run so far, if anything does.
@@ -243,6 +257,25 @@ mod tests {
                     })
                 );
             }
+        }
+    }
+
+    /// The least that is doubted: nothing supplied but by shoulders that took it back, and all that laws gave in the motion.
+    #[test]
+    fn what_is_doubted_has_risen() {
+        for (work_in_j, risen_j) in [(0.0, 1.001 * UNIT_J), (-500.0, 1.001 * UNIT_J)] {
+            let start = balance(0.0, 50.0, 0.0, 0.0);
+            let given_j = risen_j - work_in_j;
+            let now = Energy {
+                dissipated_j: -given_j,
+                ..balance(risen_j - 20.0, 70.0, work_in_j, 0.0)
+            };
+            assert!(doubted("dop853", 1e-6, &[start, now]).is_some());
+            let scene = load("music", &[]).unwrap();
+            let method = method("dop853").unwrap();
+            let mut belief = Belief::new(&scene, method, &crate::run::settings(&scene));
+            let mut might = |e: &Energy| belief.might_doubt([e.kinetic_j, e.potential_j]);
+            assert!(!might(&start) && might(&now));
         }
     }
 

@@ -35,6 +35,8 @@ pub struct Sample {
     pub energy: Option<Energy>,
     /// Of every account of it ([`Model::accounts`]), work since the start and energy dissipated, J.
     pub shares_j: Vec<[f64; 2]>,
+    /// Whether the account, had it been kept, might have ended the run here: the same run with it tells.
+    pub doubtful: bool,
 }
 
 impl Sample {
@@ -229,6 +231,7 @@ fn blank(model: &Model, forces: bool) -> Sample {
         handle_m: vec![[0.0; 3]; n],
         energy: None,
         shares_j: vec![[0.0; 2]; model.accounts().count()],
+        doubtful: false,
     }
 }
 
@@ -259,8 +262,9 @@ impl Observer for Bridge<'_> {
             }
         }
         s.energy = Energy::of(model, y, w, &mut s.shares_j, &mut self.at_start);
-        if let Some(energy) = &s.energy {
-            self.doubt = self.belief.doubt(energy, w);
+        match &s.energy {
+            Some(energy) => self.doubt = self.belief.doubt(energy, w),
+            None => s.doubtful = self.belief.might_doubt(model.freedoms().energy_j(y)),
         }
         if self.doubt.is_some() {
             return false;

@@ -90,8 +90,10 @@ fn a_twin_comes_back_and_a_wrong_stiffness_does_not() {
 fn a_stretch_begins_as_it_was_measured() {
     let folder = tempfile::tempdir().unwrap();
     let file = record(folder.path(), "baseline", &["--duration", "30"]);
-    let stretch = ["--scene", "baseline", "--from", "10", "--to", "20"];
+    let stretch = ["--from", "10", "--to", "20"];
     let (found, _) = replay(&file, &stretch);
+    // It is its own scene that is driven.
+    assert_eq!(found["scene"], "baseline");
     assert_eq!(found["misfit"]["height_m"]["samples"], 301);
     for signal in ["height_m", "pitch_deg", "force_n"] {
         assert!(share(&found, signal) < 0.01, "{signal}: {found}");
@@ -160,6 +162,8 @@ fn what_cannot_be_replayed_ends_in_one_sentence() {
     let still = record(folder.path(), "stand-still", &["--duration", "3"]);
     let eight = record(folder.path(), "eight-carriers", &["--duration", "3"]);
     let beatless = record(folder.path(), "baseline", &["--duration", "3"]);
+    let driven = record(folder.path(), "music", &["--duration", "3"]);
+    let (_, driven) = replay(&driven, &[]);
     phases(&at("gap.mcap"), 2, |_, t| {
         (!(7.0..9.0).contains(&t)).then_some(12.0 * t)
     });
@@ -174,7 +178,21 @@ fn what_cannot_be_replayed_ends_in_one_sentence() {
     let (gap, eight, beatless) = (at("gap.mcap"), eight.as_path(), beatless.as_path());
     for (file, more, says) in [
         (still.as_path(), &[][..], "there are no phases in it"),
-        (eight, &[], "holds 8 carriers, but the scene `music` has 2"),
+        (
+            eight,
+            &["--scene", "music"],
+            "holds 8 carriers, but the scene `music` has 2",
+        ),
+        (
+            eight,
+            &["--scene", "music", "--drive", "beat"],
+            "holds 8 carriers, but the scene `music` has 2",
+        ),
+        (
+            &driven,
+            &["--drive", "beat"],
+            "effects.measured moves the carriers",
+        ),
         (&at("one.mcap"), &[], "holds 1 carriers"),
         (&gap, &[], "has a gap from 6.9"),
         (&gap, &["--to", "30"], "change --from or --to"),
@@ -190,11 +208,7 @@ fn what_cannot_be_replayed_ends_in_one_sentence() {
             "there are no shoulders in it",
         ),
         (&gap, &["--drive", "beat"], "holds 0 beats"),
-        (
-            beatless,
-            &["--drive", "beat", "--scene", "baseline"],
-            "has no effects.music",
-        ),
+        (beatless, &["--drive", "beat"], "has no effects.music"),
         (&at("nan.mcap"), &[], "0 usable samples"),
         (&at("short.mcap"), &[], "usable samples"),
         (&at("empty.mcap"), &[], "is empty"),

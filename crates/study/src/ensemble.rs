@@ -59,6 +59,8 @@ impl Run {
 pub struct Columns {
     /// What `analyze` takes.
     pub inputs: Inputs,
+    /// Whether any of the samples is [`Sample::doubtful`].
+    pub doubtful: bool,
     /// Nobody asks for tilt and heading.
     only_roll: bool,
 }
@@ -83,6 +85,7 @@ impl Columns {
                 gravity_m_per_s2: (gx * gx + gy * gy + gz * gz).sqrt(),
                 ..Inputs::default()
             },
+            doubtful: false,
             only_roll: false,
         }
     }
@@ -98,6 +101,7 @@ impl Columns {
 
     /// Forgets all samples, but not what room they took.
     fn clear(&mut self) {
+        self.doubtful = false;
         let i = &mut self.inputs;
         let single = [
             &mut i.t_s,
@@ -113,6 +117,7 @@ impl Columns {
 
     /// Adds a sample.
     pub fn push(&mut self, s: &Sample) {
+        self.doubtful |= s.doubtful;
         let i = &mut self.inputs;
         i.t_s.push(s.t_s);
         i.height_m.push(s.pose.position_m[2]);
@@ -164,7 +169,7 @@ pub fn measure_abreast<T>(
     seeds: Range<u64>,
     metrics: &[&Metric],
     most_evaluations: u64,
-    measure: impl Fn(&Inputs, &Stats, &Result<(), Stopped>) -> T,
+    measure: impl Fn(&Columns, &Stats, &Result<(), Stopped>) -> T,
 ) -> Option<Vec<T>> {
     let model = |seed| {
         let model = Model::new(&Scene {
@@ -212,7 +217,7 @@ impl<T, M> Lane<'_, T, M> {
     }
 }
 
-impl<T, M: Fn(&Inputs, &Stats, &Result<(), Stopped>) -> T> Listener for Lane<'_, T, M> {
+impl<T, M: Fn(&Columns, &Stats, &Result<(), Stopped>) -> T> Listener for Lane<'_, T, M> {
     fn sample(&mut self, sample: &Sample) -> bool {
         self.columns().push(sample);
         true
@@ -221,7 +226,7 @@ impl<T, M: Fn(&Inputs, &Stats, &Result<(), Stopped>) -> T> Listener for Lane<'_,
     fn ended(&mut self, stats: &Stats, outcome: &Result<(), Stopped>) {
         self.columns();
         if let Some(mut columns) = self.columns.take() {
-            self.found = Some((self.measure)(&columns.inputs, stats, outcome));
+            self.found = Some((self.measure)(&columns, stats, outcome));
             columns.clear();
             self.spare.borrow_mut().push(columns);
         }

@@ -186,9 +186,9 @@ pub fn table(conditions: &[Condition]) -> String {
             let line = format!(
                 "  {:<33}{:>18}{:>18}{:>8}{:>18}{:>8}",
                 row.label,
-                here.map_or("–".into(), |s| match s.runs {
-                    1 => format!("{:.d$} ± –", s.mean),
-                    _ => format!("{:.d$} ± {:.d$}", s.mean, s.sd),
+                here.map_or("–".into(), |s| match s.sd {
+                    None => format!("{:.d$} ± –", s.mean),
+                    Some(sd) => format!("{:.d$} ± {sd:.d$}", s.mean),
                 }),
                 known(row.paper[c]),
                 diff(row.paper[c]),
@@ -249,7 +249,7 @@ pub fn to_json(conditions: &[Condition], wall_s: f64) -> Value {
             .iter()
             .map(|row| {
                 let of = match condition.summary(row.name) {
-                    Some(s) => json!({"mean": s.mean, "sd": s.ci95.map(|_| s.sd), "ci95": s.ci95, "runs": s.runs}),
+                    Some(s) => json!({"mean": s.mean, "sd": s.sd, "ci95": s.ci95, "runs": s.runs}),
                     // An onset that no run has is there, and null.
                     None => json!({"mean": null, "sd": null, "ci95": null, "runs": 0}),
                 };

@@ -10,9 +10,9 @@ pub struct Summary {
     pub runs: usize,
     /// Arithmetic mean.
     pub mean: f64,
-    /// Sample standard deviation (n − 1); 0 for one run.
-    pub sd: f64,
-    /// Half-width of the 95 % interval of the mean by Student's t, t·SD/√n; `None` for one run, which shows no spread.
+    /// Sample standard deviation (n − 1); `None` for one run, which shows no spread.
+    pub sd: Option<f64>,
+    /// Half-width of the 95 % interval of the mean by Student's t, t·SD/√n; `None` for one run.
     pub ci95: Option<f64>,
 }
 
@@ -24,15 +24,13 @@ pub fn summarise(values: impl Iterator<Item = f64>) -> Option<Summary> {
         return None;
     }
     let mean = values.iter().sum::<f64>() / n as f64;
-    let sd = match n {
-        1 => 0.0,
-        _ => (values.iter().map(|x| (x - mean) * (x - mean)).sum::<f64>() / (n - 1) as f64).sqrt(),
-    };
+    let squares = || values.iter().map(|x| (x - mean) * (x - mean)).sum::<f64>();
+    let sd = (n > 1).then(|| (squares() / (n - 1) as f64).sqrt());
     Some(Summary {
         runs: n,
         mean,
         sd,
-        ci95: (n > 1).then(|| student_975(n - 1) * sd / (n as f64).sqrt()),
+        ci95: sd.map(|sd| student_975(n - 1) * sd / (n as f64).sqrt()),
     })
 }
 
@@ -99,10 +97,10 @@ mod tests {
     fn textbook_numbers() {
         let s = summarise([2.0, 4.0, 4.0, 4.0, 5.0, 5.0, 7.0, 9.0].into_iter()).unwrap();
         assert_eq!((s.runs, s.mean), (8, 5.0));
-        assert!((s.sd - (32.0_f64 / 7.0).sqrt()).abs() < 1e-15);
+        assert!((s.sd.unwrap() - (32.0_f64 / 7.0).sqrt()).abs() < 1e-15);
         assert!(summarise(std::iter::empty()).is_none());
         let one = summarise([3.0].into_iter()).unwrap();
-        assert_eq!((one.sd, one.ci95), (0.0, None));
+        assert_eq!((one.sd, one.ci95), (None, None));
         // scipy.stats.t.interval(0.95, 2, 2, scale=1/sqrt(3)): 2 ± 2.484
         let three = summarise([1.0, 2.0, 3.0].into_iter()).unwrap();
         assert!((three.ci95.unwrap() - 2.4841).abs() < 1e-3);

@@ -422,6 +422,7 @@ fn line(f: &Found, k: usize, row: &Row, bound: Bound) -> String {
         .max_by(|a, b| a.abs().total_cmp(&b.abs()))
         .filter(|_| !word);
     let show = |x: Option<String>| x.unwrap_or_else(|| "–".into());
+    let spread = |sd: Option<f64>| show(sd.map(|sd| format!("{sd:.d$}")));
     let limit = match bound {
         Bound::Free => "–".into(),
         Bound::Same => "the same".into(),
@@ -434,7 +435,7 @@ fn line(f: &Found, k: usize, row: &Row, bound: Bound) -> String {
         f.condition.name,
         row.label,
         show(truth.map(|s| format!("{:.d$}", s.mean))),
-        show(error.map(|s| format!("{:+.d$} ± {:.d$}", s.mean, s.sd))),
+        show(error.map(|s| format!("{:+.d$} ± {}", s.mean, spread(s.sd)))),
         show(largest.map(|x| format!("{x:+.d$}"))),
         of(sums.kept),
         of(sums.covered),

@@ -404,6 +404,38 @@ fn a_weak_coupling_is_seen_and_takes_no_frequency_along() {
     assert!(held >= 14, "{held} of 16");
 }
 
+/// Eight carriers who pull each other hard, everybody or neighbours, take back much of their noise of 0.01 rad/√s within an increment of a thirtieth of a second: it is
+/// put back.
+#[test]
+fn what_coupled_carriers_take_back_of_their_noise_is_put_back() {
+    for (graph, strength) in [("all", 4), ("all", 8), ("chain", 4)] {
+        let (mut sum, mut held) = (0.0, 0);
+        for seed in 201..205 {
+            let scene = format!(
+                "eight-carriers effects.coupling.graph={graph} effects.coupling.strength_rad_per_s={strength} seed={seed}"
+            );
+            let found = found_in(&scene, false);
+            let e = find(&found, "phase noise");
+            println!("{graph} {strength} {e:?}");
+            let [low, high] = e.interval;
+            held += usize::from(low <= 0.01 && 0.01 <= high && high - low < 1e-3);
+            sum += e.value;
+        }
+        assert!(
+            (sum / 4.0 / 0.01 - 1.0).abs() < 0.015,
+            "{graph} {strength}: {sum}"
+        );
+        assert!(held >= 3, "{graph} {strength}: {held}");
+    }
+}
+
+#[test]
+fn who_has_no_noise_is_said_to() {
+    let found = found_in("music effects.noise=false", false);
+    let why = reason(&found, "phase noise");
+    assert!(why.starts_with("next to none"), "{why}");
+}
+
 #[test]
 fn a_beat_that_changes_its_tempo_has_none() {
     let found = found_in("tempo-change", false);

@@ -129,6 +129,33 @@ fn what_no_strap_could_do_is_no_result() {
     }
 }
 
+/// `sim record` refuses these too: steps that are too long, by the account that a study therefore keeps, and straps that swing far sideways and hardly roll.
+#[test]
+fn a_run_is_as_good_as_its_recording() {
+    for (settings, why) in [
+        (
+            "solver.method = \"rk4\"\nsolver.step_s = 0.02",
+            "came from nowhere",
+        ),
+        (
+            "effects.sling.length_m = 0.3\neffects.sling.damping_s = 0.02",
+            "effects.sling gave",
+        ),
+    ] {
+        for more in ["", "recordings = true\n"] {
+            let text = format!(
+                "seeds = 1\nfirst_seed = 1002\nmetrics = [\"rms_roll_deg\"]\n{more}[set]\nduration_s = 20.0\n{settings}"
+            );
+            let rows = plan(&text).unwrap().run(0..1, None).unwrap();
+            let failed = &rows[0][rows[0].len() - 2];
+            assert!(
+                matches!(failed, Cell::Text(t) if t.contains(why)),
+                "{more}{settings}: {rows:?}"
+            );
+        }
+    }
+}
+
 /// What a summary makes of one point's values of a metric, of five runs.
 fn summary_of(metric: &str, values: &[Option<f64>]) -> (Found, String) {
     let text = format!("seeds = {}\nmetrics = [\"{metric}\"]", values.len());
@@ -142,6 +169,13 @@ fn summary_of(metric: &str, values: &[Option<f64>]) -> (Found, String) {
     }
     let found = summary.finish().unwrap();
     (found, String::from_utf8(csv).unwrap())
+}
+
+/// One run shows no spread: its SD is blank, between its mean and its quantiles.
+#[test]
+fn one_run_has_no_spread() {
+    let (_, csv) = summary_of("rms_roll_deg", &[Some(2.5)]);
+    assert!(csv.contains(",2.5,,2.5,2.5,2.5,1\n"), "{csv}");
 }
 
 #[test]

@@ -9,7 +9,7 @@ use sim::model::Model;
 use sim::record::Recorder;
 use sim::replay::{Course, Drive, Misfit, Options, Replay, Take, misfit};
 use sim::run::{Listener, Sample, method_of, run_model, settings};
-use sim::scene::load;
+use sim::scene::{load, parse};
 use sim::sensors::Reading;
 use sim::solve::Stopped;
 use std::collections::{BTreeMap, VecDeque};
@@ -21,9 +21,10 @@ use std::path::{Path, PathBuf};
 pub struct Args {
     /// The recording (.mcap).
     file: PathBuf,
-    /// The scene that is driven: a built-in one (see `sim scenes`) or the path of a TOML file, with as many carriers as the recording.
-    #[arg(long, value_name = "SCENE", default_value = "music")]
-    scene: String,
+    /// The scene that is driven: a built-in one (see `sim scenes`) or the path of a TOML file, with as many carriers as the recording. Default:
+    /// the scene attached to the recording; without one `music`.
+    #[arg(long, value_name = "SCENE")]
+    scene: Option<String>,
     /// What takes the oscillators' place.
     #[arg(long, value_enum, default_value_t = What::Phases)]
     drive: What,
@@ -68,7 +69,7 @@ sensors, gets its phases and the body's measured motion from `analyze`, which wr
 
 OUT holds the model's motion on the usual topics and the measured one on /measured/rath/state, /measured/carriers/phases, \
 /measured/handles/forces and /measured/beat, all with the recording's stamps. Times that the scene itself names (onsets, \
-turns) count from where the replay begins. SCENE's frequency_spread, coupling, noise and feedback are off \
+turns) count from where the replay begins. The scene's frequency_spread, coupling, noise and feedback are off \
 where phases or shoulders drive; the attached scene.toml is complete, and `sim record` runs it again.
 
 Share is the SD of the difference over that of the measured motion: 0 is the same motion, 1 a model that does not move.
@@ -78,6 +79,9 @@ Examples:
   sim replay m.mcap --set effects.contact.stiffness_n_per_m=4000
   sim replay found.mcap --scene rath.toml --from 20 --to 80 --format json
   sim replay m.mcap --drive beat --out beat.mcap";
+
+/// The scene that is driven where nothing says which.
+const USUAL: &str = "music";
 
 /// Left out at the beginning where the body's start was not measured, s.
 const SETTLE_S: f64 = 3.0;
@@ -94,9 +98,23 @@ pub fn run(args: &Args) -> Result<Input> {
     if args.file == Path::new("-") {
         bail!("-: a replay does not read standard input; expected the path of a recording");
     }
-    let scene = load(&args.scene, &args.set)?;
+    // What is given is read first, so that a slip in it does not wait for the recording.
+    if let Some(scene) = &args.scene {
+        load(scene, &args.set)?;
+    }
     let recording = Recording::open(&args.file, &ReadOptions::default())?;
     let name = args.file.display().to_string();
+    let attached = match args.scene {
+        Some(_) => None,
+        None => recording.attachment("scene.toml"),
+    };
+    let with = |set: &[String]| match (&args.scene, &attached) {
+        (Some(scene), _) => load(scene, set).map_err(anyhow::Error::new),
+        (None, Some(text)) => parse("scene.toml", &String::from_utf8_lossy(text), set)
+            .with_context(|| format!("{name}: the scene attached to it; give one with --scene")),
+        (None, None) => load(USUAL, set).map_err(anyhow::Error::new),
+    };
+    let scene = with(&args.set)?;
     let take = Take::read(&recording)?;
     let drive = match args.drive {
         What::Phases => Drive::Phases,
@@ -115,7 +133,7 @@ pub fn run(args: &Args) -> Result<Input> {
         let mut others = args.set.clone();
         others.remove(k);
         // A setting may ask for others, and then it does something.
-        let Ok(without) = load(&args.scene, &others) else {
+        let Ok(without) = with(&others) else {
             continue;
         };
         let same = |other: Replay| other.scene == replay.scene;
@@ -142,7 +160,9 @@ pub fn run(args: &Args) -> Result<Input> {
         PathBuf::from(format!("{stem}-replay.mcap"))
     });
     super::is_file(&out)?;
-    super::may_write(&out, "mcap", &[&args.file, Path::new(&args.scene)])?;
+    let scene = args.scene.as_ref().map(Path::new);
+    let inputs: Vec<&Path> = [Some(&*args.file), scene].into_iter().flatten().collect();
+    super::may_write(&out, "mcap", &inputs)?;
     let model = Model::new(&replay.scene);
     let writer = RecordingWriter::create(&out, &WriterOptions::beside())?;
     let mut recorder = Recorder::at(&model, writer, replay.epoch_ns)?;
@@ -202,9 +222,14 @@ pub fn run(args: &Args) -> Result<Input> {
         replay.samples,
         replay.topic
     );
+    if args.scene.is_none() && attached.is_none() {
+        recording::note!(
+            "sim: {name}: no scene is attached to it, so the scene `{USUAL}` was driven; --scene gives another"
+        );
+    }
     print(&match args.format {
         Format::Json => json(&name, &out.display().to_string(), &replay, window_s, &found)?,
-        Format::Table => table(&take, window_s, &found),
+        Format::Table => table(&take, &replay.scene.name, window_s, &found),
     })?;
     for loss in &take.losses {
         recording::note!("sim: {name}: {loss}");
@@ -408,7 +433,7 @@ fn json(
     Ok(format!("{whole:#}\n"))
 }
 
-fn table(take: &Take, window_s: [f64; 2], found: &[Misfit]) -> String {
+fn table(take: &Take, scene: &str, window_s: [f64; 2], found: &[Misfit]) -> String {
     use std::fmt::Write;
     if found.is_empty() {
         let why = match take.state_topic() {
@@ -418,7 +443,7 @@ fn table(take: &Take, window_s: [f64; 2], found: &[Misfit]) -> String {
         return format!("nothing to compare: {why}\n");
     }
     let mut text = format!(
-        "model against measurement, {:.2} to {:.2} s of the replay\n{:<10}{:>9}{:>13}{:>13}{:>13}{:>13}{:>9}{:>13}\n",
+        "the scene `{scene}` against measurement, {:.2} to {:.2} s of the replay\n{:<10}{:>9}{:>13}{:>13}{:>13}{:>13}{:>9}{:>13}\n",
         window_s[0],
         window_s[1],
         "",

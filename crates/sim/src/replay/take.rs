@@ -220,20 +220,22 @@ impl Take {
             ))?),
             Drive::Beat => None,
         };
-        let per_carrier = if options.drive == Drive::Shoulders {
-            3
-        } else {
-            1
-        };
+        // The body that is compared has its own carriers, whatever drives.
+        if let Some(c) = driven.or(self.phases.as_ref()) {
+            let per_carrier = match options.drive {
+                Drive::Shoulders => 3,
+                Drive::Phases | Drive::Beat => 1,
+            };
+            let found = c.x.len() / per_carrier;
+            if found != n {
+                return Err(format!(
+                    "{} holds {found} carriers, but the scene `{}` has {n}; give a scene with {found} handles",
+                    c.topic, scene.name
+                ));
+            }
+        }
         let (first, last) = match driven {
             Some(c) => {
-                let found = c.x.len() / per_carrier;
-                if found != n {
-                    return Err(format!(
-                        "{} holds {found} carriers, but the scene `{}` has {n}; give a scene with {found} handles",
-                        c.topic, scene.name
-                    ));
-                }
                 if c.t_s.len() < Spline::LEAST {
                     return Err(format!(
                         "{} holds {} usable samples, expected {} or more",
@@ -304,6 +306,12 @@ impl Take {
             .or_else(|| driven.is_some().then(Default::default));
         let followed = music.and_then(|m| follow(&m, &beats, heard, scene.duration_s));
         match (&driven, &e.music, followed) {
+            (None, ..) if e.measured.is_some() => {
+                return Err(format!(
+                    "in the scene `{}` effects.measured moves the carriers, so no beat can drive them; give another scene, or replay the phases",
+                    scene.name
+                ));
+            }
             (None, None, _) => {
                 return Err(format!(
                     "the scene `{}` has no effects.music, so no beat can drive it; replay the phases, or add that table",

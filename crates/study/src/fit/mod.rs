@@ -15,8 +15,9 @@
 //! every other sample is left out, and all of what they change by when a coupling K_c is allowed for that does not show by itself (six standard
 //! errors). Where neighbouring increments share noise, because it was drawn on a coarser clock than the recorder's, samples are left
 //! out until less than a fifth is shared, up to steps of 0.1 s, and what is shared is counted: σ² Δt = Σ e_k² + 2 Σ e_k e_{k+1}. What the pull
-//! takes back of the noise within an increment, at the rate λ = K m cos(Ωt + ψ₀ − φ), is put back: white noise is left with a share (1 − e^(−2λΔt))/(2λΔt)
-//! of its variance, noise that is even over Δt with the square of (1 − e^(−λΔt))/(λΔt), and the interval holds both. Where what is missed is not as strong
+//! and the others take back of the noise within an increment, at the rate λ = K m cos(Ωt + ψ₀ − φ) + (K_c/N) Σ_{j≠i} cos(φ_j − φ_i), is put back: white noise is left with a
+//! share (1 − e^(−2λΔt))/(2λΔt) of its variance, noise that is even over Δt with the square of (1 − e^(−λΔt))/(λΔt), and the interval holds both, and what a coupling that does
+//! not show would take back. Where what is missed is not as strong
 //! over a second as white noise would be (stronger by half and five standard errors, or weaker by three), or a tenth of it and more comes back with a carrier's own steps, carriers do what the model does not know, and
 //! nothing is told. On a graph, the scene's, the coupling is K_c/(d_i + 1) times the sum over the d_i neighbours.
 //! Nothing reaches across a hole of the record: no increment, no spline, no straight line through a beat.

@@ -10,19 +10,18 @@ pub mod spec;
 pub mod summary;
 pub mod table;
 
-use crate::ensemble::{measure_abreast, observe};
+use crate::ensemble::{Columns, measure_abreast, observe};
 use analyze::inputs::{Inputs, Window};
 use analyze::metrics::{Metric, find, metrics_of};
 use design::Points;
 use recording::write::{RecordingWriter, WriteError, WriterOptions};
 use sim::model::Model;
 use sim::record::{Recorder, VERSION};
-use sim::run::{Listener, Sample};
+use sim::run::{Listener, Sample, method_of};
 use sim::scene::{Scene, Template};
 use sim::sensors::Reading;
 use sim::solve::{METHODS, Stats, Stopped, abreast};
 use spec::{DesignKind, Spec, flatten, number};
-use std::f64::consts::FRAC_PI_2;
 use std::ops::Range;
 use std::panic::AssertUnwindSafe;
 use std::path::Path;
@@ -40,6 +39,9 @@ pub const FIXED_COLUMNS: &[&str] = &[
     "failed",
     "version",
 ];
+
+/// The key that says whether a run keeps its energy account.
+const ACCOUNT: &str = "solver.energy";
 
 /// Work after which a run is given up: a thousand times what a minute of the paper's scenes takes.
 const MOST_EVALUATIONS: u64 = 100_000_000;
@@ -63,6 +65,8 @@ pub struct Plan {
     /// Axes whose key holds a whole number.
     whole: Vec<bool>,
     columns: Vec<Column>,
+    /// Whether somebody asks for the energy account, or may read it.
+    keeps_account: bool,
     metrics: Vec<&'static Metric>,
 }
 
@@ -89,14 +93,15 @@ impl Plan {
     /// # Errors
     /// One sentence.
     pub fn new(spec: Spec, folder: &Path) -> Result<Self, String> {
-        let mut set: Vec<String> = flatten(&spec.set)
+        let set = flatten(&spec.set);
+        let mut asked = set.iter().map(|(key, _)| key);
+        let mut axes = spec.axes.iter().map(|axis| &axis.key);
+        let keeps_account =
+            spec.recordings || asked.any(|k| k == ACCOUNT) || axes.any(|k| k == ACCOUNT);
+        let set: Vec<String> = set
             .iter()
             .map(|(key, value)| format!("{key}={value}"))
             .collect();
-        // Nobody reads an energy account here; without it the motion is the same within the tolerance and costs less.
-        if !spec.recordings && !set.iter().any(|s| s.starts_with("solver.energy=")) {
-            set.push("solver.energy=false".into());
-        }
         let scene = match sim::scene::builtin(&spec.scene) {
             Some(_) => spec.scene.clone(),
             None if folder.join(&spec.scene).exists() => {
@@ -127,6 +132,7 @@ impl Plan {
                 .collect(),
             whole: spec.axes.iter().map(whole).collect(),
             columns: columns(&spec, &metrics),
+            keeps_account,
             metrics,
             template,
             spec,
@@ -350,19 +356,22 @@ impl Plan {
         runs: Range<u64>,
         recordings: Option<&Path>,
     ) -> Result<Vec<Measured>, String> {
-        let scene = match self.scene(runs.start) {
+        let mut scene = match self.scene(runs.start) {
             Ok(scene) => scene,
             Err(reason) => return Ok(runs.map(|_| Measured::failed(reason.clone())).collect()),
         };
+        // A method that locates contacts keeps its tolerance without the account, and costs less. Others are judged by it alone.
+        let unwatched = !self.keeps_account && scene.solver.energy && method_of(&scene).locates;
+        scene.solver.energy &= !unwatched;
         // By plan and scene alone, not by how many happen to be together: a row is to be the same however the runs are shared out.
         let samples = scene.duration_s * scene.log_rate_hz;
         let auto = scene.solver.method == METHODS[0].name;
         if self.goes_abreast() && recordings.is_none() && auto && samples <= LONGEST_ABREAST {
             let seeds = scene.seed..scene.seed + (runs.end - runs.start);
-            let weigh = |inputs: &Inputs, stats: &Stats, outcome: &Result<(), Stopped>| {
+            let weigh = |columns: &Columns, stats: &Stats, outcome: &Result<(), Stopped>| {
                 let outcome = outcome.clone().map_err(|e| e.to_string());
-                let doubted = swings_too_wide(&scene, inputs);
-                (self.weigh(&scene, inputs, *stats, outcome), doubted)
+                let measured = self.weigh(&scene, &columns.inputs, *stats, outcome);
+                (measured, unwatched && columns.doubtful)
             };
             let metrics = &self.metrics;
             let found = measure_abreast(&scene, seeds, metrics, MOST_EVALUATIONS, weigh);
@@ -380,7 +389,7 @@ impl Plan {
                 seed,
                 ..scene.clone()
             };
-            self.measure_alone(run, &scene, recordings)
+            self.measure_alone(run, &scene, unwatched, recordings)
         };
         runs.map(alone).collect()
     }
@@ -389,28 +398,29 @@ impl Plan {
         &self,
         run: u64,
         scene: &Scene,
+        unwatched: bool,
         recordings: Option<&Path>,
     ) -> Result<Measured, String> {
         let model;
-        let mut keeper = Keeper(None);
+        let mut keeper = Keeper::default();
         if let Some(folder) = recordings {
             model = Model::new(scene);
             let path = folder.join(parts::recording_name(run));
             let recorder = RecordingWriter::create(&path, &WriterOptions::default())
                 .and_then(|writer| Recorder::new(&model, writer));
             match recorder {
-                Ok(recorder) => keeper.0 = Some(recorder),
+                Ok(recorder) => keeper.recorder = Some(recorder),
                 Err(error) => return of_its_run(&error).map(Measured::failed),
             }
         }
         let (inputs, stats, outcome) = observe(scene, Some(MOST_EVALUATIONS), &mut keeper);
         // The writer knows best why it stopped a run.
-        let ended = match keeper.0.map_or(Ok(()), Recorder::finish) {
+        let ended = match keeper.recorder.map_or(Ok(()), Recorder::finish) {
             Ok(()) => outcome.map_err(|e| e.to_string()),
             Err(error) => Err(of_its_run(&error)?),
         };
         let measured = self.weigh(scene, &inputs, stats, ended);
-        Ok(match swings_too_wide(scene, &inputs) {
+        Ok(match unwatched && keeper.doubtful {
             true => with_its_account(scene, scene.seed, measured),
             false => measured,
         })
@@ -455,12 +465,6 @@ impl Plan {
             failed: nothing.then(why),
         }
     }
-}
-
-/// Whether straps may have been used beyond what their law holds for, and nobody kept the account that would say so.
-fn swings_too_wide(scene: &Scene, inputs: &Inputs) -> bool {
-    let unwatched = scene.effects.sling.is_some() && !scene.solver.energy;
-    unwatched && inputs.roll_rad.iter().any(|roll| roll.abs() > FRAC_PI_2)
 }
 
 /// What was measured, unless the energy account of the same run ends it.
@@ -533,15 +537,21 @@ fn of_its_run(error: &WriteError) -> Result<String, String> {
     }
 }
 
-struct Keeper<'m>(Option<Recorder<'m>>);
+/// Records what it sees where that is asked for, and remembers a doubt.
+#[derive(Default)]
+struct Keeper<'m> {
+    recorder: Option<Recorder<'m>>,
+    doubtful: bool,
+}
 
 impl Listener for Keeper<'_> {
     fn sample(&mut self, sample: &Sample) -> bool {
-        self.0.as_mut().is_none_or(|r| r.sample(sample))
+        self.doubtful |= sample.doubtful;
+        self.recorder.as_mut().is_none_or(|r| r.sample(sample))
     }
 
     fn reading(&mut self, reading: &Reading<'_>) {
-        if let Some(recorder) = &mut self.0 {
+        if let Some(recorder) = &mut self.recorder {
             recorder.reading(reading);
         }
     }

@@ -13,8 +13,8 @@ pub struct Spread {
     pub runs: usize,
     /// Arithmetic mean.
     pub mean: f64,
-    /// Sample standard deviation; 0 for one run.
-    pub sd: f64,
+    /// Sample standard deviation; `None` for one run.
+    pub sd: Option<f64>,
     /// Quantiles 5 %, 50 % and 95 %, straight between order statistics (NumPy's default).
     pub quantiles: [f64; 3],
 }
@@ -228,7 +228,8 @@ impl<W: Write> Summary<W> {
             match &spread {
                 Some(s) => {
                     let [low, middle, high] = s.quantiles;
-                    write!(out, ",{},{},{low},{middle},{high},{}", s.mean, s.sd, s.runs)?;
+                    let sd = s.sd.map_or_else(String::new, |sd| sd.to_string());
+                    write!(out, ",{},{sd},{low},{middle},{high},{}", s.mean, s.runs)?;
                     range.take(s, self.seeds, *turn, axes);
                 }
                 None => write!(out, ",,,,,,0")?,
@@ -348,7 +349,8 @@ mod tests {
             (turning.mean + 179.0 + 2.0 / 3.0).abs() < 1e-9,
             "{turning:?}"
         );
-        assert!((turning.sd - 2.081_665_999).abs() < 1e-6 && turning.quantiles[1] == -179.0);
+        assert!((turning.sd.unwrap() - 2.081_665_999).abs() < 1e-6);
+        assert_eq!(turning.quantiles[1], -179.0);
         assert_eq!(Spread::of(&[]), None);
         assert_eq!(Spread::of(&[3.0]).unwrap().quantiles, [3.0; 3]);
         assert_eq!(short(0.000123456), "0.0001235");
