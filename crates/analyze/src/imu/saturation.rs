@@ -12,6 +12,8 @@ const fn least_end(of: Instrument) -> f64 {
 /// So many samples at the end, three of them in a row, and so many times as many as at one of the values below it: the crest of a sine has four times as many.
 const LEAST_SAMPLES: usize = 8;
 const PILED_UP: f64 = 8.0;
+/// The same in a band: a crest as flat as 1 − t⁴ has eleven times as many as a band below, one as 1 − t⁶ eighteen times.
+const PILED_UP_SPREAD: f64 = 32.0;
 /// How many of the values below it, or of bands as wide.
 const BELOW: usize = 8;
 /// What counts as the end: that value alone, or all within such a part of it, where values lie that close: a bias that was taken off, axes that were
@@ -84,17 +86,17 @@ fn piled_up(x: &[f64], least: f64) -> Option<(f64, Vec<usize>)> {
             return None;
         }
         let others = &descending[samples.len()..];
-        let below = if width > 0.0 {
+        let (below, times) = if width > 0.0 {
             let all = descending.partition_point(|x| end - x <= (BELOW + 1) as f64 * width);
             if descending[..all].chunk_by(|a, b| a == b).count() <= BELOW {
                 return None;
             }
-            all - samples.len()
+            (all - samples.len(), PILED_UP_SPREAD)
         } else {
             let values = others.chunk_by(|a, b| a == b).take(BELOW);
-            values.map(<[f64]>::len).sum()
+            (values.map(<[f64]>::len).sum(), PILED_UP)
         };
-        let piled = samples.len() as f64 * BELOW as f64 >= PILED_UP * below as f64;
+        let piled = samples.len() as f64 * BELOW as f64 >= times * below as f64;
         piled.then_some((end, samples))
     })
 }
@@ -178,6 +180,26 @@ mod tests {
     fn a_crest_is_no_end() {
         for quantum in [1e-9, 0.001, 0.05, 0.2, 0.5] {
             assert_eq!(saturated(&turning(quantum, 100.0)), [], "{quantum}");
+        }
+    }
+
+    /// Nor one that is flat for a tenth of a second, through noise and a converter's steps.
+    #[test]
+    fn a_flat_crest_is_no_end() {
+        let mut random = crate::random::Random(6);
+        for power in [2, 4, 6] {
+            let mut track = turning(1e-9, 100.0);
+            for (k, x) in track.gyro_rad_per_s.iter_mut().enumerate() {
+                let t = (k as f64 - 2000.0) / 60.0;
+                let crest = 4.3 * (1.0 - t.powi(power)).max(0.0);
+                x[1] = ((x[1].min(3.9).max(crest) + 1e-3 * random.normal()) / 7e-4).round() * 7e-4;
+                x[1] -= if crest < 4.0 {
+                    0.1 * random.uniform()
+                } else {
+                    0.0
+                };
+            }
+            assert_eq!(saturated(&track), [], "{power}");
         }
     }
 
