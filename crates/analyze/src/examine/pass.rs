@@ -44,23 +44,26 @@ pub(super) struct Entry {
 }
 
 impl Entry {
-    /// The next values; `times` are those up to them.
-    fn take(&mut self, x: &[f64], finite: bool, times: &Times, window_s: f64) {
+    /// The next values; `shared` are the channel's times up to them, which count where it has none of its own.
+    fn take(&mut self, x: &[f64], finite: bool, shared: &Times, window_s: f64) {
+        let times = self.times.as_ref().unwrap_or(shared);
         if let Some(waiting) = &mut self.waiting
             && times.count() < FEW
         {
             waiting.extend_from_slice(x);
             return;
         }
-        self.begin(times, window_s);
+        self.begin(shared, window_s);
+        let times = self.times.as_ref().unwrap_or(shared);
         self.stream.push(x, finite, times.gaps());
     }
 
     /// Takes what waited, at the rate that the times tell.
-    fn begin(&mut self, times: &Times, window_s: f64) {
+    fn begin(&mut self, shared: &Times, window_s: f64) {
         let Some(waiting) = self.waiting.take() else {
             return;
         };
+        let times = self.times.as_ref().unwrap_or(shared);
         let hz = times.hz_between_gaps().unwrap_or(0.0);
         let most = self.most.min((window_s * hz).ceil() as u64);
         let nperseg = if self.lines { segment(hz, most) } else { 0 };
@@ -73,6 +76,7 @@ impl Entry {
         let mut times = Times::default();
         times.push(&times_ns);
         (self.waiting, self.most) = (Some(Vec::new()), x.len() as u64);
+        self.times = None;
         self.begin(&times, f64::INFINITY);
         self.stream.push(&x, false, times.gaps());
         self.times = Some(times);
@@ -97,7 +101,7 @@ pub(super) struct Pass<'a> {
     pub axes: HashMap<usize, Axis>,
     pub entries: Vec<Entry>,
     /// By channel: entries that every message so far has had, whose times are the channel's.
-    pub whole: Vec<Vec<usize>>,
+    whole: Vec<Vec<usize>>,
     /// Times of the batch's channel before the batch.
     before: Times,
     /// Entry of a column of the stream.
@@ -247,13 +251,11 @@ impl<'a> Pass<'a> {
                     } else if entry.times.is_none() && rows.is_some() {
                         entry.times = Some(self.before.clone());
                     }
-                    let mut own = entry.times.take();
-                    if let Some(own) = &mut own {
+                    if let Some(own) = &mut entry.times {
                         own.push(times);
                     }
-                    let so_far = own.as_ref().unwrap_or(&self.times[batch.channel]);
-                    entry.take(values, finite, so_far, f64::INFINITY);
-                    entry.times = own;
+                    let shared = &self.times[batch.channel];
+                    entry.take(values, finite, shared, f64::INFINITY);
                 }
                 _ => {
                     let inside =
@@ -262,10 +264,9 @@ impl<'a> Pass<'a> {
                         .filter(|(t, _)| inside(**t))
                         .map(|(t, x)| (*t, *x))
                         .unzip();
-                    let mut own = entry.times.take().unwrap_or_default();
-                    own.push(&kept);
-                    entry.take(&x, finite, &own, self.request.longest_s());
-                    entry.times = Some(own);
+                    entry.times.get_or_insert_default().push(&kept);
+                    let shared = &self.times[batch.channel];
+                    entry.take(&x, finite, shared, self.request.longest_s());
                 }
             }
         }
@@ -307,10 +308,8 @@ impl<'a> Pass<'a> {
     /// these are more than memory should hold, a remark says that they have neither jitter nor spectrum.
     pub(super) fn put_in_order(&mut self) -> Result<Vec<Quality>, ReadError> {
         for entry in &mut self.entries {
-            let own = entry.times.take();
-            let times = own.as_ref().unwrap_or(&self.times[entry.channel]);
-            entry.begin(times, self.request.longest_s());
-            entry.times = own;
+            let shared = &self.times[entry.channel];
+            entry.begin(shared, self.request.longest_s());
         }
         let entries = self.entries.iter().enumerate();
         let tangled: HashMap<String, usize> = entries
