@@ -46,6 +46,14 @@ struct Window {
 /// No step tells so short a build-up from none, s.
 const AT_ONCE_S: f64 = 0.01;
 
+/// A climb's damping is no less, so that it is soon large where a step leads down.
+const LEAST_DAMPING: f64 = 1e-3;
+/// Share of a variance that a climb takes off at once at most.
+const FURTHEST_OFF: f64 = 0.875;
+/// A climb that is so near a summit ends on it: in ln K, ln τ, rad/s and rad, and in log-likelihood.
+const BESIDE: f64 = 0.05;
+const BESIDE_HIGH: f64 = 2.0;
+
 /// Weights of a cubic through the four ends of [`WINDOW`] steps, in the middle.
 const MIDDLE: [f64; WINDOW + 1] = [-0.0625, 0.5625, 0.5625, -0.0625];
 
@@ -95,7 +103,7 @@ impl Drive {
         (rate, back)
     }
 
-    /// One step of h seconds (Runge and Kutta), the pull at its beginning, middle and end; and ∂φ/∂φ over it.
+    /// One step of h seconds (Runge and Kutta), the pull at its beginning, middle and end; and −∂μ̇/∂μ in its middle.
     #[inline(always)]
     fn step(&self, at: State, pull: &[Dual; 3], psi: [f64; 2], h: f64) -> (State, Dual) {
         let middle = 0.5 * (psi[0] + psi[1]);
@@ -108,7 +116,7 @@ impl Drive {
             .after(b, h / 3.0)
             .after(c, h / 3.0)
             .after(d, h / 6.0);
-        (end, (back * -h).exp())
+        (end, back)
     }
 }
 
@@ -126,7 +134,6 @@ impl Walk {
         let noise = shared(NOISE).exp() + self.least_noise;
         let error = shared(ERROR).exp() + self.least_error;
         let to_come = match self.fresh {
-            true if self.unheard_s == 0.0 => pull,
             true => {
                 let unheard_s = self.unheard_s;
                 let early_s = shared(BEGUN) * (unheard_s / 12.0f64.sqrt()) + 0.5 * unheard_s;
@@ -166,7 +173,11 @@ impl Walk {
                 let mut kept = Dual::constant(1.0);
                 match self.sounds[k] {
                     Some(true) => {
-                        (state, kept) = drive.step(state, &grown[k], psi, h);
+                        let back;
+                        (state, back) = drive.step(state, &grown[k], psi, h);
+                        if self.measured {
+                            kept = (back * -h).exp();
+                        }
                         state.variance.value = state.variance.value.max(1e-12);
                     }
                     sounds => {
@@ -230,34 +241,59 @@ impl Walk {
         }
     }
 
-    /// Climbs to the most likely unknowns (Fisher's scoring, damped as by Levenberg and Marquardt); K stays where it is if `held`.
-    pub fn climb(&self, mut x: DVector<f64>, held: bool) -> (DVector<f64>, Score) {
+    /// Climbs to the most likely unknowns (Fisher's scoring, damped as by Levenberg and Marquardt); K stays where it is if `held`. Ends beside a
+    /// `summit` that is known.
+    pub fn climb(
+        &self,
+        mut x: DVector<f64>,
+        held: bool,
+        summit: Option<&(DVector<f64>, Score)>,
+    ) -> (DVector<f64>, Score) {
         let mut here = self.score(&x);
         // Along the profile of K the fall is wanted to a hundredth only.
         let enough = if held { 0.02 } else { 1e-3 };
-        let mut damping = 1e-3;
+        let mut damping = LEAST_DAMPING;
         for _ in 0..60 {
             let mut normal = here.information.clone();
             for k in 0..x.len() {
                 *normal.diagonal(k) *= 1.0 + damping;
             }
             *normal.diagonal(PULL) += if held { 1e18 } else { 1e-9 };
-            let Some(step) = normal.solve(&here.gradient) else {
+            let Some(mut step) = normal.solve(&here.gradient) else {
                 break;
             };
-            // Nothing moves by more than a factor of two or 40° at once.
-            let step = step.scale(1.0f64.min(0.7 / step.amax()));
-            let promised = step.dot(&here.gradient);
+            let straight = step.dot(&here.gradient);
+            // Scoring takes 1 − s/σ² off ln σ² where the misses say s, never more than 1 however small they are: from far, what they say.
+            let falls = [NOISE, ERROR].map(|k| (k, step[k].max(-FURTHEST_OFF)));
+            for (k, by) in falls.into_iter().filter(|(_, by)| *by < -0.5) {
+                step[k] = (1.0 + by).ln();
+            }
+            // No variance falls by more than a factor of eight, nothing else moves by more than one of two or 40° at once.
+            let most = |k: usize, by: f64| match k == NOISE || k == ERROR {
+                true if by < 0.0 => -(1.0 - FURTHEST_OFF).ln(),
+                _ => 0.7,
+            };
+            let far = step
+                .iter()
+                .enumerate()
+                .map(|(k, by)| by.abs() / most(k, *by));
+            let furthest = far.fold(1.0, f64::max);
+            let step = step.unscale(furthest);
+            let promised = straight / furthest;
             let mut there = &x + step;
             there[PULL] = there[PULL].clamp(LEAST.ln(), MOST.ln());
             let new = self.score(&there);
-            if new.value > here.value {
+            let higher = new.value > here.value;
+            if higher {
                 (x, here) = (there, new);
-                damping *= 0.2;
+                damping = (damping * 0.2).max(LEAST_DAMPING);
             } else {
                 damping *= 10.0;
             }
-            if !(promised > enough) || damping > 1e6 {
+            // Beside the summit information and curvature differ: what a step promises it need not keep.
+            let enough = if higher { enough } else { 10.0 * enough };
+            let known = summit.is_some_and(|summit| here.is_beside(&x, summit));
+            if !(promised > enough) || damping > 1e6 || known {
                 break;
             }
         }
@@ -271,6 +307,13 @@ impl Walk {
 }
 
 impl Score {
+    /// Whether it is that of unknowns `x` beside a summit.
+    fn is_beside(&self, x: &DVector<f64>, (summit, top): &(DVector<f64>, Score)) -> bool {
+        let of_motion = (0..x.len()).filter(|k| ![NOISE, ERROR, BEGUN].contains(k));
+        (top.value - self.value).abs() < BESIDE_HIGH
+            && of_motion.fold(0.0, |far: f64, k| far.max((x[k] - summit[k]).abs())) < BESIDE
+    }
+
     /// Takes an observation of carrier `c` (rad) of what is `expected`: its mean, its variance but for the error, and its covariance with
     /// the state. Gives the state after it.
     fn observe(

@@ -33,6 +33,7 @@ use crate::inputs::Inputs;
 use crate::phase::wrap;
 use crate::spectrum::chi_square_quantile;
 use nalgebra::DVector;
+use rayon::prelude::*;
 use unknowns::{BUILD_UP, LEAST, MOST, OFFSET, OWN, PULL, place};
 use walk::Walk;
 
@@ -105,13 +106,15 @@ pub fn adler(
     measured: bool,
 ) -> Result<Adler, &'static str> {
     let walk = Walk::new(t_s, phase_rad, beat_rad, measured)?;
-    let [a, b, others @ ..] = walk.starts()?.map(|start| walk.climb(start, false));
-    let mut highest = match b.1.value > a.1.value || !a.1.value.is_finite() {
-        true => b,
-        false => a,
-    };
+    let [first, others @ ..] = walk.starts()?;
+    let first = walk.climb(first, false, None);
+    let others = others.into_par_iter();
+    let others: Vec<_> = others
+        .map(|start| walk.climb(start, false, Some(&first)))
+        .collect();
+    let mut highest = first;
     for other in others {
-        if other.1.value > highest.1.value + SAME {
+        if other.1.value > highest.1.value + SAME || !highest.1.value.is_finite() {
             highest = other;
         }
     }
@@ -159,7 +162,7 @@ impl Walk {
             return (best[PULL] + sign * 1.96 * sd).exp();
         }
         let fallen = |x: DVector<f64>| {
-            let (x, found) = self.climb(x, true);
+            let (x, found) = self.climb(x, true, None);
             (x, (top - found.value).max(0.0))
         };
         if !up {

@@ -97,8 +97,13 @@ impl Walk {
         let phases = phases?;
         let step_s = period_s(t_s).ok_or(TOO_LITTLE)?;
         let parts = (step_s / STEP_S).round().max(1.0);
+        // Whoever recorded phases saw the beat as seldom: it may have begun anywhere in the sample before.
+        let unheard = match measured && parts == 1.0 {
+            true => 0,
+            false => parts as usize,
+        };
         if parts == 1.0 && t_s.windows(2).all(|t| t[1] - t[0] <= 1.5 * step_s) {
-            return Walk::on(t_s, &phases, beat, measured, first_heard, 0);
+            return Walk::on(t_s, &phases, beat, measured, first_heard, unheard);
         }
         if (t_s[t_s.len() - 1] - t_s[0]) / step_s + 1.0 > 2.0 * t_s.len() as f64 {
             return Err(TOO_LITTLE);
@@ -111,11 +116,10 @@ impl Walk {
         let places = phases.first().map_or(0, Vec::len);
         let even: Vec<f64> = (0..places).map(|k| t_s[0] + k as f64 * step_s).collect();
         let beat = played_on(t_s, &beat, &turns, &even);
-        let unheard = if parts > 1.0 { parts as usize } else { 0 };
         Walk::on(&even, &phases, beat, measured, first_heard, unheard)
     }
 
-    /// On an even axis; phases straightened; over so many steps before the first beat nobody knows whether it sounds.
+    /// On an even axis; phases straightened; over so many of its steps before the first beat nobody knows whether it sounds.
     fn on(
         t_s: &[f64],
         phase_rad: &[Vec<f64>],
@@ -136,12 +140,13 @@ impl Walk {
             .step_by(hop)
             .map(|k| match k < onset {
                 true => sounding(&beat_rad[k..onset.min(k + hop + 1)])
-                    .filter(|sounds| !sounds && onset - k > unheard),
+                    .filter(|sounds| !sounds && onset - k >= hop + unheard),
                 false => sounding(&beat_rad[k..=k + hop]),
             })
             .collect();
+        let silent_to_s = -(unheard as f64 - 0.5) * step_s;
         let tried_s: f64 = (t.windows(2).zip(&sounds))
-            .filter(|(t, sounds)| t[1] <= 0.0 && sounds.is_none())
+            .filter(|(t, sounds)| t[1] < silent_to_s && sounds.is_none())
             .map(|(t, _)| t[1] - t[0])
             .sum();
         let observed = |p: &Vec<f64>| match measured {
