@@ -423,6 +423,9 @@ fn line(f: &Found, k: usize, row: &Row, bound: Bound) -> String {
         .filter(|_| !word);
     let show = |x: Option<String>| x.unwrap_or_else(|| "–".into());
     let spread = |sd: Option<f64>| show(sd.map(|sd| format!("{sd:.d$}")));
+    // What rounds to nothing has no sign.
+    let unit = 10f64.powi(d as i32);
+    let signed = |x: f64| format!("{:+.d$}", (x * unit).round() / unit + 0.0);
     let limit = match bound {
         Bound::Free => "–".into(),
         Bound::Same => "the same".into(),
@@ -435,8 +438,8 @@ fn line(f: &Found, k: usize, row: &Row, bound: Bound) -> String {
         f.condition.name,
         row.label,
         show(truth.map(|s| format!("{:.d$}", s.mean))),
-        show(error.map(|s| format!("{:+.d$} ± {}", s.mean, spread(s.sd)))),
-        show(largest.map(|x| format!("{x:+.d$}"))),
+        show(error.map(|s| format!("{} ± {}", signed(s.mean), spread(s.sd)))),
+        show(largest.map(signed)),
         of(sums.kept),
         of(sums.covered),
     )
