@@ -141,6 +141,13 @@ impl Curve {
         let first = moments.next();
         moments.any(|t| Some(t) != first)
     }
+
+    /// Whether its values differ.
+    pub fn changes(&self) -> bool {
+        let mut values = self.values.iter().filter(|x| x.is_finite());
+        let first = values.next();
+        values.any(|x| Some(x) != first)
+    }
 }
 
 /// An inertial sensor.

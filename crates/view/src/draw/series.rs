@@ -22,6 +22,8 @@ pub struct Line<'a> {
     pub times_ns: std::borrow::Cow<'a, [i64]>,
     /// Values.
     pub values: std::borrow::Cow<'a, [f64]>,
+    /// Whether it is a level that others are compared with.
+    is_level: bool,
 }
 
 impl<'a> Line<'a> {
@@ -42,6 +44,7 @@ impl<'a> Line<'a> {
             width: 1.5,
             times_ns: times_ns.into(),
             values,
+            is_level: false,
         })
     }
 
@@ -90,6 +93,7 @@ impl<'a> Line<'a> {
             width: 1.0,
             times_ns: vec![first, last].into(),
             values: vec![value; 2].into(),
+            is_level: true,
         })
     }
 }
@@ -161,9 +165,11 @@ const STRETCHED: f64 = 2.0;
 /// Fewer values have no few.
 const MANY: usize = 400;
 
-/// The ends of the values without the few that would leave the others a sliver of the axis; half as much room again is left about these.
+/// The ends of the values without the few that would leave the others a sliver of the axis; half as much room again is left about these. Levels
+/// to compare with are never few.
 fn bulk(curves: &[Line<'_>], (low, high): (f64, f64)) -> (f64, f64) {
-    let values = curves.iter().flat_map(|line| line.values.iter().copied());
+    let (levels, measured): (Vec<&Line<'_>>, Vec<_>) = curves.iter().partition(|l| l.is_level);
+    let values = measured.iter().flat_map(|line| line.values.iter().copied());
     let mut values: Vec<f64> = values.filter(|x| x.is_finite()).collect();
     if values.len() < MANY {
         return (low, high);
@@ -174,6 +180,8 @@ fn bulk(curves: &[Line<'_>], (low, high): (f64, f64)) -> (f64, f64) {
     let to = *values.select_nth_unstable_by(last, f64::total_cmp).1;
     let room = 0.25 * (to - from);
     let kept = (low.max(from - room), high.min(to + room));
+    let kept = (levels.iter().flat_map(|line| line.values.iter()))
+        .fold(kept, |(from, to), x| (from.min(*x), to.max(*x)));
     // What is level but for a few pulses is about these.
     let level = to - from <= 1e-6 * from.abs().max(to.abs());
     if level || high - low < STRETCHED * (kept.1 - kept.0) {
@@ -710,6 +718,19 @@ mod tests {
             assert!(high > 3.0, "{high}");
             assert_eq!(title, "x");
         }
+    }
+
+    /// It was taken for two far values, and the title told of data down to it.
+    #[test]
+    fn a_level_far_from_all_values_stays_in_the_picture() {
+        let times: Vec<i64> = (0..2000).collect();
+        let values: Vec<f64> = (times.iter())
+            .map(|k| 1.0 + 0.05 * (0.3 * *k as f64).sin())
+            .collect();
+        let curve = Line::new("x", "x", 0, &times, values).unwrap();
+        let curves = [curve, Line::level("y", "y", 0, &times, 0.05).unwrap()];
+        let (low, high) = spread(&curves, false).unwrap();
+        assert!(low < 0.05 && high > 1.05 && high < 1.3, "{low} {high}");
     }
 
     #[test]

@@ -20,6 +20,8 @@ const MIN_POINTS: u64 = 4_000;
 const MAX_CURVES: usize = 24;
 /// Topics that are neither ours nor sensors and get a view of their own.
 const MAX_TOPICS: usize = 12;
+/// Topics among which these are chosen.
+const MAX_READ: usize = 48;
 
 /// Sensors and all topics that are not ours, in one pass.
 pub fn others(
@@ -94,7 +96,7 @@ pub fn others(
         let known = plain.len();
         let Some(topic) = (match plain.contains_key(batch.topic) {
             true => plain.get_mut(batch.topic),
-            false if known < MAX_TOPICS => Some(plain.entry(batch.topic.to_owned()).or_default()),
+            false if known < MAX_READ => Some(plain.entry(batch.topic.to_owned()).or_default()),
             false => None,
         }) else {
             left_out.insert(batch.topic.to_owned());
@@ -156,6 +158,7 @@ pub fn others(
         .map(|(name, curves)| topic(name, curves, detail))
         .filter(|t| !t.plots.is_empty())
         .collect();
+    left_out.extend(kept_out(&mut take.topics));
     if !left_out.is_empty() {
         let names: Vec<&str> = left_out.iter().map(String::as_str).collect();
         take.notes.push(format!(
@@ -180,6 +183,18 @@ pub fn others(
 
 /// Plots of one topic without a unit; more could not be read.
 const MAX_PLOTS: usize = 4;
+
+/// Leaves [`MAX_TOPICS`], those before others in which anything changes; gives the names of the rest.
+fn kept_out(topics: &mut Vec<Topic>) -> Vec<String> {
+    if topics.len() > MAX_TOPICS {
+        let changes = |t: &Topic| t.plots.iter().flat_map(|(_, c)| c).any(Curve::changes);
+        topics.sort_by_key(|t| !changes(t));
+        let rest = topics.split_off(MAX_TOPICS);
+        topics.sort_by(|a, b| a.name.cmp(&b.name));
+        return rest.into_iter().map(|t| t.name).collect();
+    }
+    Vec::new()
+}
 
 /// A plain topic: curves of one unit share a plot; of those without one, those that are alike large. While more may come nobody knows how
 /// large they are.
@@ -216,6 +231,21 @@ fn are_alike_large(a: &Curve, b: &Curve) -> bool {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    /// Constants took the places of what moves, and so did topics without a plot.
+    #[test]
+    fn what_moves_is_drawn_before_what_does_not() {
+        let of = |k: usize| {
+            let mut thin = Thin::new("x", 0, 1, 2, 10);
+            thin.push(&[0, 1], &[0.0, f64::from(u8::from(k >= 3))]);
+            let curves = vec![("x".to_owned(), String::new(), thin)];
+            topic(format!("/{k:02}"), curves, Detail::Thinned)
+        };
+        let mut topics: Vec<Topic> = (0..14).map(of).collect();
+        assert_eq!(kept_out(&mut topics), ["/01", "/02"]);
+        let names: Vec<&str> = topics.iter().map(|t| t.name.as_str()).collect();
+        assert!(names.is_sorted() && names.len() == MAX_TOPICS && names[1] == "/03");
+    }
 
     #[test]
     fn curves_without_a_unit_share_a_plot_where_they_are_alike_large() {
