@@ -127,7 +127,7 @@ fn wrong_types_and_signs_are_pointed_at() {
     );
     expect("name = \"a\"\nduration_s = nan", "2:14", &["NaN"]);
     expect("name = \"a\"\nlog_rate_hz = 0.0", "2:15", &["above zero"]);
-    expect("name = \"a\"\nlog_rate_hz = 1e12", "2:15", &["samples"]);
+    expect("name = \"a\"\nlog_rate_hz = 1e9", "2:15", &["samples"]);
     // Of two that are too much together, the one that is farther from its default is pointed at.
     for (text, place) in [
         ("duration_s = 1e12\nlog_rate_hz = 1.0", "2:14"),
@@ -150,7 +150,33 @@ fn wrong_types_and_signs_are_pointed_at() {
     ] {
         expect(&format!("name = \"a\"\n{text}"), place, &[" s "]);
     }
-    expect("name = \"a\"\nseed = -4", "2:8", &["-4"]);
+    expect("name = \"a\"\nseed = -4", "2:8", &["-4", "2^56 - 1"]);
+    expect(
+        "name = \"a\"\nduration_s = 0.1\nlog_rate_hz = 1.1e9",
+        "3:15",
+        &["at most 1e9"],
+    );
+    expect("name = \"a\"\nepoch_s = 2147483600.0", "2:11", &["2038"]);
+    expect(
+        "name = \"a\"\n[carriers]\nhandles_m = [[1.0, 2.0, 3.0]]\n[carriers.along_poles]\ncount = 2",
+        "3:13",
+        &["along_poles"],
+    );
+    // A held coordinate does not move; turning about the pole is roll's.
+    let held =
+        |start: &str| format!("name = \"a\"\nfreedom = [\"height\", \"roll\"]\n[start]\n{start}");
+    expect(
+        &held("velocity_m_per_s = [0.5, 0.0, 1.0]"),
+        "4:20",
+        &["[0.5, 0.0, 1.0]", "[0.0, 0.0, 1.0]"],
+    );
+    expect(
+        &held("angular_velocity_rad_per_s = [1.0, 2.0, 0.0]"),
+        "4:30",
+        &["[1.0, 0.0, 0.0]"],
+    );
+    let moves = "velocity_m_per_s = [0.0, 0.0, 1.0]\nangular_velocity_rad_per_s = [1.0, 0.0, 0.0]";
+    assert!(parse("scene.toml", &held(moves), &[]).is_ok());
     expect(
         "name = \"a\"\n[body]\nmass_kg = 0.0",
         "3:11",

@@ -255,6 +255,7 @@ fn try_freedoms(scene: &Scene, most: u64) -> Vec<Trial> {
             let square = full.iter().map(|s| (s[i] - mean).powi(2)).sum::<f64>();
             let mut fewer = scene.clone();
             fewer.freedom.retain(|g| g != f);
+            fewer.keep_to_freedoms();
             let held = sim::scene::check(&fewer)
                 .map_err(|p| p.message)
                 .and_then(|()| motion(&fewer, most))
