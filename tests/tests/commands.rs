@@ -139,7 +139,7 @@ fn bad_input_gets_one_sentence_and_leaves_nothing() {
         (
             &["record", "--duration", "1e11", "--set", "log_rate_hz=1e-3"],
             None,
-            "--duration: duration_s: the stamps would pass the year 2262",
+            "--duration: duration_s: the stamps would pass the 19th of January 2038",
         ),
         (
             &["record", "--tolerance", "1e-20"],

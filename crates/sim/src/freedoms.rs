@@ -13,7 +13,8 @@ use crate::body::Body;
 use crate::lanes::{Avx2, Avx512, FusedEach};
 use crate::lanes::{Eight, Moments, Number, Plain8, Slope, Slopes, f64x2, pack, sum};
 use crate::model::workspace::{All, Block, Pair, Part, Workspace};
-use crate::scene::parts::Start;
+use crate::scene::Scene;
+use crate::scene::parts::{Freedom, Start};
 use nalgebra::{Matrix3, Quaternion, UnitQuaternion, Vector3};
 use std::ops::Range;
 
@@ -66,6 +67,19 @@ impl Pose {
         let [x, y, z, w] = self.orientation;
         (2.0 * (w * x + y * z)).atan2(1.0 - 2.0 * (x * x + y * y))
     }
+}
+
+/// The velocities with which a scene starts, m/s (world) and rad/s (body), as its freedoms take them; `None` where they take all.
+pub(crate) fn start_velocities(scene: &Scene) -> Option<[[f64; 3]; 2]> {
+    let body = Body::new(&scene.body).ok()?;
+    if Freedom::ALL.iter().all(|f| scene.freedom.contains(f)) {
+        return None;
+    }
+    let freedoms = choose(&body, &[], &scene.freedom, &scene.start, 0.0);
+    let mut y = vec![0.0; freedoms.size()];
+    freedoms.place(&scene.start, 0.0, &mut y);
+    let pose = freedoms.pose(&y);
+    Some([pose.velocity_m_per_s, pose.spin_rad_per_s])
 }
 
 /// A choice of coordinates for the body.

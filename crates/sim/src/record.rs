@@ -48,7 +48,7 @@ impl<'m> Recorder<'m> {
     /// # Errors
     /// What the writer says.
     pub fn new(model: &'m Model, writer: RecordingWriter) -> Result<Self, WriteError> {
-        // OK because a checked scene keeps stamps below 2262.
+        // OK because a checked scene keeps stamps below 2038.
         let epoch_ns = (model.scene.epoch_s * 1e9).round() as i64;
         Self::at(model, writer, epoch_ns)
     }
@@ -159,7 +159,7 @@ impl<'m> Recorder<'m> {
     }
 
     fn stamp_ns(&self, t_s: f64) -> i64 {
-        // OK because a checked scene keeps stamps below 2262.
+        // OK because a checked scene keeps stamps below 2038.
         self.epoch_ns + (t_s * 1e9).round() as i64
     }
 

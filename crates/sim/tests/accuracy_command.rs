@@ -1,7 +1,7 @@
 //! `sim accuracy` as a person runs it.
 
 use serde_json::Value;
-use sim::solve::METHODS;
+use sim::solve::{METHODS, Stopped};
 use std::process::{Command, Output};
 
 fn sim(args: &[&str]) -> Output {
@@ -72,8 +72,30 @@ fn a_study_of_a_second_says_what_the_contract_promises() {
     assert_eq!(csv.lines().count(), runs.len() + 1);
     let svg = std::fs::read_to_string(folder.join("work-precision.svg")).unwrap();
     assert!(svg.starts_with("<svg") && svg.contains("semi-implicit-euler") && !svg.contains("NaN"));
+    assert!(
+        svg.contains(
+            "><title>music, duration_s=2.0, analysis_start_s=0.0: what accuracy costs</title>"
+        ),
+        "{svg:.200}"
+    );
     assert!(folder.join("table.txt").exists() && folder.join("accuracy.json").exists());
     std::fs::remove_dir_all(folder).unwrap();
+}
+
+/// Method and tolerance of a reference are not for who runs the study to choose.
+#[test]
+fn a_missing_reference_is_no_reason_to_loosen_what_cannot_be_set() {
+    let why = Stopped::StepTooSmall {
+        method: "dop853",
+        t_s: 1.5,
+        step_s: 1e-15,
+        tolerance: 1e-12,
+    };
+    assert!(why.to_string().contains("--tolerance"));
+    assert_eq!(
+        why.what(),
+        "dop853 gave up at t = 1.5 s: the step fell to 1.0e-15 s without reaching the tolerance 1e-12"
+    );
 }
 
 #[test]

@@ -390,7 +390,10 @@ fn cubic(t: &[f64], x: &[f64], at: f64) -> f64 {
 /// nothing is at rest and some handles are slack.
 #[track_caller]
 fn check(text: &str, t_s: f64) {
-    let scene = scene(text);
+    let mut scene = scene(text);
+    scene.start.velocity_m_per_s = [0.1, -0.2, 0.1];
+    scene.start.angular_velocity_rad_per_s = [0.5, 0.1, -0.3];
+    scene.keep_to_freedoms();
     let model = Model::new(&scene);
     let (names, mut w) = (model.state_names(), model.workspace());
     let mut y = model.initial_state();
@@ -657,8 +660,6 @@ walk_m_per_s = [0.9, 0.2, 0.0]
 height_m = 0.84
 position_m = [0.02, -0.03]
 roll_pitch_yaw_deg = [8.0, 3.0, -5.0]
-velocity_m_per_s = [0.1, -0.2, 0.1]
-angular_velocity_rad_per_s = [0.5, 0.1, -0.3]
 "#;
 const CONTACT: &str = "[effects.contact]\nstiffness_n_per_m = [3000.0, 2500.0, 3300.0, 2800.0, 3100.0]\ndamping_n_s_per_m = [450.0, 300.0, 410.0, 350.0, 390.0]\n";
 const HOLD: &str = "[effects.hold]\nstiffness_n_per_m = [900.0, 800.0, 700.0, 650.0, 750.0]\ndamping_n_s_per_m = [90.0, 120.0, 80.0, 70.0, 60.0]\n";

@@ -5,7 +5,7 @@ mod common;
 use common::{samples, scene};
 use sim::model::Model;
 use sim::run::{Sample, run};
-use sim::scene::{Freedom, Scene, parse};
+use sim::scene::{Freedom, Scene, check, parse};
 
 /// A rath of the paper's kind in which both carriers step together: only height, roll and the sideways sway move.
 fn in_step(freedom: &str) -> Scene {
@@ -75,7 +75,7 @@ fn every_subset_balances_its_energy() {
             .filter(|(i, _)| mask >> i & 1 == 1)
             .map(|(_, f)| format!("\"{}\"", format!("{f:?}").to_lowercase()))
             .collect();
-        let scene = scene(&format!(
+        let mut scene = scene(&format!(
             r#"
             name = "subset"
             duration_s = 3.0
@@ -87,8 +87,6 @@ fn every_subset_balances_its_energy() {
             [start]
             height_m = 0.85
             roll_pitch_yaw_deg = [8.0, 3.0, -5.0]
-            velocity_m_per_s = [0.1, -0.2, 0.1]
-            angular_velocity_rad_per_s = [0.5, 0.1, -0.3]
             [solver]
             tolerance = 1e-10
             [effects.contact]
@@ -99,6 +97,11 @@ fn every_subset_balances_its_energy() {
             "#,
             names.join(", ")
         ));
+        scene.start.velocity_m_per_s = [0.1, -0.2, 0.1];
+        scene.start.angular_velocity_rad_per_s = [0.5, 0.1, -0.3];
+        assert!(check(&scene).is_err(), "{names:?}");
+        scene.keep_to_freedoms();
+        assert_eq!(check(&scene), Ok(()), "{names:?}");
         let model = Model::new(&scene);
         let attitude_is_a_quaternion = names
             .iter()

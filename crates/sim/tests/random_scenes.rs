@@ -30,7 +30,7 @@ fn valid(seed: u64) -> String {
         d.from(0.2, 3.0),
         d.from(1.0, 120.0)
     );
-    let mut turns = true;
+    let (mut turns, mut moves) = (true, [true; 4]);
     if d.chance(0.4) {
         let mut free: Vec<&str> = ["x", "y", "height", "roll", "tilt", "yaw"]
             .into_iter()
@@ -39,7 +39,10 @@ fn valid(seed: u64) -> String {
         if free.is_empty() {
             free.push("height");
         }
-        turns = ["x", "y", "yaw"].iter().all(|f| free.contains(f));
+        let has = |all: &[&str]| all.iter().all(|f| free.contains(f));
+        turns = has(&["x", "y", "yaw"]);
+        // What is held may not start with a velocity.
+        moves = [&["x"][..], &["height"], &["roll"], &["roll", "tilt", "yaw"]].map(has);
         t += &format!("freedom = {free:?}\n");
     }
     // Moments of a box: they always belong to a body.
@@ -74,16 +77,17 @@ fn valid(seed: u64) -> String {
     if d.chance(0.5) {
         t += &format!("height_m = {:?}\n", d.from(0.5, 1.6));
     }
+    let [x, height, roll, all_turns] = moves.map(|moves| if moves { 1.0 } else { 0.0 });
     t += &format!(
         "roll_pitch_yaw_deg = [{:?}, {:?}, {:?}]\nvelocity_m_per_s = [{:?}, 0.0, {:?}]\nangular_velocity_rad_per_s = [{:?}, {:?}, {:?}]\n",
         d.from(-30.0, 30.0),
         d.from(-20.0, 20.0),
         yaw_deg,
-        d.from(-1.0, 1.0),
-        d.from(-1.0, 1.0),
-        d.from(-2.0, 2.0),
-        d.from(-2.0, 2.0),
-        d.from(-2.0, 2.0)
+        x * d.from(-1.0, 1.0),
+        height * d.from(-1.0, 1.0),
+        roll * d.from(-2.0, 2.0),
+        all_turns * d.from(-2.0, 2.0),
+        all_turns * d.from(-2.0, 2.0)
     );
     t += &format!(
         "[solver]\ntolerance = {:?}\nenergy = {}\n",

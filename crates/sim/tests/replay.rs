@@ -95,13 +95,34 @@ fn a_stretch_begins_as_it_was_measured() {
     // It is its own scene that is driven.
     assert_eq!(found["scene"], "baseline");
     assert_eq!(found["misfit"]["height_m"]["samples"], 301);
-    for signal in ["height_m", "pitch_deg", "force_n"] {
+    assert_eq!(found["starts_as_measured"], true);
+    for signal in SIGNALS {
         assert!(share(&found, signal) < 0.01, "{signal}: {found}");
     }
-    // Sideways nothing tells phases where the body is; shoulders do.
+    // In another scene nothing tells phases where the body is sideways; shoulders do.
+    let (other, _) = replay(&file, &[&stretch[..], &["--scene", "baseline"]].concat());
+    assert_eq!(other["starts_as_measured"], false);
+    assert_eq!(other["window_s"], serde_json::json!([3.0, 10.0]));
     let (found, _) = replay(&file, &[&stretch[..], &["--drive", "shoulders"]].concat());
     for signal in SIGNALS {
         assert!(share(&found, signal) < 0.01, "{signal}: {found}");
+    }
+}
+
+/// Poles are bent at rest where the recording began; how they were bent later is in no recording.
+#[test]
+fn bent_poles_start_as_they_were_or_settle() {
+    let folder = tempfile::tempdir().unwrap();
+    let file = record(folder.path(), "long-pole", &["--duration", "10"]);
+    let (found, _) = replay(&file, &[]);
+    assert_eq!(found["starts_as_measured"], true);
+    for signal in ["height_m", "pitch_deg", "force_n"] {
+        assert!(share(&found, signal) < 0.01, "{signal}: {found}");
+    }
+    let softer = "effects.contact.stiffness_n_per_m=4000";
+    for more in [&["--from", "5"][..], &["--set", softer]] {
+        let (found, _) = replay(&file, more);
+        assert_eq!(found["starts_as_measured"], false, "{more:?}");
     }
 }
 
@@ -209,6 +230,11 @@ fn what_cannot_be_replayed_ends_in_one_sentence() {
         ),
         (&gap, &["--drive", "beat"], "holds 0 beats"),
         (beatless, &["--drive", "beat"], "has no effects.music"),
+        (
+            beatless,
+            &["--scene", "stand-still"],
+            "`stand-still` has no effects.gait, so no phase can move its shoulders; replay those (`--drive shoulders`)",
+        ),
         (&at("nan.mcap"), &[], "0 usable samples"),
         (&at("short.mcap"), &[], "usable samples"),
         (&at("empty.mcap"), &[], "is empty"),

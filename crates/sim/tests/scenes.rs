@@ -2,7 +2,7 @@
 
 use sim::model::Model;
 use sim::run::{Sample, run};
-use sim::scene::{BUILTIN, SceneError, load, parse, to_toml};
+use sim::scene::{BUILTIN, SceneError, Template, load, parse, to_toml};
 
 /// The message about a scene that must not pass.
 fn message(text: &str) -> String {
@@ -127,7 +127,7 @@ fn wrong_types_and_signs_are_pointed_at() {
     );
     expect("name = \"a\"\nduration_s = nan", "2:14", &["NaN"]);
     expect("name = \"a\"\nlog_rate_hz = 0.0", "2:15", &["above zero"]);
-    expect("name = \"a\"\nlog_rate_hz = 1e12", "2:15", &["samples"]);
+    expect("name = \"a\"\nlog_rate_hz = 1e9", "2:15", &["samples"]);
     // Of two that are too much together, the one that is farther from its default is pointed at.
     for (text, place) in [
         ("duration_s = 1e12\nlog_rate_hz = 1.0", "2:14"),
@@ -150,7 +150,33 @@ fn wrong_types_and_signs_are_pointed_at() {
     ] {
         expect(&format!("name = \"a\"\n{text}"), place, &[" s "]);
     }
-    expect("name = \"a\"\nseed = -4", "2:8", &["-4"]);
+    expect("name = \"a\"\nseed = -4", "2:8", &["-4", "2^56 - 1"]);
+    expect(
+        "name = \"a\"\nduration_s = 0.1\nlog_rate_hz = 1.1e9",
+        "3:15",
+        &["at most 1e9"],
+    );
+    expect("name = \"a\"\nepoch_s = 2147483600.0", "2:11", &["2038"]);
+    expect(
+        "name = \"a\"\n[carriers]\nhandles_m = [[1.0, 2.0, 3.0]]\n[carriers.along_poles]\ncount = 2",
+        "3:13",
+        &["along_poles"],
+    );
+    // A held coordinate does not move; turning about the pole is roll's.
+    let held =
+        |start: &str| format!("name = \"a\"\nfreedom = [\"height\", \"roll\"]\n[start]\n{start}");
+    expect(
+        &held("velocity_m_per_s = [0.5, 0.0, 1.0]"),
+        "4:20",
+        &["[0.5, 0.0, 1.0]", "[0.0, 0.0, 1.0]"],
+    );
+    expect(
+        &held("angular_velocity_rad_per_s = [1.0, 2.0, 0.0]"),
+        "4:30",
+        &["[1.0, 0.0, 0.0]"],
+    );
+    let moves = "velocity_m_per_s = [0.0, 0.0, 1.0]\nangular_velocity_rad_per_s = [1.0, 0.0, 0.0]";
+    assert!(parse("scene.toml", &held(moves), &[]).is_ok());
     expect(
         "name = \"a\"\n[body]\nmass_kg = 0.0",
         "3:11",
@@ -330,6 +356,11 @@ fn settings_are_checked_like_the_scene() {
         ("duration_s", "KEY=VALUE"),
         ("duration_s=0", "above zero"),
         ("=3", "empty name"),
+        ("duration_s=false", "expected a number"),
+        ("solver=false", "expected a table"),
+        ("effects.music.beat_hz=false", "expected a number"),
+        ("effects.gait.amplitude_m=false", "expected a number"),
+        ("seed=3\nduration_s=0.1", "expected a whole number"),
         ("name.x=3", "single value"),
     ] {
         let said = with(setting).unwrap_err();
@@ -339,6 +370,39 @@ fn settings_are_checked_like_the_scene() {
             "{said}"
         );
     }
+}
+
+/// What has no default but to be absent can be taken away; places of carriers are given once.
+#[test]
+fn carriers_stand_along_poles_or_by_hand() {
+    let with = |settings: &[&str]| {
+        let settings: Vec<String> = settings.iter().map(|s| (*s).to_owned()).collect();
+        load("eight-carriers", &settings)
+    };
+    let (by_hand, no_poles) = (
+        "carriers.handles_m=[[1.0, 0.0, 0.1], [-1.0, 0.0, 0.1]]",
+        "carriers.along_poles=false",
+    );
+    for set in [by_hand, "carriers.handles_m.0.0=2.0"] {
+        let said = with(&[set]).unwrap_err().to_string();
+        assert!(said.contains(no_poles), "{said}");
+    }
+    assert_eq!(with(&[no_poles, by_hand]).unwrap().carriers.count(), 2);
+    assert_eq!(
+        with(&["start.height_m=2.0", "start.height_m=false"])
+            .unwrap()
+            .start
+            .height_m,
+        None
+    );
+    // A printed scene has both alike, and a sweep counts along the poles.
+    let template = Template::of(&with(&[]).unwrap());
+    let count = |key, value: toml::Value| template.with([(key, value)]).map(|s| s.carriers.count());
+    assert_eq!(count("carriers.along_poles.count", 6.into()).unwrap(), 6);
+    let said = count("carriers.handles_m.0.0", 2.0.into())
+        .unwrap_err()
+        .to_string();
+    assert!(said.contains(no_poles), "{said}");
 }
 
 /// Every built-in scene is complete, comes back from its own TOML, and runs its first seconds with nothing unexplained.

@@ -138,7 +138,7 @@ fn solve(
             "{} was given up at t = {t_s:.3} s: it had computed for {PATIENCE_S} s",
             method.name
         )),
-        Err(why) => Some(why.to_string()),
+        Err(why) => Some(why.what()),
     };
     (course, stats, clock.read(), failed)
 }

@@ -35,6 +35,8 @@ const EXAMPLES: &str = "Examples:
 const TRIAL_S: f64 = 20.0;
 const TRIAL_WALL_S: f64 = 1.0;
 const GIVEN_UP_S: f64 = 2.0;
+/// A shorter trial says nothing of the motion, s.
+const TELLING_S: f64 = 1.0;
 /// A freedom whose absence changes less than this is named as one that could be held: rad and m.
 const LITTLE: (f64, f64) = (0.017_453, 0.005);
 
@@ -59,7 +61,7 @@ struct Findings {
     /// Cost of a simulated second, or why even the shortest trial failed.
     ms_per_s: Result<f64, String>,
     trial_s: f64,
-    /// Why no longer stretch was tried, where one failed.
+    /// Why no longer stretch was tried, where one failed or would have taken too long.
     failed: Option<String>,
 }
 
@@ -106,6 +108,14 @@ fn explore(scene: Scene) -> Findings {
             }
         }
     }
+    let tells = trial.duration_s >= TELLING_S.min(scene.duration_s);
+    if let (Ok(ms), false, None) = (&ms, tells, &failed) {
+        failed = Some(format!(
+            "{} s of the motion took {:.1} s already, more was too dear to try",
+            (trial.duration_s * 1e3).round() / 1e3,
+            ms / 1e3 * trial.duration_s
+        ));
+    }
     let effects = TABLE
         .iter()
         .map(|e| {
@@ -136,8 +146,8 @@ fn explore(scene: Scene) -> Findings {
     Findings {
         rhs_ns,
         freedoms: match ms {
-            Ok(_) => try_freedoms(&trial, most),
-            Err(_) => Vec::new(),
+            Ok(_) if tells => try_freedoms(&trial, most),
+            _ => Vec::new(),
         },
         trial_s: trial.duration_s,
         failed,
@@ -248,13 +258,15 @@ fn try_freedoms(scene: &Scene, most: u64) -> Vec<Trial> {
     Freedom::ALL
         .iter()
         .enumerate()
-        .filter(|(_, f)| scene.freedom.contains(f))
+        // With the only one held nothing would move.
+        .filter(|(_, f)| scene.freedom.contains(f) && scene.freedom.len() > 1)
         .map(|(i, f)| {
             let count = full.len() as f64;
             let mean = full.iter().map(|s| s[i]).sum::<f64>() / count;
             let square = full.iter().map(|s| (s[i] - mean).powi(2)).sum::<f64>();
             let mut fewer = scene.clone();
             fewer.freedom.retain(|g| g != f);
+            fewer.keep_to_freedoms();
             let held = sim::scene::check(&fewer)
                 .map_err(|p| p.message)
                 .and_then(|()| motion(&fewer, most))
@@ -378,8 +390,11 @@ fn write_effects(out: &mut String, found: &Findings) -> std::fmt::Result {
 }
 
 fn write_freedoms(out: &mut String, found: &Findings) -> std::fmt::Result {
-    if found.ms_per_s.is_err() {
-        return Ok(());
+    if found.freedoms.is_empty() {
+        return match (&found.ms_per_s, &found.failed) {
+            (Ok(_), Some(why)) => writeln!(out, "\nno freedom was held in a trial: {why}"),
+            _ => Ok(()),
+        };
     }
     writeln!(
         out,

@@ -34,7 +34,7 @@ pub struct Args {
     /// To, s after the recording's start. Default: where what drives ends.
     #[arg(long, value_name = "S", value_parser = seconds, allow_hyphen_values = true)]
     to: Option<f64>,
-    /// Left out of the misfit at the beginning, s. Default: 0 where the body starts as measured, else 3.
+    /// Left out of the misfit at the beginning, s. Default: 0 where the body, and poles and bristles with it, start as in the recording, else 3.
     #[arg(long, value_name = "S", value_parser = seconds, allow_hyphen_values = true)]
     settle: Option<f64>,
     /// Change a value of the scene; `effects.NAME=false` takes an effect away. May be repeated.
@@ -121,8 +121,10 @@ pub fn run(args: &Args) -> Result<Input> {
         What::Shoulders => Drive::Shoulders,
         What::Beat => Drive::Beat,
     };
+    let made_by = attached.as_ref().and_then(|_| with(&[]).ok());
     let options = Options {
         drive,
+        made_by: made_by.as_ref(),
         from_s: args.from,
         to_s: args.to,
     };

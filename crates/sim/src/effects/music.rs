@@ -4,8 +4,8 @@
 //! φ̇_i += K_i m(t) sin(ψ − φ_i)        m(t) = 1 − e^{−(t − t₀)/τ}  while the drum sounds,  0 before t₀ and in pauses
 //! ψ = ψ₀ + 2π ∫ f_m dt        f_m steady but for changes of tempo, each a jump or a straight ramp
 //! ```
-//! K_i strength, one for all or one for each carrier [rad/s]; f_m beat (Hz); ψ₀ beat phase at t = 0 (rad); t₀ onset (s); τ build-up
-//! (s), where 0 means K from t₀ on. In a pause the players count on: ψ goes on unheard. One carrier locks where
+//! K_i strength, one for all or one for each carrier [rad/s]; f_m beat (Hz); ψ₀ beat phase at t = 0 (rad), from which ψ counts, not from t₀;
+//! t₀ onset (s); τ build-up (s), where 0 means K from t₀ on. In a pause the players count on: ψ goes on unheard. One carrier locks where
 //! |2πf_m − ω| < K, at sin(ψ − φ) = (2πf_m − ω)/K; outside it drifts at √(Δω² − K²). At t₀ with τ = 0, at the ends of pauses
 //! and at changes of tempo the phase rates jump or bend: events. Source: paper, eqs. (music), (adler); Adler (1946).
 

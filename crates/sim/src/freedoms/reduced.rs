@@ -6,7 +6,7 @@
 //! ```
 //! J holds the columns of the free angles; τ torque on the body in its axes (N·m). These are Lagrange's equations of the body with ideal
 //! (workless) constraints, in Kane's form: the held coordinates cost nothing, neither states nor equations. A held coordinate keeps its
-//! value at t = 0; `start` velocities along it are dropped. With all three angles free the attitude stays a quaternion (`pinned.rs`), with
+//! value at t = 0; a scene whose `start` moves along it is refused. With all three angles free the attitude stays a quaternion (`pinned.rs`), with
 //! two it is a gimbal (`gimbal.rs`), with one or none a hinge (`hinge.rs`), so no choice of freedoms has a singular
 //! attitude that motion can reach; roll and yaw alone need the held tilt away from ±90°, which the scene's check asks for.
 //! Source: Landau & Lifshitz, *Mechanics*, §35 (Euler angles); Kane & Levinson, *Dynamics* (1985), ch. 6.

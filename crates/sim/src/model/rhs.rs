@@ -387,7 +387,6 @@ mod tests {
                     inertia_kg_m2 = {{ xx = 300.0, yy = 9000.0, zz = 9300.0 }}
                     [start]
                     roll_pitch_yaw_deg = [3.0, 2.0, 1.0]
-                    angular_velocity_rad_per_s = [0.3, 0.2, 0.1]
                     [carriers]
                     initial_phase_sd_rad = 1.0
                     [carriers.along_poles]
@@ -403,7 +402,9 @@ mod tests {
                     [effects.music]
                     "#
                 );
-                let scene = parse("crowd", &text, &[]).unwrap_or_else(|e| panic!("{e}"));
+                let mut scene = parse("crowd", &text, &[]).unwrap_or_else(|e| panic!("{e}"));
+                scene.start.angular_velocity_rad_per_s = [0.3, 0.2, 0.1];
+                scene.keep_to_freedoms();
                 let mut model = Model::new(&scene);
                 assert!(model.in_blocks, "{freedom} {forces}");
                 let y = model.initial_state();

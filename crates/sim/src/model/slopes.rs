@@ -162,16 +162,25 @@ mod tests {
             [[2.3,-0.3,1.4],[2.4,-0.3,1.41],[2.5,-0.3,1.39],[2.4,-0.2,1.4]],\
             [[-2.4,0.3,1.4],[-2.4,0.3,1.41],[-2.5,0.3,1.39],[-2.4,0.2,1.4]]]}";
         for settings in [
-            &["effects.path.turn_deg=0", "freedom=['height','roll']"][..],
+            &[
+                "effects.path.turn_deg=0",
+                "freedom=['height','roll']",
+                "start.angular_velocity_rad_per_s=[0.3,0,0]",
+            ][..],
             &[
                 "effects.path.turn_deg=0",
                 "freedom=['height','roll','tilt']",
+                "start.angular_velocity_rad_per_s=[0.3,0.2,-0.0105]",
             ],
             &[
                 "effects.path.turn_deg=0",
                 "freedom=['y','height','roll','tilt','yaw']",
             ],
-            &["effects.path.turn_deg=0", "freedom=['tilt']"],
+            &[
+                "effects.path.turn_deg=0",
+                "freedom=['tilt']",
+                "start.angular_velocity_rad_per_s=[0,0.2,-0.0105]",
+            ],
             &[
                 "effects.contact.law='hunt-crossley'",
                 "effects.contact.exponent=1.5",

@@ -3,6 +3,7 @@
 use super::beat::follow;
 use super::misfit::Course;
 use crate::effects::measured::Measured;
+use crate::model::Model;
 use crate::scene::{Scene, check};
 use crate::spline::Spline;
 use recording::Signal;
@@ -17,6 +18,8 @@ const FOUND_STATE: &str = "/findings/state";
 const FOUND_PHASES: &str = "/findings/phases";
 /// A pause between two samples longer than this, and than three usual ones, is a gap, s: half a step.
 const GAP_S: f64 = 0.25;
+/// A replay from here on, s, begins where the recording does: stamps are whole nanoseconds.
+const AT_ONCE_S: f64 = 1e-9;
 /// Less is no replay, s.
 const SHORTEST_S: f64 = 1.0;
 
@@ -33,9 +36,11 @@ pub enum Drive {
 
 /// Which part of a recording is replayed, and how.
 #[derive(Clone, Copy, Debug)]
-pub struct Options {
+pub struct Options<'a> {
     /// What drives.
     pub drive: Drive,
+    /// The scene that made the recording, where that is known: its party walks where the recorded one did.
+    pub made_by: Option<&'a Scene>,
     /// From, s after the recording's start; the first moment at which all that drives is known where absent.
     pub from_s: Option<f64>,
     /// To, s after the recording's start; the last such moment where absent.
@@ -79,7 +84,7 @@ pub struct Replay {
     pub topic: String,
     /// Samples of it.
     pub samples: usize,
-    /// Whether the body starts as it was measured.
+    /// Whether the body starts as it was measured, and what no recording holds as it was then.
     pub starts_as_measured: bool,
 }
 
@@ -205,8 +210,8 @@ impl Take {
     ///
     /// # Errors
     /// One sentence: what is missing or does not fit, and what to do.
-    pub fn scene(&self, scene: &Scene, options: &Options) -> Result<Replay, String> {
-        let mut scene = scene.clone();
+    pub fn scene(&self, given: &Scene, options: &Options) -> Result<Replay, String> {
+        let mut scene = given.clone();
         let n = scene.carriers.count();
         let e = &mut scene.effects;
         let driven = match options.drive {
@@ -220,6 +225,12 @@ impl Take {
             ))?),
             Drive::Beat => None,
         };
+        if options.drive == Drive::Phases && e.gait.is_none() {
+            return Err(format!(
+                "the scene `{}` has no effects.gait, so no phase can move its shoulders; replay those (`--drive shoulders`), or add that table",
+                scene.name
+            ));
+        }
         // The body that is compared has its own carriers, whatever drives.
         if let Some(c) = driven.or(self.phases.as_ref()) {
             let per_carrier = match options.drive {
@@ -336,16 +347,24 @@ impl Take {
                 }
             }
         }
-        let starts_as_measured = self.start(&mut scene, from_s, options.drive);
+        let body_as_measured = self.start(&mut scene, given, from_s, options);
         if let Some(hz) = self.rate_hz() {
             scene.log_rate_hz = hz;
         }
         let epoch_ns = self.start_ns.saturating_add((from_s * 1e9).round() as i64);
         scene.epoch_s = epoch_ns.max(0) as f64 / 1e9;
+        scene.keep_to_freedoms();
         if scene.analysis_start_s >= scene.duration_s {
             scene.analysis_start_s = 0.0;
         }
         check(&scene).map_err(|p| format!("{}: {}", p.key, p.message))?;
+        // What poles, bristles and nerves were doing is in no recording; the scene that made it began it as it begins now.
+        let all_known = match options.made_by {
+            Some(made) if from_s <= AT_ONCE_S => {
+                scene.effects.flexure.is_none() || rest_alike(made, given)
+            }
+            _ => options.drive != Drive::Beat && Model::new(&scene).layout().extra == 0,
+        };
         Ok(Replay {
             epoch_ns,
             stretch_s: [from_s, to_s],
@@ -355,14 +374,14 @@ impl Take {
                 .measured
                 .as_ref()
                 .map_or(beats.len(), |m| m.t_s.len()),
-            starts_as_measured,
+            starts_as_measured: body_as_measured && all_known,
             scene,
         })
     }
 
     /// Starts the body as it was measured at `from_s`; whether all of it was. Its place over the ground stays the scene's, under which the
-    /// carriers stand, unless their shoulders were measured in the same frame.
-    fn start(&self, scene: &mut Scene, from_s: f64, drive: Drive) -> bool {
+    /// carriers stand, unless their shoulders were measured in the same frame, or walk and have not turned where those of the recording did.
+    fn start(&self, scene: &mut Scene, given: &Scene, from_s: f64, options: &Options) -> bool {
         let at = |field: &str| {
             let c = self.motion.get(field)?;
             let spline = Spline::new(&c.t_s, &c.x)?;
@@ -371,11 +390,23 @@ impl Take {
         };
         let three = |fields: [&str; 3]| Some(fields.map(|f| at(f).map(|[x, _]| x))).and_then(all);
         let walk = scene.carriers.walk_m_per_s;
+        let turned = (scene.effects.path.as_ref())
+            .is_some_and(|p| p.turn_deg != 0.0 && from_s > p.turn_start_s);
+        let one_frame = options.drive == Drive::Shoulders
+            || !turned
+                && self.state_topic == Some(STATE)
+                && (options.made_by).is_some_and(|made| made.carriers.walk_m_per_s == walk);
+        // Bent poles are so only where the body is left at rest.
+        let rests = scene.effects.flexure.is_some()
+            && from_s <= AT_ONCE_S
+            && (options.made_by).is_some_and(|made| rest_alike(made, given));
         let start = &mut scene.start;
-        if let (Drive::Shoulders, Some([x, _]), Some([y, _])) =
-            (drive, at("position_m.x"), at("position_m.y"))
+        let mut is_placed = false;
+        if let (true, Some([x, _]), Some([y, _])) =
+            (one_frame, at("position_m.x"), at("position_m.y"))
         {
             start.position_m = [x - walk[0] * from_s, y - walk[1] * from_s];
+            is_placed = true;
         }
         let angles = [at("roll_rad"), at("pitch_rad"), at("yaw_rad")];
         if angles[0].is_none() && angles[1].is_none() {
@@ -397,9 +428,11 @@ impl Take {
         let height = at("position_m.z").filter(|_| self.height_has_mean());
         match (velocity, height) {
             (Some(v), Some([z, _])) => {
-                start.height_m = Some(z - walk[2] * from_s);
+                if !rests {
+                    start.height_m = Some(z - walk[2] * from_s);
+                }
                 start.velocity_m_per_s = [0, 1, 2].map(|a| v[a] - walk[a]);
-                spin.is_some()
+                is_placed && spin.is_some()
             }
             // An inertial sensor knows no height: the body starts where it rests.
             _ => {
@@ -468,6 +501,11 @@ fn together(topic: &str, signals: &[&Signal], start_ns: i64) -> Option<Columns> 
             .map(|k| rows.values().map(|row| row[k]).collect())
             .collect(),
     })
+}
+
+/// Whether two scenes start alike where they start at rest.
+fn rest_alike(a: &Scene, b: &Scene) -> bool {
+    (&a.body, &a.carriers, &a.start, &a.effects) == (&b.body, &b.carriers, &b.start, &b.effects)
 }
 
 fn all([a, b, c]: [Option<f64>; 3]) -> Option<[f64; 3]> {

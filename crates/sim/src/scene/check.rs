@@ -6,6 +6,10 @@ use crate::body::Body;
 
 /// Most steps that a run of fixed steps may take: an hour or so of computing.
 const MOST_STEPS: f64 = 1e10;
+/// Stamps count seconds since 1970 in 32 bits with a sign.
+const LAST_STAMP_S: f64 = 2_147_483_647.0;
+/// A velocity that is given to three digits fits the freedoms if it differs by no more than this part.
+const ROUNDED: f64 = 1e-3;
 
 /// Checks everything that the types do not.
 ///
@@ -14,6 +18,15 @@ const MOST_STEPS: f64 = 1e10;
 pub fn check(scene: &Scene) -> Result<(), Problem> {
     Checker::positive("duration_s", scene.duration_s)?;
     Checker::positive("log_rate_hz", scene.log_rate_hz)?;
+    if scene.log_rate_hz > 1e9 {
+        return Err(problem(
+            "log_rate_hz",
+            format!(
+                "found {}, expected at most 1e9: stamps are whole nanoseconds",
+                shown(scene.log_rate_hz)
+            ),
+        ));
+    }
     let samples = scene.duration_s * scene.log_rate_hz;
     if samples > MOST_SAMPLES {
         let times = scene.log_rate_hz / super::default::log_rate_hz();
@@ -29,7 +42,7 @@ pub fn check(scene: &Scene) -> Result<(), Problem> {
     }
     Checker::not_negative("analysis_start_s", scene.analysis_start_s)?;
     Checker::not_negative("epoch_s", scene.epoch_s)?;
-    if scene.epoch_s + scene.duration_s > 9.2e9 {
+    if scene.epoch_s + scene.duration_s > LAST_STAMP_S {
         let key = if scene.duration_s > scene.epoch_s {
             "duration_s"
         } else {
@@ -37,7 +50,7 @@ pub fn check(scene: &Scene) -> Result<(), Problem> {
         };
         return Err(problem(
             key,
-            "the stamps would pass the year 2262, the last that nanoseconds in 64 bits can name",
+            "the stamps would pass the 19th of January 2038, the last day that seconds in 32 bits can name",
         ));
     }
     if scene.seed >> 56 != 0 {
@@ -122,6 +135,26 @@ pub fn check(scene: &Scene) -> Result<(), Problem> {
         "start.angular_velocity_rad_per_s",
         &start.angular_velocity_rad_per_s,
     )?;
+    if let Some(left) = crate::freedoms::start_velocities(scene) {
+        let asked = [
+            ("start.velocity_m_per_s", start.velocity_m_per_s),
+            (
+                "start.angular_velocity_rad_per_s",
+                start.angular_velocity_rad_per_s,
+            ),
+        ];
+        for ((key, asked), left) in asked.into_iter().zip(left) {
+            let size = |v: [f64; 3]| v.iter().map(|x| x * x).sum::<f64>().sqrt();
+            if size([0, 1, 2].map(|a| asked[a] - left[a])) > ROUNDED * size(asked) {
+                return Err(problem(
+                    key,
+                    format!(
+                        "found {asked:?}, of which the coordinates that `freedom` names can have {left:?}; free the others too, or leave out what is held"
+                    ),
+                ));
+            }
+        }
+    }
 
     if !(1e-13..=1e-1).contains(&scene.solver.tolerance) {
         return Err(problem(

@@ -78,6 +78,14 @@ impl Scene {
         }
         Ok(())
     }
+
+    /// Takes from the velocities at the start what the held coordinates do not let be.
+    pub fn keep_to_freedoms(&mut self) {
+        if let Some([velocity, spin]) = crate::freedoms::start_velocities(self) {
+            self.start.velocity_m_per_s = velocity;
+            self.start.angular_velocity_rad_per_s = spin;
+        }
+    }
 }
 
 pub(crate) mod default {

@@ -68,11 +68,15 @@ pub fn load(name_or_path: &str, settings: &[String]) -> Result<Scene, SceneError
 /// As [`load`].
 pub fn parse(origin: &str, text: &str, settings: &[String]) -> Result<Scene, SceneError> {
     let scene: Scene = from_toml(origin, text)?;
-    if let Some(key) = list_for_table(&from_toml(origin, text)?, &scene) {
+    let table: toml::Table = from_toml(origin, text)?;
+    if let Some(key) = list_for_table(&table, &scene) {
         let message = format!("{key}: found a list, expected a table");
         return Err(located(origin, text, find(text, &key), &message));
     }
     let checked = |scene: &mut Scene| scene.expand().and_then(|()| check(scene));
+    if let Some(places) = places_twice(&scene, &table) {
+        return Err(located(origin, text, find(text, HANDLES), &places));
+    }
     let mut changed = if settings.is_empty() {
         scene.clone()
     } else {
@@ -95,6 +99,28 @@ pub fn parse(origin: &str, text: &str, settings: &[String]) -> Result<Scene, Sce
         }
     })?;
     Ok(changed)
+}
+
+const HANDLES: &str = "carriers.handles_m";
+
+/// What is wrong where a scene's text places the carriers by hand and, elsewhere, along poles. A printed scene has both alike.
+fn places_twice(scene: &Scene, text: &toml::Table) -> Option<String> {
+    text.get("carriers")?.get("handles_m")?;
+    let mut along = scene.clone();
+    along.expand().ok()?;
+    (along.carriers.handles_m != scene.carriers.handles_m).then(|| {
+        format!(
+            "{HANDLES}: other places than those of carriers.along_poles; leave one of the two out"
+        )
+    })
+}
+
+/// What is wrong where settings give places by hand to carriers who stand along poles.
+fn overruled<'a>(table: &toml::Table, mut keys: impl Iterator<Item = &'a str>) -> Option<String> {
+    table.get("carriers")?.get("along_poles")?;
+    keys.any(|key| key.starts_with(HANDLES)).then(|| {
+        format!("{HANDLES}: carriers.along_poles places the carriers; take it away first with carriers.along_poles=false")
+    })
 }
 
 /// The key of a list that serde took for a table's values in their order, which nobody means.
@@ -207,6 +233,9 @@ impl Template {
             set_key(&mut table, &path, value).map_err(|m| fail(format!("{key}: {m}")))?;
             keys.push(key);
         }
+        if let Some(message) = overruled(&table, keys.iter().copied()) {
+            return Err(fail(message));
+        }
         let mut scene: Scene = table.try_into().map_err(|e: toml::de::Error| {
             fail(format!("{}: {}", keys.join(", "), readable(e.message())))
         })?;
@@ -222,6 +251,8 @@ impl Template {
 pub fn setting_value(text: &str) -> toml::Value {
     toml::from_str::<toml::Table>(&format!("x = {text}"))
         .ok()
+        // One line more would be another setting.
+        .filter(|t| t.len() == 1)
         .and_then(|mut t| t.remove("x"))
         .unwrap_or_else(|| toml::Value::String(text.into()))
 }
@@ -243,7 +274,8 @@ fn apply(scene: Scene, settings: &[String]) -> Result<Scene, SceneError> {
         let (key, value) = (key.trim(), value.trim());
         let path: Vec<&str> = key.split('.').collect();
         let parsed = setting_value(value);
-        let (takes_away, before) = (parsed == toml::Value::Boolean(false), table.clone());
+        let takes_away = parsed == toml::Value::Boolean(false) && may_be_absent(&path);
+        let before = table.clone();
         set_key(&mut table, &path, parsed).map_err(|m| fail(format!("{key}: {m}")))?;
         // One setting at a time, so that the message names the setting at fault.
         match toml::Table::try_into::<Scene>(table.clone()) {
@@ -256,27 +288,53 @@ fn apply(scene: Scene, settings: &[String]) -> Result<Scene, SceneError> {
             Err(e) if takes_away && e.message().starts_with("invalid type: boolean") => {
                 table = before;
             }
-            Err(e) => return Err(fail(format!("{setting}: {}", readable(e.message())))),
+            Err(e) => {
+                let setting = setting.replace('\n', " ");
+                return Err(fail(format!("{setting}: {}", readable(e.message()))));
+            }
         }
+    }
+    let keys = settings.iter().filter_map(|s| s.split('=').next());
+    if let Some(message) = overruled(&table, keys.map(str::trim)) {
+        return Err(fail(message));
     }
     table
         .try_into()
         .map_err(|e: toml::de::Error| fail(readable(e.message())))
 }
 
+/// Whether `KEY=false` takes a key away: what has no default but to be absent.
+fn may_be_absent(path: &[&str]) -> bool {
+    matches!(
+        path,
+        ["effects", _]
+            | ["start", "height_m"]
+            | ["carriers", "along_poles"]
+            | ["effects", "gait", "harmonics", _, "carriers"]
+            | ["effects", "imu", "sensors", _, "name"]
+    )
+}
+
 fn set_key(table: &mut toml::Table, path: &[&str], value: toml::Value) -> Result<(), String> {
+    let takes_away = value == toml::Value::Boolean(false) && may_be_absent(path);
+    put(table, path, value, takes_away)
+}
+
+fn put(
+    table: &mut toml::Table,
+    path: &[&str],
+    value: toml::Value,
+    takes_away: bool,
+) -> Result<(), String> {
     let (first, rest) = (path[0], &path[1..]);
     if first.is_empty() {
         return Err("an empty name in the key".into());
     }
     if rest.is_empty() {
-        // `effects.music=false` takes an effect away; whole numbers stand for reals where a real was.
-        if value == toml::Value::Boolean(false)
-            && !matches!(table.get(first), Some(toml::Value::Boolean(_)) | None)
-        {
-            table.remove(first);
+        if takes_away && table.remove(first).is_some() {
             return Ok(());
         }
+        // Whole numbers stand for reals where a real was.
         let value = match (table.get(first), value) {
             (Some(toml::Value::Float(_)), toml::Value::Integer(i)) => toml::Value::Float(i as f64),
             (_, v) => v,
@@ -293,7 +351,7 @@ fn set_key(table: &mut toml::Table, path: &[&str], value: toml::Value) -> Result
         .entry(first)
         .or_insert_with(|| toml::Value::Table(toml::Table::new()))
     {
-        toml::Value::Table(inner) => set_key(inner, rest, value),
+        toml::Value::Table(inner) => put(inner, rest, value, takes_away),
         toml::Value::Array(items) => {
             let index: usize = rest[0]
                 .parse()
@@ -304,7 +362,7 @@ fn set_key(table: &mut toml::Table, path: &[&str], value: toml::Value) -> Result
                 .ok_or_else(|| format!("`{first}` has {length} items, there is no item {index}"))?;
             match (item, &rest[1..]) {
                 (slot, []) => *slot = value,
-                (toml::Value::Table(inner), deeper) => set_key(inner, deeper, value)?,
+                (toml::Value::Table(inner), deeper) => put(inner, deeper, value, takes_away)?,
                 (toml::Value::Array(inner), [last]) => {
                     let i: usize = last
                         .parse()
@@ -330,7 +388,7 @@ fn readable(message: &str) -> String {
         ("invalid type: ", "found "),
         ("invalid value: ", "found "),
         ("expected f64", "expected a number"),
-        ("expected u64", "expected a whole number, zero to 2^63 - 1"),
+        ("expected u64", "expected a whole number, zero to 2^56 - 1"),
         ("expected u32", "expected a whole number, zero or more"),
         ("expected usize", "expected a whole number, zero or more"),
         ("expected a sequence", "expected a list"),

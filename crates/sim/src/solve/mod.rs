@@ -155,6 +155,16 @@ pub enum Stopped {
     },
 }
 
+impl Stopped {
+    /// What happened, without advice that only who chose method and tolerance can follow.
+    pub fn what(&self) -> String {
+        let said = self.to_string();
+        said.split("; ")
+            .next()
+            .map_or_else(String::new, str::to_owned)
+    }
+}
+
 type Run = fn(&Model, &Settings, &mut dyn Observer) -> (Stats, Result<(), Stopped>);
 
 /// One line of the table of methods.
