@@ -1026,6 +1026,33 @@ fn a_signal_is_the_same_in_whatever_order_it_comes() {
     }
 }
 
+/// Two messages of the clock's zero among those of a minute, in its midst and at its beginning, change neither rate, jitter nor what is drawn.
+#[test]
+fn early_messages_leave_the_rest_as_it_is() {
+    let folder = tempfile::tempdir().unwrap();
+    let page = folder.path().join("a.html");
+    for window in [&[][..], &["--window", "..50"]] {
+        let message = |k: u32| {
+            let t = f64::from(k) / 100.0;
+            let dated = if k % 3000 == 0 { t - 1.7e9 } else { t };
+            (dated, format!("{{\"v\":{}}}", 5.0 + tone(1.2345, t)))
+        };
+        let file = told(
+            folder.path(),
+            &[("/a", (0..6000).map(message).collect())],
+        );
+        let asked = [&file, "--format", "json", "--report", page.to_str().unwrap()];
+        let found = json(&[&asked, window].concat());
+        assert_eq!(kinds(&found), ["early"], "{found}");
+        let v = &found["signals"]["/a.v"];
+        assert!((v["hz"].as_f64().unwrap() - 100.0).abs() < 0.1, "{v}");
+        assert!(v["jitter_s"].as_f64().unwrap() < 1e-3, "{v}");
+        assert!((v["peak_hz"].as_f64().unwrap() - 1.2345).abs() < 0.01);
+        let drawn = std::fs::read_to_string(&page).unwrap();
+        assert!(!drawn.contains("-1700000000"));
+    }
+}
+
 /// A field that some messages lack, from somewhere on or in between, has the rate and the jitter of the messages that have it.
 #[test]
 fn a_field_has_the_times_of_its_messages() {
