@@ -377,6 +377,43 @@ fn appendable_structs_are_read_where_nothing_is_put_before_them() {
     );
 }
 
+/// Both ways to number the representations of XCDR2: what is plain is read, what is not is named.
+#[test]
+fn second_representations_have_two_numbers_each() {
+    let of = |representation: u8, big_endian: bool| {
+        let found = recording(&WriterOptions::default(), |writer| {
+            let channel = RawChannel {
+                topic: "/x",
+                message_encoding: "cdr",
+                schema_name: "p/msg/X",
+                schema_encoding: "ros2msg",
+                schema_data: b"uint32 a\nfloat64 b\n",
+                metadata: &BTreeMap::new(),
+            };
+            let channel = writer.raw_channel(&channel).expect("opens");
+            // Eight bytes stand at a multiple of four.
+            let (a, b) = match big_endian {
+                true => (9u32.to_be_bytes(), 2.5f64.to_be_bytes()),
+                false => (9u32.to_le_bytes(), 2.5f64.to_le_bytes()),
+            };
+            let message = [&[0, representation, 0, 0], &a[..], &b].concat();
+            (writer.message(channel, 0, message.as_slice())).expect("writes");
+        });
+        let (signals, _) = found.signals(&|_| true).expect("reads");
+        let mut values: Vec<f64> = signals.iter().map(|s| s.values[0]).collect();
+        values.sort_by(f64::total_cmp);
+        (values, lines(&found).concat())
+    };
+    for (representation, big_endian) in [(0x06, true), (0x07, false), (0x10, true), (0x11, false)] {
+        let found = of(representation, big_endian);
+        assert_eq!(found, (vec![2.5, 9.0], String::new()), "{representation}");
+    }
+    for (representation, name) in [(0x12, "list"), (0x13, "list"), (0x14, "delim"), (0x15, "delim")] {
+        let (values, said) = of(representation, false);
+        assert!(values.is_empty() && said.contains(name), "{said}");
+    }
+}
+
 /// Words that Python and others write though JSON does not have them are numbers that are not finite; in texts they are text.
 #[test]
 fn json_with_bare_words() {
