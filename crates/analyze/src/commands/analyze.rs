@@ -11,7 +11,6 @@ use analyze::roles::{RolesFile, matches, meant};
 use anyhow::{Context, bail};
 use recording::Kind;
 use recording::read::{ReadOptions, Recording, STDIN};
-use recording::text::counted;
 use recording::whole::{self, Output};
 
 use super::{AnalyzeArgs, Done, Format, Limits, annotate, complain, print};
@@ -158,15 +157,9 @@ fn one(path: &Path, args: &AnalyzeArgs, request: &Request) -> anyhow::Result<Ana
         }
     }
     if let Some(out) = &args.out {
-        let written = analyze::table::write(&recording, request, args.downsample, out)?;
+        let findings = analyze::table::write(&recording, request, args.downsample, out)?;
         let out = out.display();
-        if written.overlaid > 0 {
-            recording::note!(
-                "analyze: {out}: {} no row, because one of the same topic and time came after",
-                counted(written.overlaid, "message has", "messages have")
-            );
-        }
-        let limits = (written.findings.iter())
+        let limits = (findings.iter())
             .filter(|f| matches!(f.kind, Kind::LongSequence | Kind::OddSchema));
         for limit in limits.take(20) {
             recording::note!("analyze: {out}: {limit}");
