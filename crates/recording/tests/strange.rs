@@ -129,7 +129,9 @@ fn a_few_early_messages_begin_no_recording() {
         assert_eq!((start_s, early), (0.0, 1));
         assert_eq!(
             said,
-            ["early 1 message is dated 1700000000.000 s before all others: seconds are counted from the first of the others"]
+            [
+                "early 1 message is dated 1700000000.000 s before all others: seconds are counted from the first of the others"
+            ]
         );
         // Half of what the rest lasts.
         assert_eq!(begun(chunk_bytes, 1, 5_000_000_000).1, 0);
@@ -408,7 +410,12 @@ fn second_representations_have_two_numbers_each() {
         let found = of(representation, big_endian);
         assert_eq!(found, (vec![2.5, 9.0], String::new()), "{representation}");
     }
-    for (representation, name) in [(0x12, "list"), (0x13, "list"), (0x14, "delim"), (0x15, "delim")] {
+    for (representation, name) in [
+        (0x12, "list"),
+        (0x13, "list"),
+        (0x14, "delim"),
+        (0x15, "delim"),
+    ] {
         let (values, said) = of(representation, false);
         assert!(values.is_empty() && said.contains(name), "{said}");
     }
@@ -705,6 +712,41 @@ fn field(name: &str, number: i32, kind: Type, of: Option<&str>) -> FieldDescript
         r#type: Some(kind as i32),
         type_name: of.map(Into::into),
         ..FieldDescriptorProto::default()
+    }
+}
+
+/// The last member of a oneof counts, whatever came before in the message, and none of the message before.
+#[test]
+fn of_a_oneof_the_last_counts() {
+    let member = |name: &str, number: i32| FieldDescriptorProto {
+        oneof_index: Some(0),
+        ..field(name, number, Type::Uint32, None)
+    };
+    let message = DescriptorProto {
+        name: Some("P".into()),
+        field: vec![
+            field("v", 1, Type::Uint32, None),
+            member("a", 2),
+            member("b", 3),
+        ],
+        oneof_decl: vec![prost_types::OneofDescriptorProto {
+            name: Some("o".into()),
+            ..Default::default()
+        }],
+        ..DescriptorProto::default()
+    };
+    for (bytes, expected) in [
+        (&[8, 1, 16, 2, 24, 3][..], &["/p.b 3", "/p.v 1"][..]),
+        (&[24, 3, 16, 2, 8, 1], &["/p.a 2", "/p.v 1"]),
+        (&[16, 2, 24, 3, 16, 4], &["/p.a 4", "/p.v 0"]),
+    ] {
+        let found = one_message("proto3", message.clone(), bytes);
+        let (signals, _) = found.signals(&|_| true).expect("reads");
+        let mut told: Vec<String> = (signals.iter())
+            .map(|s| format!("{} {}", s.path, s.values[0]))
+            .collect();
+        told.sort();
+        assert_eq!(told, expected, "{bytes:?}");
     }
 }
 
