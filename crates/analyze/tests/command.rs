@@ -1437,6 +1437,60 @@ fn a_report_is_one_page_that_loads_nothing() {
     }
     for metric in analyze::metrics::METRICS {
         assert!(html.contains(metric.name), "{}", metric.name);
+/// A swing of two minutes with a hole of twelve seconds and one value that is none: the spectrogram is blank where most of a segment of eight seconds was not
+/// measured and has the line's strength elsewhere, the portrait is broken in the hole.
+#[test]
+fn what_was_not_measured_is_not_drawn() {
+    use analyze::report::plots::{Plot, plots};
+    let folder = tempfile::tempdir().unwrap();
+    let message = |k: u32| {
+        let t = f64::from(k) / 50.0;
+        let roll = match k {
+            900 => "NaN".to_owned(),
+            _ => (0.2 * tone(1.0, t)).to_string(),
+        };
+        (t, format!("{{\"roll\":{roll}}}"))
+    };
+    let there = |k: &u32| !(2500..3100).contains(k);
+    let messages = (0..6000).filter(there).map(message).collect();
+    let file = told(folder.path(), &[("/m", messages)]);
+    let roles = folder.path().join("roles.toml");
+    std::fs::write(&roles, "roll = \"/m.roll\"\n").unwrap();
+    let opened = Recording::open(Path::new(&file), &Default::default()).unwrap();
+    let request = analyze::examine::Request {
+        roles: Some(analyze::roles::RolesFile::read(&roles).unwrap()),
+        ..Default::default()
+    };
+    let found = analyze::examine::examine("told", &opened, &request).unwrap();
+    let (mut images, mut portraits) = (0, 0);
+    for plot in plots(&found) {
+        match plot {
+            Plot::Image(i) => {
+                images += 1;
+                let step_s = (i.x_range.1 - i.x_range.0) / i.values.len() as f64;
+                for (k, column) in i.values.iter().enumerate() {
+                    let middle_s = i.x_range.0 + (k as f64 + 0.5) * step_s;
+                    let most = column.iter().copied().fold(f64::NAN, f64::max);
+                    if (middle_s - 56.0).abs() < 5.5 {
+                        assert!(most.is_nan(), "{middle_s}: {most}");
+                    } else if (middle_s - 56.0).abs() > 6.5 {
+                        // 11.5° at 1 Hz, in a line of 0.19 Hz.
+                        assert!((most - 25.5).abs() < 3.0, "{middle_s}: {most}");
+                    }
+                }
+            }
+            Plot::Panel(p) if p.id == "portrait" => {
+                portraits += 1;
+                let y = &p.series[0].y;
+                assert_eq!(y.iter().filter(|y| y.is_nan()).count(), 1);
+                assert_eq!(p.series[0].x.len(), y.len());
+            }
+            Plot::Panel(_) => {}
+        }
+    }
+    assert_eq!((images, portraits), (1, 1));
+}
+
     }
     assert!(html.contains("--report") && html.contains("Spectrogram"));
 }

@@ -1,6 +1,7 @@
 //! `--figures DIR`: every plot as SVG and PNG, in one look, for papers and talks.
 
 use std::path::{Path, PathBuf};
+use std::sync::Arc;
 
 use kuva::backend::raster::RasterBackend;
 use kuva::backend::svg::SvgBackend;
@@ -313,13 +314,20 @@ fn image(i: &Image) -> Scene {
         .map(|b| {
             i.values
                 .iter()
-                .map(|column| column[b].max(high - 60.0))
+                // Not `max`, which takes the number where one is none.
+                .map(|column| match column[b] < high - 60.0 {
+                    true => high - 60.0,
+                    false => column[b],
+                })
                 .collect()
         })
         .collect();
     let map = Heatmap::new()
         .with_data(rows)
-        .with_color_map(ColorMap::Cividis)
+        .with_color_map(ColorMap::Custom(Arc::new(|level| match level.is_nan() {
+            true => "none".into(),
+            false => ColorMap::Cividis.map(level),
+        })))
         .with_x_range(i.x_range.0, i.x_range.1)
         .with_y_range(i.y_range.0, i.y_range.1)
         .with_cell_size(1.0);
