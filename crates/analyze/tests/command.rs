@@ -279,6 +279,8 @@ fn tables_for_people_fit_a_terminal() {
     for word in [
         "RMS roll",
         "mechanism",
+        "Topics",
+        "rath.State, protobuf",
         "Spectra",
         "Events",
         "Signals",
