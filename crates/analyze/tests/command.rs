@@ -489,6 +489,41 @@ fn no_signal_fits_where_all_is_lost() {
     assert!(said.contains(expected), "{said}");
 }
 
+/// What holds no numbers has topics all the same.
+#[test]
+fn topics_without_numbers_are_told() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("bytes.mcap");
+    let file = path.to_str().unwrap();
+    for encoding in ["cbor", "json"] {
+        let mut w = RecordingWriter::create(&path, &WriterOptions::default()).unwrap();
+        let channel = recording::write::RawChannel {
+            topic: "/a",
+            message_encoding: encoding,
+            schema_name: "",
+            schema_encoding: "",
+            schema_data: &[],
+            metadata: &Default::default(),
+        };
+        let channel = w.raw_channel(&channel).unwrap();
+        for k in 0..101 {
+            w.message(channel, k * 10_000_000, &b"{\"a\":\"text\"}"[..])
+                .unwrap();
+        }
+        w.finish().unwrap();
+        let v = json(&[file, "--format", "json"]);
+        let topic = &v["recording"]["topics"][0];
+        assert_eq!(topic["messages"], 101);
+        // When messages came that no decoder reads is not looked at.
+        assert!(encoding == "cbor" || topic["hz"] == 100.0, "{topic}");
+        assert_eq!(v["signals"], serde_json::json!({}));
+        let table = analyze(&[file]);
+        assert!(table.status.success() && text(&table.stdout).contains("/a"));
+        let out = analyze(&[file, "--signal", "*"]);
+        assert_eq!(out.status.code(), Some(1));
+    }
+}
+
 #[test]
 fn who_walks_alone_gets_no_order_parameter() {
     let folder = tempfile::tempdir().unwrap();
@@ -1168,7 +1203,11 @@ fn limits_are_named() {
         folder.path(),
         &[("/big", vec![(0.0, list.clone()), (1.0, list)])],
     );
-    let said = text(&analyze(&[&file]).stderr);
+    let done = analyze(&[&file]);
+    assert!(done.status.success(), "{}", text(&done.stderr));
+    let said = text(&done.stdout);
+    assert!(said.contains("a has more than 64 items"), "{said}");
+    let said = text(&analyze(&[&file, "--signal", "*"]).stderr);
     assert!(
         said.contains("a has more than 64 items (the limit --max-items)"),
         "{said}"
