@@ -355,8 +355,12 @@ fn csv_and_parquet_hold_the_signals() {
     assert_eq!(table.lines().count(), 1802);
     let other = folder.path().join("x.txt");
     let out = analyze(&[file.to_str().unwrap(), "--out", other.to_str().unwrap()]);
-    assert_eq!(out.status.code(), Some(1));
+    assert_eq!(out.status.code(), Some(2));
     assert!(!other.exists());
+    let twice = file.to_str().unwrap();
+    let out = analyze(&[twice, twice, "--out", csv.to_str().unwrap()]);
+    assert_eq!(out.status.code(), Some(2));
+    assert!(text(&out.stderr).contains("takes one recording"));
     #[cfg(feature = "tables")]
     {
         let parquet = folder.path().join("x.parquet");
@@ -575,7 +579,7 @@ fn no_input_is_written_over() {
         &[name, "--out", both, "--report", both],
     ] {
         let out = analyze(args);
-        assert_eq!(out.status.code(), Some(1), "{args:?}");
+        assert_eq!(out.status.code(), Some(2), "{args:?}");
         assert!(text(&out.stderr).contains("named twice"), "{args:?}");
     }
     // A pattern that fits two recordings names an output and an input.
@@ -583,7 +587,7 @@ fn no_input_is_written_over() {
     std::fs::copy(&file, &other).unwrap();
     for option in ["--report", "--out"] {
         let out = analyze(&[option, name, other.to_str().unwrap()]);
-        assert_eq!(out.status.code(), Some(1), "{option}");
+        assert_eq!(out.status.code(), Some(2), "{option}");
         let said = text(&out.stderr);
         assert!(said.contains("expected a name that ends in"), "{said}");
     }
@@ -917,7 +921,7 @@ fn a_recording_may_go_to_standard_output() {
     );
     for option in ["--out", "--annotate", "--report"] {
         let refused = run(&["belt.mcap", option, "-"]);
-        assert_eq!(refused.status.code(), Some(1));
+        assert_eq!(refused.status.code(), Some(2));
         let said = text(&refused.stderr);
         assert!(said.contains("standard output"), "{said}");
     }
@@ -1933,7 +1937,7 @@ fn a_recording_is_not_named_a_table() {
     ] {
         let out = analyze(args);
         let said = text(&out.stderr);
-        assert_eq!(out.status.code(), Some(1), "{said}");
+        assert_eq!(out.status.code(), Some(2), "{said}");
         assert!(
             said.lines().count() == 1 && said.contains("ends in .mcap"),
             "{said}"

@@ -13,7 +13,7 @@ use recording::Kind;
 use recording::read::{ReadOptions, Recording, STDIN};
 use recording::whole::{self, Output};
 
-use super::{AnalyzeArgs, Done, Format, Limits, annotate, complain, print};
+use super::{AnalyzeArgs, Done, Format, Limits, Usage, annotate, complain, print};
 
 pub(super) fn run(args: &AnalyzeArgs) -> anyhow::Result<Done> {
     let request = request(args)?;
@@ -33,17 +33,19 @@ pub(super) fn run(args: &AnalyzeArgs) -> anyhow::Result<Done> {
     let outputs: Vec<Output<'_>> = single.into_iter().filter_map(named).collect();
     for Output { option, path, .. } in &outputs {
         if *path == Path::new("-") {
-            bail!("{option}: standard output holds the result; name a file");
+            return Err(Usage::of(format!(
+                "{option}: standard output holds the result; name a file"
+            )));
         }
         if args.files.len() > 1 {
-            bail!(
+            return Err(Usage::of(format!(
                 "{option} takes one recording, but {} were given: run it once for each",
                 args.files.len()
-            );
+            )));
         }
     }
     let inputs = args.files.iter().chain(&args.roles).map(AsRef::as_ref);
-    whole::may_write(&outputs, inputs).map_err(anyhow::Error::msg)?;
+    whole::may_write(&outputs, inputs).map_err(Usage::of)?;
     let mut analyses = Vec::new();
     let mut failed = false;
     for file in &args.files {
@@ -162,8 +164,8 @@ fn one(path: &Path, args: &AnalyzeArgs, request: &Request) -> anyhow::Result<Ana
     if let Some(out) = &args.out {
         let findings = analyze::table::write(&recording, request, args.downsample, out)?;
         let out = out.display();
-        let limits = (findings.iter())
-            .filter(|f| matches!(f.kind, Kind::LongSequence | Kind::OddSchema));
+        let limits =
+            (findings.iter()).filter(|f| matches!(f.kind, Kind::LongSequence | Kind::OddSchema));
         for limit in limits.take(20) {
             recording::note!("analyze: {out}: {limit}");
         }
