@@ -1075,11 +1075,14 @@ fn early_messages_leave_the_rest_as_it_is() {
             let dated = if k % 3000 == 0 { t - 1.7e9 } else { t };
             (dated, format!("{{\"v\":{}}}", 5.0 + tone(1.2345, t)))
         };
-        let file = told(
-            folder.path(),
-            &[("/a", (0..6000).map(message).collect())],
-        );
-        let asked = [&file, "--format", "json", "--report", page.to_str().unwrap()];
+        let file = told(folder.path(), &[("/a", (0..6000).map(message).collect())]);
+        let asked = [
+            &file,
+            "--format",
+            "json",
+            "--report",
+            page.to_str().unwrap(),
+        ];
         let found = json(&[&asked, window].concat());
         assert_eq!(kinds(&found), ["early"], "{found}");
         let v = &found["signals"]["/a.v"];
@@ -1366,12 +1369,18 @@ fn messages_of_one_time_have_a_row_each() {
     };
     let one = [
         at(0.0, &[r#"{"a":1,"b":10}"#, r#"{"a":2}"#]),
-        at(0.1, &[r#"{"a":3}"#, r#"{"b":31}"#, r#"{"a":NaN,"b":-Infinity}"#]),
+        at(
+            0.1,
+            &[r#"{"a":3}"#, r#"{"b":31}"#, r#"{"a":NaN,"b":-Infinity}"#],
+        ),
     ];
     let topics = [
         ("/t", one.concat()),
         ("/t", at(0.1, &[r#"{"a":4}"#])),
-        ("/s", [at(0.0, &[r#"{"s":5}"#]), at(0.1, &[r#"{"s":6}"#])].concat()),
+        (
+            "/s",
+            [at(0.0, &[r#"{"s":5}"#]), at(0.1, &[r#"{"s":6}"#])].concat(),
+        ),
     ];
     let file = told(folder.path(), &topics);
     let table = folder.path().join("x.csv");
@@ -1431,57 +1440,6 @@ fn a_finding_says_where_and_when_once() {
 }
 
 /// What has no unit shares a scale with what is alike large only, and no panel uses a colour twice.
-#[test]
-fn signals_share_a_panel_where_one_scale_shows_them() {
-    let folder = tempfile::tempdir().unwrap();
-    let message = |k: u32| {
-        let t = f64::from(k) / 50.0;
-        let small = (0..9).map(|i| format!("\"v{i}\":{}", 1.0 + 0.1 * tone(f64::from(i + 1), t)));
-        let rest = format!(
-            "\"rpm\":{},\"torque\":{}",
-            3000.0 + t,
-            500.0 + 30.0 * tone(2.0, t)
-        );
-        let fields: Vec<String> = small.chain([rest]).collect();
-        (t, format!("{{{}}}", fields.join(",")))
-    };
-    let file = told(folder.path(), &[("/m", (0..500).map(message).collect())]);
-    let opened = Recording::open(Path::new(&file), &Default::default()).unwrap();
-    let request = analyze::examine::Request {
-        traces: true,
-        ..Default::default()
-    };
-    let found = analyze::examine::examine("told", &opened, &request).unwrap();
-    let panels: Vec<Vec<&str>> = found
-        .traces
-        .iter()
-        .map(|t| t.series.iter().map(|(name, ..)| &name[..]).collect())
-        .collect();
-    assert_eq!(
-        panels,
-        [
-            vec!["rpm", "torque"],
-            vec!["v0", "v1", "v2", "v3", "v4", "v5", "v6"],
-            vec!["v7", "v8"]
-        ]
-    );
-    assert_eq!(found.undrawn, 0);
-}
-
-#[test]
-fn a_report_is_one_page_that_loads_nothing() {
-    let folder = tempfile::tempdir().unwrap();
-    let file = recording(folder.path());
-    let page = folder.path().join("x.html");
-    let out = analyze(&[file.to_str().unwrap(), "--report", page.to_str().unwrap()]);
-    assert!(out.status.success(), "{}", text(&out.stderr));
-    let html = std::fs::read_to_string(&page).unwrap();
-    assert!(html.len() < 3_000_000, "{}", html.len());
-    for outside in ["src=\"http", "href=\"http", "@import", "url(http"] {
-        assert!(!html.contains(outside), "{outside}");
-    }
-    for metric in analyze::metrics::METRICS {
-        assert!(html.contains(metric.name), "{}", metric.name);
 /// A swing of two minutes with a hole of twelve seconds and one value that is none: the spectrogram is blank where most of a segment of eight seconds was not
 /// measured and has the line's strength elsewhere, the portrait is broken in the hole.
 #[test]
@@ -1536,6 +1494,57 @@ fn what_was_not_measured_is_not_drawn() {
     assert_eq!((images, portraits), (1, 1));
 }
 
+#[test]
+fn signals_share_a_panel_where_one_scale_shows_them() {
+    let folder = tempfile::tempdir().unwrap();
+    let message = |k: u32| {
+        let t = f64::from(k) / 50.0;
+        let small = (0..9).map(|i| format!("\"v{i}\":{}", 1.0 + 0.1 * tone(f64::from(i + 1), t)));
+        let rest = format!(
+            "\"rpm\":{},\"torque\":{}",
+            3000.0 + t,
+            500.0 + 30.0 * tone(2.0, t)
+        );
+        let fields: Vec<String> = small.chain([rest]).collect();
+        (t, format!("{{{}}}", fields.join(",")))
+    };
+    let file = told(folder.path(), &[("/m", (0..500).map(message).collect())]);
+    let opened = Recording::open(Path::new(&file), &Default::default()).unwrap();
+    let request = analyze::examine::Request {
+        traces: true,
+        ..Default::default()
+    };
+    let found = analyze::examine::examine("told", &opened, &request).unwrap();
+    let panels: Vec<Vec<&str>> = found
+        .traces
+        .iter()
+        .map(|t| t.series.iter().map(|(name, ..)| &name[..]).collect())
+        .collect();
+    assert_eq!(
+        panels,
+        [
+            vec!["rpm", "torque"],
+            vec!["v0", "v1", "v2", "v3", "v4", "v5", "v6"],
+            vec!["v7", "v8"]
+        ]
+    );
+    assert_eq!(found.undrawn, 0);
+}
+
+#[test]
+fn a_report_is_one_page_that_loads_nothing() {
+    let folder = tempfile::tempdir().unwrap();
+    let file = recording(folder.path());
+    let page = folder.path().join("x.html");
+    let out = analyze(&[file.to_str().unwrap(), "--report", page.to_str().unwrap()]);
+    assert!(out.status.success(), "{}", text(&out.stderr));
+    let html = std::fs::read_to_string(&page).unwrap();
+    assert!(html.len() < 3_000_000, "{}", html.len());
+    for outside in ["src=\"http", "href=\"http", "@import", "url(http"] {
+        assert!(!html.contains(outside), "{outside}");
+    }
+    for metric in analyze::metrics::METRICS {
+        assert!(html.contains(metric.name), "{}", metric.name);
     }
     assert!(html.contains("--report") && html.contains("Spectrogram"));
 }
