@@ -100,7 +100,15 @@ impl Envelope {
 
 /// The outline of a whole column.
 pub fn outline(t_s: &[f64], x: &[f64]) -> (Vec<f64>, Vec<f64>) {
-    let mut envelope = Envelope::default();
+    outline_of(t_s, x, 1)
+}
+
+/// The outline of a column in stretches of so many samples or more.
+pub fn outline_of(t_s: &[f64], x: &[f64], per: usize) -> (Vec<f64>, Vec<f64>) {
+    let mut envelope = Envelope {
+        per,
+        ..Envelope::default()
+    };
     t_s.iter().zip(x).for_each(|(t, x)| envelope.push(*t, *x));
     envelope.points()
 }

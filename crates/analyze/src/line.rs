@@ -1,7 +1,7 @@
 //! The strongest line of a signal, and what of its power lies near one.
 
 use crate::holes::{fill, memory};
-use crate::inputs::about_mean;
+use crate::inputs::{Even, about_mean};
 use crate::spectrum::{Taper, rfft, rfft_hz, rfft_magnitude};
 use crate::summary::rounding;
 
@@ -26,7 +26,9 @@ impl Line {
         if x.len() < 4 {
             return None;
         }
-        let (about, step_s) = whole(t_s, x)?;
+        let Even {
+            x: about, step_s, ..
+        } = whole(t_s, x)?;
         let magnitude = rfft_magnitude(&about);
         let hz_grid = rfft_hz(about.len(), step_s);
         // Ties go to the lowest frequency, as NumPy's argmax does.
@@ -63,8 +65,8 @@ const MEMORY_S: f64 = 1.0;
 /// By no more samples.
 const MEMORY: usize = 256;
 
-/// A signal about its mean on an even axis, drawn through its holes, and the step (s).
-fn whole(t_s: &[f64], x: &[f64]) -> Option<(Vec<f64>, f64)> {
+/// A signal about its mean on an even axis, drawn through its holes.
+pub(crate) fn whole(t_s: &[f64], x: &[f64]) -> Option<Even> {
     let mut even = about_mean(t_s, x)?;
     if !even.holes.is_empty() {
         fill(
@@ -75,7 +77,7 @@ fn whole(t_s: &[f64], x: &[f64]) -> Option<(Vec<f64>, f64)> {
         let mean = even.x.iter().sum::<f64>() / even.x.len() as f64;
         even.x.iter_mut().for_each(|x| *x -= mean);
     }
-    Some((even.x, even.step_s))
+    Some(even)
 }
 
 /// How far the strongest line of `x`, evenly spaced at `t_s`, is from the farthest one of at least half its power (Hz).
@@ -111,7 +113,7 @@ pub struct Shares {
 impl Shares {
     /// For a signal on an even time axis; `None` where it does not move, or for less than [`FEWEST_PERIODS`].
     pub fn of(t_s: &[f64], x: &[f64], f_hz: f64) -> Option<Self> {
-        let (x, step_s) = whole(t_s, x)?;
+        let Even { x, step_s, .. } = whole(t_s, x)?;
         if (x.len() as f64 + 0.5) * step_s * f_hz < FEWEST_PERIODS {
             return None;
         }

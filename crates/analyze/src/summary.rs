@@ -135,6 +135,9 @@ impl Moments {
 #[derive(Clone, Debug, Default)]
 pub struct Times {
     count: u64,
+    /// What is dated before (ns) tells neither rate nor order: it belongs to no time of the recording.
+    from_ns: Option<i64>,
+    early: u64,
     first_ns: i64,
     last_ns: i64,
     earliest_ns: i64,
@@ -166,13 +169,35 @@ const FIRST: u64 = 16;
 const MUCH_BACK: f64 = 0.01;
 
 impl Times {
+    /// Of a recording that begins then: what is dated before is counted only.
+    pub fn since(start_ns: i64) -> Self {
+        Times {
+            from_ns: Some(start_ns),
+            ..Times::default()
+        }
+    }
+
     /// The next log times.
     pub fn push(&mut self, times_ns: &[i64]) {
+        let early = |t: &i64| self.from_ns.is_some_and(|from_ns| *t < from_ns);
+        if !times_ns.iter().any(early) {
+            return self.push_known(times_ns);
+        }
+        let known = times_ns.iter().enumerate().filter(|(_, t)| !early(t));
+        let (places, known): (Vec<usize>, Vec<i64>) = known.map(|(k, t)| (k, *t)).unzip();
+        self.push_known(&known);
+        for gap in &mut self.gaps {
+            gap.before = places[gap.before];
+        }
+        self.early += (times_ns.len() - known.len()) as u64;
+    }
+
+    fn push_known(&mut self, times_ns: &[i64]) {
+        self.gaps.clear();
         let (Some(&first), Some(&last)) = (times_ns.first(), times_ns.last()) else {
             return;
         };
         self.buffer.clear();
-        self.gaps.clear();
         let place = usize::from(self.count == 0);
         if self.count == 0 {
             (self.first_ns, self.earliest_ns, self.latest_ns) = (first, first, first);
@@ -243,7 +268,7 @@ impl Times {
 
     /// Messages so far.
     pub fn count(&self) -> u64 {
-        self.count
+        self.count + self.early
     }
 
     /// Whether messages come so far from the order of their times that steps and spectra tell nothing, until they are put in order: a few that
@@ -495,6 +520,32 @@ mod tests {
         let mut odd = Times::default();
         odd.push(&[i64::MIN, i64::MAX, 5]);
         assert!(odd.hz().unwrap() > 0.0);
+    }
+
+    /// What is dated before the recording's start leaves the rest as it is, wherever it comes; gaps keep their places in the batch.
+    #[test]
+    fn early_messages_tell_no_rate() {
+        for batch in [1, 7, 10_000] {
+            let (mut times, mut places) = (Times::since(1_000_000_000), Vec::new());
+            let at = |k: i64| match k {
+                0 | 300 | 301 => k,
+                _ => 1_000_000_000 + k * 10_000_000 + if k < 600 { 0 } else { 5_000_000_000 },
+            };
+            let ns: Vec<i64> = (0..1001).map(at).collect();
+            for (b, ns) in ns.chunks(batch).enumerate() {
+                times.push(ns);
+                places.extend(times.gaps().iter().map(|gap| b * batch + gap.before));
+            }
+            assert_eq!(times.count(), 1001, "{batch}");
+            assert_eq!(places, [600], "{batch}");
+            let hz = times.hz_between_gaps().unwrap();
+            assert!((hz - 100.0).abs() < 0.5, "{batch}: {hz}");
+            assert!((times.hz().unwrap() - 997.0 / 14.99).abs() < 1e-9);
+            assert!(times.jitter_s().unwrap() < 0.2 && !times.backward());
+            // Where nothing came, nothing was lost.
+            times.push(&[]);
+            assert_eq!(times.gaps(), []);
+        }
     }
 
     /// A queue that is emptied at once, at the beginning or all the time, changes no rate, and hides no gap.

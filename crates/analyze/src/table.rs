@@ -1,12 +1,13 @@
-//! `--out`: the signals as one table, a row per time, a column per signal named by its path.
+//! `--out`: the signals as one table, a column per signal named by its path, a row per time: where a topic has several messages of one time, as many as
+//! the topic with most of them has, each row with one message of each topic.
 
-use std::collections::{BTreeMap, BTreeSet, HashMap};
+use std::collections::{BTreeMap, HashMap, HashSet};
 use std::io::Write;
 use std::path::Path;
 
 use recording::read::{ReadError, Recording};
 use recording::signal::field_of;
-use recording::{Finding, Signal};
+use recording::{Finding, Kind, Signal};
 
 use crate::examine::Request;
 use crate::quaternion::{ANGLES, angles};
@@ -45,28 +46,51 @@ pub enum TableError {
     },
 }
 
-/// Signals on one time axis, the union of their times. They are put on it block by block of rows, so that nothing is held but them.
-struct Table {
-    /// Log time of each row, nanoseconds, ascending.
-    time_ns: Vec<i64>,
-    start_ns: i64,
-    signals: Vec<Signal>,
-    written: Written,
+/// A row: its log time (ns), and which message of that time it holds of each topic.
+type Row = (i64, u32);
+
+/// A signal, and the number of each value's message among those of its topic and time; empty where none shares its time.
+struct Column {
+    signal: Signal,
+    nth: Vec<u32>,
 }
 
-/// What is to be said of a table that was written.
-#[derive(Debug, Default)]
-pub struct Written {
-    /// Messages that have no row, because one of the same topic and time came after them.
-    pub overlaid: u64,
-    /// What the reader remarked.
-    pub findings: Vec<Finding>,
+impl Column {
+    /// `shared` are the rows of those values whose messages share their times.
+    fn new(signal: Signal, shared: Option<&Vec<Row>>) -> Self {
+        let number = |shared: &Vec<Row>| {
+            let mut shared = shared.iter().peekable();
+            let mut of = |t: &i64| shared.next_if(|row| row.0 == *t).map_or(0, |row| row.1);
+            signal.times_ns.iter().map(&mut of).collect()
+        };
+        let nth = shared.map(number).unwrap_or_default();
+        Column { signal, nth }
+    }
+
+    /// The row of a value.
+    fn row(&self, k: usize) -> Row {
+        let nth = self.nth.get(k).copied().unwrap_or(0);
+        (self.signal.times_ns[k], nth)
+    }
+
+    fn rows(&self) -> impl Iterator<Item = Row> {
+        (0..self.signal.times_ns.len()).map(|k| self.row(k))
+    }
+}
+
+/// Signals on one axis, the union of their rows. They are put on it block by block of rows, so that nothing is held but them.
+struct Table {
+    /// Ascending.
+    rows: Vec<Row>,
+    start_ns: i64,
+    columns: Vec<Column>,
+    findings: Vec<Finding>,
 }
 
 impl Table {
     /// How many rows are put on the axis at a time: so many that a block has about four million cells.
     fn block_rows(&self) -> usize {
-        ((1 << 22) / self.signals.len().max(1)).clamp(1 << 10, 1 << 20)
+        ((1 << 22) / self.columns.len().max(1)).clamp(1 << 10, 1 << 20)
     }
 
     /// Seconds after the recording's first message.
@@ -76,7 +100,7 @@ impl Table {
 }
 
 /// Writes the signals that `request` names, all of them where it names none, in the window it names; one row of each topic in
-/// `downsample`.
+/// `downsample`. What the reader remarked.
 ///
 /// # Errors
 /// [`TableError`]; nothing is left under the final name then.
@@ -85,7 +109,7 @@ pub fn write(
     request: &Request,
     downsample: u64,
     out: &Path,
-) -> Result<Written, TableError> {
+) -> Result<Vec<Finding>, TableError> {
     let name = out.display().to_string();
     let kind = out
         .extension()
@@ -96,7 +120,7 @@ pub fn write(
         return Err(TableError::Kind(name));
     }
     let table = collect(recording, request, downsample)?;
-    if table.signals.is_empty() {
+    if table.columns.is_empty() {
         return Err(TableError::Empty(name));
     }
     let io = |source| TableError::Io {
@@ -113,7 +137,7 @@ pub fn write(
         Trouble::Io(source) => io(source),
         Trouble::Table(error) => error,
     })?;
-    Ok(table.written)
+    Ok(table.findings)
 }
 
 /// What can go wrong while a table is written.
@@ -138,18 +162,28 @@ fn collect(recording: &Recording, request: &Request, downsample: u64) -> Result<
                 .filter(|(_, last)| matches!(*last, "x" | "y" | "z" | "w"))
                 .is_some_and(|(prefix, _)| ANGLES.iter().any(|a| lists(&format!("{prefix}.{a}"))))
     };
-    let (mut signals, findings) = recording.signals(&select)?;
-    let derived: Vec<Signal> = quaternions(&signals);
-    signals.extend(derived);
-    signals.retain(|s| lists(&s.path));
-    signals.sort_by(|a, b| a.path.cmp(&b.path));
+    let (signals, findings) = recording.signals(&select)?;
+    let shared = match may_share(recording, &findings) {
+        true => shared(recording, &select)?,
+        false => HashMap::new(),
+    };
+    let columns = signals.into_iter().map(|signal| {
+        let of_signal = shared.get(&signal.path);
+        Column::new(signal, of_signal)
+    });
+    let mut columns: Vec<Column> = columns.collect();
+    let derived = quaternions(&columns);
+    columns.extend(derived);
+    columns.retain(|c| lists(&c.signal.path));
+    columns.sort_by(|a, b| a.signal.path.cmp(&b.signal.path));
     let start_ns = recording.info().start_ns;
     let seconds = |t: i64| (i128::from(t) - i128::from(start_ns)) as f64 / 1e9;
-    let inside = |t: &i64| request.holds(seconds(*t));
+    let inside = |row: &Row| request.holds(seconds(row.0));
     let channels = &recording.info().channels;
-    let mut topics: BTreeMap<&str, Rows> = BTreeMap::new();
+    let mut topics: BTreeMap<&str, Vec<Row>> = BTreeMap::new();
     let mut axes: Vec<*const i64> = Vec::new();
-    for s in &signals {
+    for c in &columns {
+        let s = &c.signal;
         // Complete signals of one topic share their axis: take it once.
         if !axes.contains(&s.times_ns.as_ptr()) {
             axes.push(s.times_ns.as_ptr());
@@ -157,117 +191,151 @@ fn collect(recording: &Recording, request: &Request, downsample: u64) -> Result<
             let topic = channels.iter().map(|c| c.topic.as_str()).filter(of);
             let topic = topic.max_by_key(|topic| topic.len()).unwrap_or_default();
             let rows = topics.entry(topic).or_default();
-            rows.take(s.times_ns.iter().copied().filter(inside));
+            rows.extend(c.rows().filter(inside));
+            // Stable: quick where two ascending runs become one.
+            rows.sort();
+            rows.dedup();
         }
     }
     // Each topic is thinned by itself, so that all keep rows.
     let step = usize::try_from(downsample).unwrap_or(usize::MAX).max(1);
-    let kept = topics
-        .values()
-        .flat_map(|rows| rows.times_ns.iter().step_by(step));
-    let mut time_ns: Vec<i64> = kept.copied().collect();
-    time_ns.sort_unstable();
-    time_ns.dedup();
-    let overlaid = topics.values().map(|rows| rows.again.len() as u64).sum();
+    let kept = topics.values().flat_map(|rows| rows.iter().step_by(step));
+    let mut rows: Vec<Row> = kept.copied().collect();
+    rows.sort_unstable();
+    rows.dedup();
     Ok(Table {
-        time_ns,
+        rows,
         start_ns,
-        signals,
-        written: Written { overlaid, findings },
+        columns,
+        findings,
     })
 }
 
-/// The messages of a topic, as its signals tell them.
-#[derive(Default)]
-struct Rows {
-    /// Their times, ascending, each once.
-    times_ns: Vec<i64>,
-    /// Times that come again, and how many messages came before in that time.
-    again: BTreeSet<(i64, u32)>,
+/// Whether messages of one topic may share a time, as far as channels and the reader's remarks tell.
+fn may_share(recording: &Recording, findings: &[Finding]) -> bool {
+    let odd = [Kind::Duplicate, Kind::Backward, Kind::Early];
+    let mut known = HashSet::new();
+    let mut channels = recording.info().channels.iter();
+    findings.iter().any(|f| odd.contains(&f.kind)) || !channels.all(|c| known.insert(&c.topic))
 }
 
-impl Rows {
-    /// Adds the times of a signal's values, which ascend.
-    fn take(&mut self, times_ns: impl Iterator<Item = i64>) {
-        let (mut last, mut before) = (None, 0);
-        for time_ns in times_ns {
-            if last == Some(time_ns) {
-                before += 1;
-                self.again.insert((time_ns, before));
-            } else {
-                (last, before) = (Some(time_ns), 0);
-                self.times_ns.push(time_ns);
+/// Of messages that share topic and time, the rows of their values, by the path of the signal, in the order of its values. Channels of one topic
+/// come in the order in which they begin, as in its signals.
+fn shared(
+    recording: &Recording,
+    select: &(dyn Fn(&str) -> bool + Sync),
+) -> Result<HashMap<String, Vec<Row>>, ReadError> {
+    let mut channels: Vec<usize> = Vec::new();
+    let mut came: HashMap<String, Vec<(i64, usize)>> = HashMap::new();
+    recording.stream(&|_| false, &mut |batch| {
+        let begun = channels.iter().position(|c| *c == batch.channel);
+        let place = begun.unwrap_or(channels.len());
+        if begun.is_none() {
+            channels.push(batch.channel);
+        }
+        let came = came.entry(batch.topic.to_owned()).or_default();
+        came.extend(batch.times_ns.iter().map(|t| (*t, place)));
+    })?;
+    // By channel and time: the number of the next message.
+    let mut next: HashMap<(usize, i64), u32> = HashMap::new();
+    for came in came.values_mut() {
+        came.sort_unstable();
+        for messages in came.chunk_by(|a, b| a.0 == b.0).filter(|m| m.len() > 1) {
+            for (nth, (t, place)) in (0..).zip(messages) {
+                next.entry((channels[*place], *t)).or_insert(nth);
             }
         }
-        // Stable: quick where two ascending runs become one.
-        self.times_ns.sort();
-        self.times_ns.dedup();
     }
+    let mut found: HashMap<String, Vec<Row>> = HashMap::new();
+    recording.stream(select, &mut |batch| {
+        let numbered = batch.times_ns.iter().map(|t| {
+            let next = next.get_mut(&(batch.channel, *t))?;
+            *next += 1;
+            Some((*t, *next - 1))
+        });
+        let rows: Vec<Option<Row>> = numbered.collect();
+        for column in batch.columns {
+            let found = found.entry(column.path.to_owned()).or_default();
+            match column.rows {
+                Some(there) => found.extend(there.iter().filter_map(|k| rows[*k as usize])),
+                None => found.extend(rows.iter().flatten()),
+            }
+        }
+    })?;
+    found.values_mut().for_each(|rows| rows.sort_unstable());
+    Ok(found)
 }
 
-/// The signal's last value at each time of a stretch of the axis, where it has one there; `next` is where the signal goes on.
-fn on_axis(s: &Signal, next: &mut usize, axis: &[i64]) -> Vec<Option<f64>> {
+/// The signal's value in each row of a stretch of the axis, where it has one there; `next` is where the signal goes on.
+fn on_axis(c: &Column, next: &mut usize, axis: &[Row]) -> Vec<Option<f64>> {
+    let values = &c.signal.values;
     let mut k = *next;
-    let values = axis
-        .iter()
-        .map(|at| {
-            while k < s.times_ns.len() && s.times_ns[k] < *at {
-                k += 1;
-            }
-            let mut value = None;
-            while k < s.times_ns.len() && s.times_ns[k] == *at {
-                value = Some(s.values[k]);
-                k += 1;
-            }
-            value.filter(|x| x.is_finite())
-        })
-        .collect();
+    let found = axis.iter().map(|at| {
+        while k < values.len() && c.row(k) < *at {
+            k += 1;
+        }
+        (k < values.len() && c.row(k) == *at).then(|| values[k])
+    });
+    let found = found.collect();
     *next = k;
-    values
+    found
 }
 
-/// Roll, pitch and yaw of every quaternion among the signals, when all of it is there; a field of such a name has it for itself.
-fn quaternions(signals: &[Signal]) -> Vec<Signal> {
-    let named: HashMap<&str, &Signal> = signals.iter().map(|s| (s.path.as_str(), s)).collect();
+/// Roll, pitch and yaw of every quaternion among the signals, where all of it is there and it is a rotation; a field of such a name has it for itself.
+fn quaternions(columns: &[Column]) -> Vec<Column> {
+    let named: HashMap<&str, &Column> = (columns.iter())
+        .map(|c| (c.signal.path.as_str(), c))
+        .collect();
     let mut out = Vec::new();
-    for w in signals {
-        let Some(prefix) = w.path.strip_suffix(".w") else {
+    for w in columns {
+        let Some(prefix) = w.signal.path.strip_suffix(".w") else {
             continue;
         };
         let at = |last: &str| named.get(format!("{prefix}.{last}").as_str());
         let (Some(x), Some(y), Some(z)) = (at("x"), at("y"), at("z")) else {
             continue;
         };
-        let (mut times_ns, mut values) = (Vec::new(), [const { Vec::new() }; 3]);
+        let (mut rows, mut values) = (Vec::new(), [const { Vec::new() }; 3]);
         let mut parts = [x, y, z, &w].map(|part| (part, 0));
-        for axis in w.times_ns.chunks(1 << 16) {
+        let all: Vec<Row> = w.rows().collect();
+        for axis in all.chunks(1 << 16) {
             let parts = parts.each_mut();
             let parts = parts.map(|(part, next)| on_axis(part, next, axis));
-            for (k, time_ns) in axis.iter().enumerate() {
-                if let [Some(x), Some(y), Some(z), Some(w)] = [0, 1, 2, 3].map(|i| parts[i][k]) {
-                    times_ns.push(*time_ns);
-                    for (values, angle) in values.iter_mut().zip(angles(x, y, z, w)) {
+            for (k, row) in axis.iter().enumerate() {
+                if let [Some(x), Some(y), Some(z), Some(w)] = [0, 1, 2, 3].map(|i| parts[i][k])
+                    && let angles = angles(x, y, z, w)
+                    && angles.iter().all(|angle| angle.is_finite())
+                {
+                    rows.push(*row);
+                    for (values, angle) in values.iter_mut().zip(angles) {
                         values.push(angle);
                     }
                 }
             }
         }
-        if values[0].iter().all(|roll: &f64| roll.is_nan()) {
+        if rows.is_empty() {
             continue;
         }
         // The axis of what is complete is shared.
-        let times_ns = match times_ns.len() == w.times_ns.len() {
-            true => w.times_ns.clone(),
-            false => times_ns.into(),
+        let times_ns = match rows.len() == all.len() {
+            true => w.signal.times_ns.clone(),
+            false => rows.iter().map(|row| row.0).collect(),
+        };
+        let nth: Vec<u32> = match w.nth.is_empty() {
+            true => Vec::new(),
+            false => rows.iter().map(|row| row.1).collect(),
         };
         for (angle, values) in ANGLES.iter().zip(values) {
             let path = format!("{prefix}.{angle}");
             if !named.contains_key(path.as_str()) {
-                out.push(Signal {
-                    path,
-                    unit: "rad".into(),
-                    times_ns: times_ns.clone(),
-                    values,
+                out.push(Column {
+                    signal: Signal {
+                        path,
+                        unit: "rad".into(),
+                        times_ns: times_ns.clone(),
+                        values,
+                    },
+                    nth: nth.clone(),
                 });
             }
         }
@@ -278,7 +346,7 @@ fn quaternions(signals: &[Signal]) -> Vec<Signal> {
 fn csv(table: &Table, out: &mut impl Write) -> std::io::Result<()> {
     let mut out = std::io::BufWriter::with_capacity(1 << 20, out);
     write!(out, "time_ns,t_s")?;
-    for s in &table.signals {
+    for Column { signal: s, .. } in &table.columns {
         let name = if s.unit.is_empty() {
             s.path.clone()
         } else {
@@ -287,12 +355,12 @@ fn csv(table: &Table, out: &mut impl Write) -> std::io::Result<()> {
         write!(out, ",{}", quoted(&name))?;
     }
     writeln!(out)?;
-    let mut next = vec![0; table.signals.len()];
-    for axis in table.time_ns.chunks(table.block_rows()) {
-        let columns: Vec<Vec<Option<f64>>> = (table.signals.iter().zip(&mut next))
-            .map(|(s, next)| on_axis(s, next, axis))
+    let mut next = vec![0; table.columns.len()];
+    for axis in table.rows.chunks(table.block_rows()) {
+        let columns: Vec<Vec<Option<f64>>> = (table.columns.iter().zip(&mut next))
+            .map(|(c, next)| on_axis(c, next, axis))
             .collect();
-        for (row, time_ns) in axis.iter().enumerate() {
+        for (row, (time_ns, _)) in axis.iter().enumerate() {
             write!(out, "{time_ns},{}", table.seconds(*time_ns))?;
             for values in &columns {
                 match values[row] {
@@ -336,7 +404,7 @@ fn parquet(table: &Table, out: &mut (impl Write + Send), name: &str) -> Result<(
         field("time_ns", Physical::INT64, Repetition::REQUIRED).map_err(problem)?,
         field("t_s", Physical::DOUBLE, Repetition::REQUIRED).map_err(problem)?,
     ];
-    for s in &table.signals {
+    for Column { signal: s, .. } in &table.columns {
         fields.push(field(&s.path, Physical::DOUBLE, Repetition::OPTIONAL).map_err(problem)?);
     }
     let schema = Arc::new(
@@ -346,9 +414,7 @@ fn parquet(table: &Table, out: &mut (impl Write + Send), name: &str) -> Result<(
             .map_err(problem)?,
     );
     // Units travel as metadata of the file, so that columns are named by their paths alone.
-    let units = table
-        .signals
-        .iter()
+    let units = (table.columns.iter().map(|c| &c.signal))
         .filter(|s| !s.unit.is_empty())
         .map(|s| KeyValue::new(format!("unit:{}", s.path), s.unit.clone()))
         .collect();
@@ -358,13 +424,14 @@ fn parquet(table: &Table, out: &mut (impl Write + Send), name: &str) -> Result<(
         .set_created_by(concat!("rath ", env!("CARGO_PKG_VERSION")).to_owned())
         .build();
     let mut file = SerializedFileWriter::new(out, schema, Arc::new(properties)).map_err(problem)?;
-    let rows = table.time_ns.len();
+    let rows = table.rows.len();
     // An empty table still has a row group.
     let group_rows = table.block_rows();
-    let mut next = vec![0; table.signals.len()];
+    let mut next = vec![0; table.columns.len()];
     for start in (0..rows.max(1)).step_by(group_rows) {
-        let axis = &table.time_ns[start..(start + group_rows).min(rows)];
-        let t_s: Vec<f64> = axis.iter().map(|t| table.seconds(*t)).collect();
+        let axis = &table.rows[start..(start + group_rows).min(rows)];
+        let time_ns: Vec<i64> = axis.iter().map(|row| row.0).collect();
+        let t_s: Vec<f64> = time_ns.iter().map(|t| table.seconds(*t)).collect();
         let mut group = file.next_row_group().map_err(problem)?;
         let mut column = 0;
         while let Some(mut writer) = group.next_column().map_err(problem)? {
@@ -372,7 +439,7 @@ fn parquet(table: &Table, out: &mut (impl Write + Send), name: &str) -> Result<(
                 0 => drop(
                     writer
                         .typed::<Int64Type>()
-                        .write_batch(axis, None, None)
+                        .write_batch(&time_ns, None, None)
                         .map_err(problem)?,
                 ),
                 1 => drop(
@@ -382,7 +449,7 @@ fn parquet(table: &Table, out: &mut (impl Write + Send), name: &str) -> Result<(
                         .map_err(problem)?,
                 ),
                 k => {
-                    let values = on_axis(&table.signals[k - 2], &mut next[k - 2], axis);
+                    let values = on_axis(&table.columns[k - 2], &mut next[k - 2], axis);
                     let present: Vec<f64> = values.iter().flatten().copied().collect();
                     let levels: Vec<i16> = values.iter().map(|v| i16::from(v.is_some())).collect();
                     writer

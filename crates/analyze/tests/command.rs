@@ -279,6 +279,8 @@ fn tables_for_people_fit_a_terminal() {
     for word in [
         "RMS roll",
         "mechanism",
+        "Topics",
+        "rath.State, protobuf",
         "Spectra",
         "Events",
         "Signals",
@@ -353,8 +355,12 @@ fn csv_and_parquet_hold_the_signals() {
     assert_eq!(table.lines().count(), 1802);
     let other = folder.path().join("x.txt");
     let out = analyze(&[file.to_str().unwrap(), "--out", other.to_str().unwrap()]);
-    assert_eq!(out.status.code(), Some(1));
+    assert_eq!(out.status.code(), Some(2));
     assert!(!other.exists());
+    let twice = file.to_str().unwrap();
+    let out = analyze(&[twice, twice, "--out", csv.to_str().unwrap()]);
+    assert_eq!(out.status.code(), Some(2));
+    assert!(text(&out.stderr).contains("takes one recording"));
     #[cfg(feature = "tables")]
     {
         let parquet = folder.path().join("x.parquet");
@@ -487,6 +493,41 @@ fn no_signal_fits_where_all_is_lost() {
     assert!(said.contains(expected), "{said}");
 }
 
+/// What holds no numbers has topics all the same.
+#[test]
+fn topics_without_numbers_are_told() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("bytes.mcap");
+    let file = path.to_str().unwrap();
+    for encoding in ["cbor", "json"] {
+        let mut w = RecordingWriter::create(&path, &WriterOptions::default()).unwrap();
+        let channel = recording::write::RawChannel {
+            topic: "/a",
+            message_encoding: encoding,
+            schema_name: "",
+            schema_encoding: "",
+            schema_data: &[],
+            metadata: &Default::default(),
+        };
+        let channel = w.raw_channel(&channel).unwrap();
+        for k in 0..101 {
+            w.message(channel, k * 10_000_000, &b"{\"a\":\"text\"}"[..])
+                .unwrap();
+        }
+        w.finish().unwrap();
+        let v = json(&[file, "--format", "json"]);
+        let topic = &v["recording"]["topics"][0];
+        assert_eq!(topic["messages"], 101);
+        // When messages came that no decoder reads is not looked at.
+        assert!(encoding == "cbor" || topic["hz"] == 100.0, "{topic}");
+        assert_eq!(v["signals"], serde_json::json!({}));
+        let table = analyze(&[file]);
+        assert!(table.status.success() && text(&table.stdout).contains("/a"));
+        let out = analyze(&[file, "--signal", "*"]);
+        assert_eq!(out.status.code(), Some(1));
+    }
+}
+
 #[test]
 fn who_walks_alone_gets_no_order_parameter() {
     let folder = tempfile::tempdir().unwrap();
@@ -538,7 +579,7 @@ fn no_input_is_written_over() {
         &[name, "--out", both, "--report", both],
     ] {
         let out = analyze(args);
-        assert_eq!(out.status.code(), Some(1), "{args:?}");
+        assert_eq!(out.status.code(), Some(2), "{args:?}");
         assert!(text(&out.stderr).contains("named twice"), "{args:?}");
     }
     // A pattern that fits two recordings names an output and an input.
@@ -546,7 +587,7 @@ fn no_input_is_written_over() {
     std::fs::copy(&file, &other).unwrap();
     for option in ["--report", "--out"] {
         let out = analyze(&[option, name, other.to_str().unwrap()]);
-        assert_eq!(out.status.code(), Some(1), "{option}");
+        assert_eq!(out.status.code(), Some(2), "{option}");
         let said = text(&out.stderr);
         assert!(said.contains("expected a name that ends in"), "{said}");
     }
@@ -656,7 +697,7 @@ fn a_topic_is_told_of_as_a_whole() {
     let n = &found["signals"]["/n"];
     assert_eq!(n["count"], 2000);
     assert!((n["hz"].as_f64().unwrap() - 200.0).abs() < 0.2, "{n}");
-    // A table has one row a time, and says what has none; a pattern that nothing fits is said beside one that fits.
+    // A table has a row for each message of a time; a pattern that nothing fits is said beside one that fits.
     let table = folder.path().join("n.csv");
     let out = analyze(&[
         file,
@@ -669,12 +710,9 @@ fn a_topic_is_told_of_as_a_whole() {
     ]);
     let said = text(&out.stderr);
     assert!(out.status.success(), "{said}");
-    assert!(
-        said.contains("1000 messages have no row") && said.contains("fits /m"),
-        "{said}"
-    );
+    assert!(said.contains("fits /m"), "{said}");
     let rows = std::fs::read_to_string(&table).unwrap().lines().count();
-    assert_eq!(rows, 1001);
+    assert_eq!(rows, 2001);
 }
 
 /// Messages of one channel: topic, and log time (s) and JSON text of each.
@@ -883,7 +921,7 @@ fn a_recording_may_go_to_standard_output() {
     );
     for option in ["--out", "--annotate", "--report"] {
         let refused = run(&["belt.mcap", option, "-"]);
-        assert_eq!(refused.status.code(), Some(1));
+        assert_eq!(refused.status.code(), Some(2));
         let said = text(&refused.stderr);
         assert!(said.contains("standard output"), "{said}");
     }
@@ -1026,6 +1064,36 @@ fn a_signal_is_the_same_in_whatever_order_it_comes() {
     }
 }
 
+/// Two messages of the clock's zero among those of a minute, in its midst and at its beginning, change neither rate, jitter nor what is drawn.
+#[test]
+fn early_messages_leave_the_rest_as_it_is() {
+    let folder = tempfile::tempdir().unwrap();
+    let page = folder.path().join("a.html");
+    for window in [&[][..], &["--window", "..50"]] {
+        let message = |k: u32| {
+            let t = f64::from(k) / 100.0;
+            let dated = if k % 3000 == 0 { t - 1.7e9 } else { t };
+            (dated, format!("{{\"v\":{}}}", 5.0 + tone(1.2345, t)))
+        };
+        let file = told(folder.path(), &[("/a", (0..6000).map(message).collect())]);
+        let asked = [
+            &file,
+            "--format",
+            "json",
+            "--report",
+            page.to_str().unwrap(),
+        ];
+        let found = json(&[&asked, window].concat());
+        assert_eq!(kinds(&found), ["early"], "{found}");
+        let v = &found["signals"]["/a.v"];
+        assert!((v["hz"].as_f64().unwrap() - 100.0).abs() < 0.1, "{v}");
+        assert!(v["jitter_s"].as_f64().unwrap() < 1e-3, "{v}");
+        assert!((v["peak_hz"].as_f64().unwrap() - 1.2345).abs() < 0.01);
+        let drawn = std::fs::read_to_string(&page).unwrap();
+        assert!(!drawn.contains("-1700000000"));
+    }
+}
+
 /// A field that some messages lack, from somewhere on or in between, has the rate and the jitter of the messages that have it.
 #[test]
 fn a_field_has_the_times_of_its_messages() {
@@ -1142,7 +1210,11 @@ fn limits_are_named() {
         folder.path(),
         &[("/big", vec![(0.0, list.clone()), (1.0, list)])],
     );
-    let said = text(&analyze(&[&file]).stderr);
+    let done = analyze(&[&file]);
+    assert!(done.status.success(), "{}", text(&done.stderr));
+    let said = text(&done.stdout);
+    assert!(said.contains("a has more than 64 items"), "{said}");
+    let said = text(&analyze(&[&file, "--signal", "*"]).stderr);
     assert!(
         said.contains("a has more than 64 items (the limit --max-items)"),
         "{said}"
@@ -1285,11 +1357,40 @@ fn a_topic_is_thinned_by_its_messages() {
     let expected: Vec<f64> = (0..60).map(|k| f64::from(10 * k)).collect();
     assert_eq!(found, expected);
     assert_eq!(column(&table, "/t.a").len(), 65);
-    // A message that has no row is counted once, however many fields it has.
-    let twice = |k: u32| (0.01 * f64::from(k / 2), message(k).1);
-    let file = told(folder.path(), &[("/t", (0..600).map(twice).collect())]);
-    let said = text(&analyze(&[&file, "--out", out]).stderr);
-    assert!(said.contains("300 messages have no row"), "{said}");
+}
+
+/// Messages of one time have a row each, whatever their fields are, and from whichever channel of the topic they come; other topics stand in the first. What is
+/// not finite is written as that, and is not what is not there.
+#[test]
+fn messages_of_one_time_have_a_row_each() {
+    let folder = tempfile::tempdir().unwrap();
+    let at = |t: f64, texts: &[&str]| -> Vec<(f64, String)> {
+        texts.iter().map(|x| (t, (*x).to_owned())).collect()
+    };
+    let one = [
+        at(0.0, &[r#"{"a":1,"b":10}"#, r#"{"a":2}"#]),
+        at(
+            0.1,
+            &[r#"{"a":3}"#, r#"{"b":31}"#, r#"{"a":NaN,"b":-Infinity}"#],
+        ),
+    ];
+    let topics = [
+        ("/t", one.concat()),
+        ("/t", at(0.1, &[r#"{"a":4}"#])),
+        (
+            "/s",
+            [at(0.0, &[r#"{"s":5}"#]), at(0.1, &[r#"{"s":6}"#])].concat(),
+        ),
+    ];
+    let file = told(folder.path(), &topics);
+    let table = folder.path().join("x.csv");
+    let done = analyze(&[&file, "--out", table.to_str().unwrap()]);
+    assert!(done.status.success(), "{}", text(&done.stderr));
+    let written = std::fs::read_to_string(&table).unwrap();
+    let rows: Vec<&str> = (written.lines().skip(1))
+        .map(|line| line.splitn(3, ',').last().unwrap())
+        .collect();
+    assert_eq!(rows, ["5,1,10", ",2,", "6,3,", ",,31", ",NaN,-inf", ",4,"]);
 }
 
 /// Messages that tell the angles of their quaternion themselves, in degrees; the first ones do not.
@@ -1339,6 +1440,60 @@ fn a_finding_says_where_and_when_once() {
 }
 
 /// What has no unit shares a scale with what is alike large only, and no panel uses a colour twice.
+/// A swing of two minutes with a hole of twelve seconds and one value that is none: the spectrogram is blank where most of a segment of eight seconds was not
+/// measured and has the line's strength elsewhere, the portrait is broken in the hole.
+#[test]
+fn what_was_not_measured_is_not_drawn() {
+    use analyze::report::plots::{Plot, plots};
+    let folder = tempfile::tempdir().unwrap();
+    let message = |k: u32| {
+        let t = f64::from(k) / 50.0;
+        let roll = match k {
+            900 => "NaN".to_owned(),
+            _ => (0.2 * tone(1.0, t)).to_string(),
+        };
+        (t, format!("{{\"roll\":{roll}}}"))
+    };
+    let there = |k: &u32| !(2500..3100).contains(k);
+    let messages = (0..6000).filter(there).map(message).collect();
+    let file = told(folder.path(), &[("/m", messages)]);
+    let roles = folder.path().join("roles.toml");
+    std::fs::write(&roles, "roll = \"/m.roll\"\n").unwrap();
+    let opened = Recording::open(Path::new(&file), &Default::default()).unwrap();
+    let request = analyze::examine::Request {
+        roles: Some(analyze::roles::RolesFile::read(&roles).unwrap()),
+        ..Default::default()
+    };
+    let found = analyze::examine::examine("told", &opened, &request).unwrap();
+    let (mut images, mut portraits) = (0, 0);
+    for plot in plots(&found) {
+        match plot {
+            Plot::Image(i) => {
+                images += 1;
+                let step_s = (i.x_range.1 - i.x_range.0) / i.values.len() as f64;
+                for (k, column) in i.values.iter().enumerate() {
+                    let middle_s = i.x_range.0 + (k as f64 + 0.5) * step_s;
+                    let most = column.iter().copied().fold(f64::NAN, f64::max);
+                    if (middle_s - 56.0).abs() < 5.5 {
+                        assert!(most.is_nan(), "{middle_s}: {most}");
+                    } else if (middle_s - 56.0).abs() > 6.5 {
+                        // 11.5° at 1 Hz, in a line of 0.19 Hz.
+                        assert!((most - 25.5).abs() < 3.0, "{middle_s}: {most}");
+                    }
+                }
+            }
+            Plot::Panel(p) if p.id == "portrait" => {
+                portraits += 1;
+                let y = &p.series[0].y;
+                assert_eq!(y.iter().filter(|y| y.is_nan()).count(), 1);
+                assert_eq!(p.series[0].x.len(), y.len());
+            }
+            Plot::Panel(_) => {}
+        }
+    }
+    assert_eq!((images, portraits), (1, 1));
+}
+
 #[test]
 fn signals_share_a_panel_where_one_scale_shows_them() {
     let folder = tempfile::tempdir().unwrap();
@@ -1791,7 +1946,7 @@ fn a_recording_is_not_named_a_table() {
     ] {
         let out = analyze(args);
         let said = text(&out.stderr);
-        assert_eq!(out.status.code(), Some(1), "{said}");
+        assert_eq!(out.status.code(), Some(2), "{said}");
         assert!(
             said.lines().count() == 1 && said.contains("ends in .mcap"),
             "{said}"

@@ -248,6 +248,53 @@ fn single_flipped_bits() {
     }
 }
 
+/// Message indexes say nothing that chunks do not: whatever bit of one's head is flipped, opcode, length, channel or inner length, every message is read.
+#[test]
+fn a_bad_message_index_costs_nothing() {
+    let options = mcap::WriteOptions::new()
+        .compression(None)
+        .chunk_size(Some(2000));
+    let mut bytes = std::io::Cursor::new(Vec::new());
+    let mut writer = options.create(&mut bytes).expect("begins");
+    let channels = ["/a", "/b"].map(|topic| {
+        let channel = writer.add_channel(0, topic, "json", &Default::default());
+        channel.expect("a channel")
+    });
+    for k in 0..600u64 {
+        let header = mcap::records::MessageHeader {
+            channel_id: channels[k as usize % 2],
+            sequence: k as u32,
+            log_time: 1_700_000_000_000_000_000 + k * 10_000_000,
+            publish_time: 0,
+        };
+        let data = format!("[{},{k}]", mix(k) >> 20);
+        let written = writer.write_to_known_channel(&header, data.as_bytes());
+        written.expect("writes");
+    }
+    writer.finish().expect("ends");
+    drop(writer);
+    let bytes = bytes.into_inner();
+    let whole = read(bytes.clone()).expect("reads").content;
+    let (mut at, mut indexes) = (8, Vec::new());
+    while at + 9 < bytes.len() {
+        let length = u64::from_le_bytes(bytes[at + 1..at + 9].try_into().expect("eight bytes"));
+        if bytes[at] == 0x07 {
+            indexes.push(at);
+        }
+        at += 9 + length as usize;
+    }
+    assert!(indexes.len() > 5, "{}", indexes.len());
+    for at in indexes {
+        for bit in 0..15 * 8 {
+            let mut bad = bytes.clone();
+            bad[at + bit / 8] ^= 1 << (bit % 8);
+            let found = read(bad).expect("reads").content;
+            let lost = whole.keys().filter(|key| !found.contains_key(key)).count();
+            assert_eq!(lost, 0, "bit {bit} of the index at {at}");
+        }
+    }
+}
+
 #[test]
 fn one_bad_chunk_costs_one_chunk() {
     let bytes = data("zstd.mcap");

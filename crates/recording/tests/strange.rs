@@ -89,8 +89,8 @@ fn oddities_are_said() {
     );
 }
 
-/// Latched messages stamped with nothing do not make half a century of a minute, in one chunk or many; what is more than an exception, or not far enough
-/// off, does.
+/// Latched messages stamped with nothing do not make half a century of a minute, in one chunk or many, and are neither steps back nor gaps; what is more than
+/// an exception, or not far enough off, does.
 #[test]
 fn a_few_early_messages_begin_no_recording() {
     let begun = |chunk_bytes: u64, early: i64, before_ns: i64| {
@@ -112,7 +112,6 @@ fn a_few_early_messages_begin_no_recording() {
         });
         let (said, info) = (lines(&found), found.info());
         assert_eq!(info.messages, 1000);
-        let said = said.into_iter().find(|line| line.starts_with("early"));
         ((info.start_ns - START_NS) as f64 / 1e9, info.early, said)
     };
     const HOUR_NS: i64 = 3_600_000_000_000;
@@ -122,15 +121,17 @@ fn a_few_early_messages_begin_no_recording() {
             (
                 0.0,
                 3,
-                Some("early 3 messages are dated up to 3600.000 s before all others: seconds are counted from the first of the others".into())
+                vec!["early 3 messages are dated up to 3600.000 s before all others: seconds are counted from the first of the others".into()]
             ),
             "{chunk_bytes}"
         );
         let (start_s, early, said) = begun(chunk_bytes, 1, START_NS);
         assert_eq!((start_s, early), (0.0, 1));
         assert_eq!(
-            said.unwrap(),
-            "early 1 message is dated 1700000000.000 s before all others: seconds are counted from the first of the others"
+            said,
+            [
+                "early 1 message is dated 1700000000.000 s before all others: seconds are counted from the first of the others"
+            ]
         );
         // Half of what the rest lasts.
         assert_eq!(begun(chunk_bytes, 1, 5_000_000_000).1, 0);
@@ -376,6 +377,48 @@ fn appendable_structs_are_read_where_nothing_is_put_before_them() {
             "undecodable /a: 1 message could not be decoded; the first, at 0.000 s: the message holds the @appendable struct p::In, delimited in XCDR2, which has no decoder"
         ]
     );
+}
+
+/// Both ways to number the representations of XCDR2: what is plain is read, what is not is named.
+#[test]
+fn second_representations_have_two_numbers_each() {
+    let of = |representation: u8, big_endian: bool| {
+        let found = recording(&WriterOptions::default(), |writer| {
+            let channel = RawChannel {
+                topic: "/x",
+                message_encoding: "cdr",
+                schema_name: "p/msg/X",
+                schema_encoding: "ros2msg",
+                schema_data: b"uint32 a\nfloat64 b\n",
+                metadata: &BTreeMap::new(),
+            };
+            let channel = writer.raw_channel(&channel).expect("opens");
+            // Eight bytes stand at a multiple of four.
+            let (a, b) = match big_endian {
+                true => (9u32.to_be_bytes(), 2.5f64.to_be_bytes()),
+                false => (9u32.to_le_bytes(), 2.5f64.to_le_bytes()),
+            };
+            let message = [&[0, representation, 0, 0], &a[..], &b].concat();
+            (writer.message(channel, 0, message.as_slice())).expect("writes");
+        });
+        let (signals, _) = found.signals(&|_| true).expect("reads");
+        let mut values: Vec<f64> = signals.iter().map(|s| s.values[0]).collect();
+        values.sort_by(f64::total_cmp);
+        (values, lines(&found).concat())
+    };
+    for (representation, big_endian) in [(0x06, true), (0x07, false), (0x10, true), (0x11, false)] {
+        let found = of(representation, big_endian);
+        assert_eq!(found, (vec![2.5, 9.0], String::new()), "{representation}");
+    }
+    for (representation, name) in [
+        (0x12, "list"),
+        (0x13, "list"),
+        (0x14, "delim"),
+        (0x15, "delim"),
+    ] {
+        let (values, said) = of(representation, false);
+        assert!(values.is_empty() && said.contains(name), "{said}");
+    }
 }
 
 /// Words that Python and others write though JSON does not have them are numbers that are not finite; in texts they are text.
@@ -669,6 +712,41 @@ fn field(name: &str, number: i32, kind: Type, of: Option<&str>) -> FieldDescript
         r#type: Some(kind as i32),
         type_name: of.map(Into::into),
         ..FieldDescriptorProto::default()
+    }
+}
+
+/// The last member of a oneof counts, whatever came before in the message, and none of the message before.
+#[test]
+fn of_a_oneof_the_last_counts() {
+    let member = |name: &str, number: i32| FieldDescriptorProto {
+        oneof_index: Some(0),
+        ..field(name, number, Type::Uint32, None)
+    };
+    let message = DescriptorProto {
+        name: Some("P".into()),
+        field: vec![
+            field("v", 1, Type::Uint32, None),
+            member("a", 2),
+            member("b", 3),
+        ],
+        oneof_decl: vec![prost_types::OneofDescriptorProto {
+            name: Some("o".into()),
+            ..Default::default()
+        }],
+        ..DescriptorProto::default()
+    };
+    for (bytes, expected) in [
+        (&[8, 1, 16, 2, 24, 3][..], &["/p.b 3", "/p.v 1"][..]),
+        (&[24, 3, 16, 2, 8, 1], &["/p.a 2", "/p.v 1"]),
+        (&[16, 2, 24, 3, 16, 4], &["/p.a 4", "/p.v 0"]),
+    ] {
+        let found = one_message("proto3", message.clone(), bytes);
+        let (signals, _) = found.signals(&|_| true).expect("reads");
+        let mut told: Vec<String> = (signals.iter())
+            .map(|s| format!("{} {}", s.path, s.values[0]))
+            .collect();
+        told.sort();
+        assert_eq!(told, expected, "{bytes:?}");
     }
 }
 

@@ -11,10 +11,9 @@ use analyze::roles::{RolesFile, matches, meant};
 use anyhow::{Context, bail};
 use recording::Kind;
 use recording::read::{ReadOptions, Recording, STDIN};
-use recording::text::counted;
 use recording::whole::{self, Output};
 
-use super::{AnalyzeArgs, Done, Format, Limits, annotate, complain, print};
+use super::{AnalyzeArgs, Done, Format, Limits, Usage, annotate, complain, print};
 
 pub(super) fn run(args: &AnalyzeArgs) -> anyhow::Result<Done> {
     let request = request(args)?;
@@ -34,17 +33,19 @@ pub(super) fn run(args: &AnalyzeArgs) -> anyhow::Result<Done> {
     let outputs: Vec<Output<'_>> = single.into_iter().filter_map(named).collect();
     for Output { option, path, .. } in &outputs {
         if *path == Path::new("-") {
-            bail!("{option}: standard output holds the result; name a file");
+            return Err(Usage::of(format!(
+                "{option}: standard output holds the result; name a file"
+            )));
         }
         if args.files.len() > 1 {
-            bail!(
+            return Err(Usage::of(format!(
                 "{option} takes one recording, but {} were given: run it once for each",
                 args.files.len()
-            );
+            )));
         }
     }
     let inputs = args.files.iter().chain(&args.roles).map(AsRef::as_ref);
-    whole::may_write(&outputs, inputs).map_err(anyhow::Error::msg)?;
+    whole::may_write(&outputs, inputs).map_err(Usage::of)?;
     let mut analyses = Vec::new();
     let mut failed = false;
     for file in &args.files {
@@ -142,7 +143,10 @@ fn one(path: &Path, args: &AnalyzeArgs, request: &Request) -> anyhow::Result<Ana
         recording = recording.searched();
         analysis = examine(&name, &recording, request)?;
     }
-    if analysis.is_empty() {
+    // Where all was read and there are no numbers, the topics are the answer.
+    let asked = !request.signals.is_empty() || !request.topics.is_empty();
+    let lost = analysis.quality.iter().any(|q| q.loss);
+    if analysis.is_empty() && (asked || lost || analysis.messages == 0) {
         bail!("{}", nothing(&analysis, request));
     }
     for pattern in &request.topics {
@@ -158,16 +162,10 @@ fn one(path: &Path, args: &AnalyzeArgs, request: &Request) -> anyhow::Result<Ana
         }
     }
     if let Some(out) = &args.out {
-        let written = analyze::table::write(&recording, request, args.downsample, out)?;
+        let findings = analyze::table::write(&recording, request, args.downsample, out)?;
         let out = out.display();
-        if written.overlaid > 0 {
-            recording::note!(
-                "analyze: {out}: {} no row, because one of the same topic and time came after",
-                counted(written.overlaid, "message has", "messages have")
-            );
-        }
-        let limits = (written.findings.iter())
-            .filter(|f| matches!(f.kind, Kind::LongSequence | Kind::OddSchema));
+        let limits =
+            (findings.iter()).filter(|f| matches!(f.kind, Kind::LongSequence | Kind::OddSchema));
         for limit in limits.take(20) {
             recording::note!("analyze: {out}: {limit}");
         }

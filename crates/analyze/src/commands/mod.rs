@@ -144,6 +144,17 @@ enum Done {
     Partly,
 }
 
+/// What was asked for cannot be, whatever is in the files.
+#[derive(Debug, thiserror::Error)]
+#[error("{0}")]
+struct Usage(String);
+
+impl Usage {
+    fn of(said: String) -> anyhow::Error {
+        Usage(said).into()
+    }
+}
+
 /// Parses the command line and runs the command; the exit code is the contract's.
 pub fn run() -> ExitCode {
     // Nothing half-written stays behind when the user interrupts.
@@ -162,7 +173,10 @@ pub fn run() -> ExitCode {
         Ok(Done::Partly) => ExitCode::FAILURE,
         Err(error) => {
             complain(&error);
-            ExitCode::FAILURE
+            match error.is::<Usage>() {
+                true => ExitCode::from(2),
+                false => ExitCode::FAILURE,
+            }
         }
     }
 }

@@ -12,7 +12,7 @@ use crate::envelope::Envelope;
 use crate::quality::Quality;
 use crate::quaternion::Quaternions;
 use crate::roles::{Role, Roles};
-use crate::summary::{Stream, Times, segment};
+use crate::summary::{Stream, Times, seconds, segment};
 
 /// So many times tell a rate.
 const FEW: u64 = 17;
@@ -72,8 +72,7 @@ impl Entry {
     }
 
     /// Takes all values anew, in the order of their times.
-    fn take_sorted(&mut self, (times_ns, x): (Vec<i64>, Vec<f64>)) {
-        let mut times = Times::default();
+    fn take_sorted(&mut self, mut times: Times, (times_ns, x): (Vec<i64>, Vec<f64>)) {
         times.push(&times_ns);
         (self.waiting, self.most) = (Some(Vec::new()), x.len() as u64);
         self.times = None;
@@ -132,7 +131,7 @@ impl<'a> Pass<'a> {
             recording,
             request,
             roles,
-            times: vec![Times::default(); info.channels.len()],
+            times: vec![Times::since(info.start_ns); info.channels.len()],
             entries: Vec::new(),
             whole: vec![Vec::new(); info.channels.len()],
             before: Times::default(),
@@ -214,7 +213,7 @@ impl<'a> Pass<'a> {
             waiting: Some(Vec::new()),
             most: self.messages[self.first[batch.channel]],
             came: 0,
-            times: late.then(Times::default),
+            times: late.then(|| Times::since(self.recording.info().start_ns)),
             kept: Vec::new(),
             outline: (self.request.traces && listed && !clock && !field.contains("covariance"))
                 .then(Envelope::default),
@@ -241,8 +240,9 @@ impl<'a> Pass<'a> {
             }
         };
         entry.came += values.len() as u64;
+        let from_ns = self.recording.info().start_ns;
         if entry.listed {
-            let start_ns = i128::from(self.recording.info().start_ns);
+            let start_ns = i128::from(from_ns);
             match self.request.window {
                 (None, None) => {
                     // A topic may come on several channels.
@@ -264,18 +264,16 @@ impl<'a> Pass<'a> {
                         .filter(|(t, _)| inside(**t))
                         .map(|(t, x)| (*t, *x))
                         .unzip();
-                    entry.times.get_or_insert_default().push(&kept);
+                    let own = entry.times.get_or_insert_with(|| Times::since(from_ns));
+                    own.push(&kept);
                     let shared = &self.times[batch.channel];
                     entry.take(&x, finite, shared, self.request.longest_s());
                 }
             }
         }
         if let Some(outline) = &mut entry.outline {
-            let start_ns = i128::from(self.recording.info().start_ns);
-            times
-                .iter()
-                .zip(values)
-                .for_each(|(t, x)| outline.push((i128::from(*t) - start_ns) as f64 / 1e9, *x));
+            let known = times.iter().zip(values).filter(|(t, _)| **t >= from_ns);
+            known.for_each(|(t, x)| outline.push(seconds(from_ns, *t), *x));
         }
         if entry.role.is_some() {
             let row = |k: usize| self.row + rows.map_or(k, |rows| rows[k] as usize);
@@ -355,12 +353,12 @@ impl<'a> Pass<'a> {
             }
             quaternions.each(batch, keep);
         })?;
-        let start_ns = i128::from(self.recording.info().start_ns);
+        let start_ns = self.recording.info().start_ns;
         for (entry, mut values) in self.entries.iter_mut().zip(found) {
-            values.retain(|(t, _)| self.request.holds((i128::from(*t) - start_ns) as f64 / 1e9));
+            values.retain(|(t, _)| self.request.holds(seconds(start_ns, *t)));
             values.sort_by_key(|(t, _)| *t);
             if !values.is_empty() {
-                entry.take_sorted(values.into_iter().unzip());
+                entry.take_sorted(Times::since(start_ns), values.into_iter().unzip());
             }
         }
         Ok(Vec::new())

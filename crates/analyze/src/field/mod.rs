@@ -161,6 +161,14 @@ impl Field {
         {
             signals.push(columns::came(recording, topic)?);
         }
+        let start_ns = recording.info().start_ns;
+        // What is dated long before all others belongs to no time of the recording.
+        for s in signals.iter_mut().filter(|_| recording.info().early > 0) {
+            let known = s.times_ns.iter().zip(&s.values);
+            let known = known.filter(|(t, _)| **t >= start_ns);
+            let (times_ns, values): (Vec<i64>, Vec<f64>) = known.unzip();
+            (s.times_ns, s.values) = (times_ns.into(), values);
+        }
         for (topic, factor) in factors.iter().filter(|(_, factor)| **factor > 1) {
             field.quality.push(Quality::remark(
                 topic,
@@ -168,7 +176,6 @@ impl Field {
                 format!("motion is estimated from means over {factor} samples each, so that memory stays small"),
             ));
         }
-        let start_ns = recording.info().start_ns;
         let columns = Columns { signals, start_ns };
         let sensors: Vec<&str> = imus.clone().map(String::as_str).collect();
         let stamped = [&sensors, roles.topic(Role::Truth).as_slice()].concat();

@@ -1,13 +1,14 @@
 //! `--figures DIR`: every plot as SVG and PNG, in one look, for papers and talks.
 
 use std::path::{Path, PathBuf};
+use std::sync::Arc;
 
 use kuva::backend::raster::RasterBackend;
 use kuva::backend::svg::SvgBackend;
 use kuva::plot::annotations::{ReferenceLine, ShadedRegion, TextAnnotation};
 use kuva::plot::legend::LegendPosition;
 use kuva::plot::{ColorMap, Heatmap, LinePlot, ScatterPlot};
-use kuva::render::layout::Layout;
+use kuva::render::layout::{Layout, TickFormat};
 use kuva::render::plots::Plot as Mark;
 use kuva::render::render::{Scene, render_multiple};
 
@@ -196,6 +197,11 @@ fn panel(p: &Panel) -> Scene {
     .with_x_axis_max(x1)
     .with_y_axis_min(range.0)
     .with_y_axis_max(range.1);
+    // The library writes three decimals.
+    let span = range.1 - range.0;
+    if span < 0.02 && y0.abs().max(y1.abs()) >= 0.01 {
+        layout.y_tick_format = TickFormat::Fixed((1.0 - span.log10()).ceil() as usize);
+    }
     if several {
         layout.show_legend = true;
         layout = layout.with_legend_position(LegendPosition::OutsideRightTop);
@@ -313,13 +319,20 @@ fn image(i: &Image) -> Scene {
         .map(|b| {
             i.values
                 .iter()
-                .map(|column| column[b].max(high - 60.0))
+                // Not `max`, which takes the number where one is none.
+                .map(|column| match column[b] < high - 60.0 {
+                    true => high - 60.0,
+                    false => column[b],
+                })
                 .collect()
         })
         .collect();
     let map = Heatmap::new()
         .with_data(rows)
-        .with_color_map(ColorMap::Cividis)
+        .with_color_map(ColorMap::Custom(Arc::new(|level| match level.is_nan() {
+            true => "none".into(),
+            false => ColorMap::Cividis.map(level),
+        })))
         .with_x_range(i.x_range.0, i.x_range.1)
         .with_y_range(i.y_range.0, i.y_range.1)
         .with_cell_size(1.0);
@@ -385,6 +398,21 @@ mod tests {
         assert!((high - low - 2.0).abs() < 1e-12, "{low} to {high}");
         assert_eq!(wide((0.8019, 0.802)), (0.8019, 0.802));
         assert_eq!(wide(NOTHING), (-1.0, 1.0));
+    }
+
+    /// Forty metres of latitude, in degrees.
+    #[test]
+    fn ticks_of_a_narrow_range_differ() {
+        let mut p = Panel::new("signals", "Latitude", "time, s", "deg");
+        p.series.push(Series {
+            x: vec![0.0, 1.0],
+            y: vec![31.1001, 31.1005],
+            ..Series::default()
+        });
+        let svg = SvgBackend::default().render_scene(&panel(&p));
+        for tick in ["31.10020", "31.10030", "31.10040"] {
+            assert!(svg.contains(tick), "{tick} in {svg}");
+        }
     }
 
     #[test]

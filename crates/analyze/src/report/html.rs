@@ -4,8 +4,9 @@ use std::fmt::Write;
 
 use serde_json::{Value, json};
 
-use super::plots::{COLOURS, Image, Panel, Plot, plots};
+use super::plots::{COLOURS, Image, Panel, Plot, Series, plots};
 use super::table::{figures, thousands};
+use crate::envelope::outline_of;
 use crate::examine::Analysis;
 use crate::metrics::{self, Datum};
 use recording::text::counted;
@@ -45,10 +46,13 @@ const MAP: [[u8; 3]; 9] = [
 const MOST_EVENTS: usize = 400;
 /// Signals listed.
 const MOST_SIGNALS: usize = 2000;
+/// Points of all curves over time together, of some 18 bytes each: a page stays below 3 MB however long the recording is.
+const MOST_POINTS: usize = 100_000;
 
 /// The page for one recording. `command` is the command line that makes it again.
 pub fn html(a: &Analysis, command: &str) -> String {
-    let plots = plots(a);
+    let mut plots = plots(a);
+    share(&mut plots);
     let mut out = String::with_capacity(1 << 20);
     let title = std::path::Path::new(&a.file)
         .file_name()
@@ -493,6 +497,39 @@ fn signals_section(out: &mut String, a: &Analysis) {
     out.push_str("</tbody></table></div></details>\n");
 }
 
+/// Curves over time that together have more points than the page may hold become coarser, the finest first: each keeps its extremes.
+fn share(plots: &mut [Plot]) {
+    let panels = plots.iter_mut().filter_map(|plot| match plot {
+        Plot::Panel(p) if p.time => Some(p),
+        _ => None,
+    });
+    let mut curves: Vec<&mut Series> = panels.flat_map(|p| &mut p.series).collect();
+    curves.sort_by_key(|s| s.x.len());
+    let (mut left, mut to_go) = (MOST_POINTS, curves.len());
+    for curve in curves {
+        let most = left / to_go;
+        if curve.x.len() > most {
+            let per = (2 * curve.x.len()).div_ceil(most.max(1));
+            let (x, y) = (std::mem::take(&mut curve.x), std::mem::take(&mut curve.y));
+            let mut from = 0;
+            for part in y.split_inclusive(|y| y.is_nan()) {
+                let to = from + part.len();
+                let (t_s, values) = outline_of(&x[from..to], part, per);
+                curve.x.extend(t_s);
+                curve.y.extend(values);
+                // The break is kept; it is no value of the outline.
+                if part.last().is_some_and(|y| y.is_nan()) {
+                    curve.x.push(x[to - 1]);
+                    curve.y.push(f64::NAN);
+                }
+                from = to;
+            }
+        }
+        left = left.saturating_sub(curve.x.len());
+        to_go -= 1;
+    }
+}
+
 /// What the script draws.
 fn data(plots: &[Plot]) -> Value {
     let all: Vec<Value> = plots
@@ -598,6 +635,34 @@ mod tests {
         ] {
             assert_eq!(coarse(x), shown);
         }
+    }
+
+    /// Forty long curves, one of them with a hole and a spike, and a short one.
+    #[test]
+    fn curves_share_the_page() {
+        let curve = |points: u32| Series {
+            x: (0..points).map(|k| f64::from(k) / 1.7).collect(),
+            y: (0..points).map(|k| f64::from(k).sin()).collect(),
+            ..Series::default()
+        };
+        let mut series = vec![curve(8000); 40];
+        (series[7].y[4000], series[7].y[5001]) = (f64::NAN, 9.0);
+        series.push(curve(50));
+        let mut p = Panel::new("signals", "", "", "");
+        (p.series, p.time) = (series, true);
+        let mut plots = vec![Plot::Panel(p)];
+        share(&mut plots);
+        let length = data(&plots).to_string().len();
+        assert!(length < 2_200_000, "{length}");
+        let [Plot::Panel(p)] = &plots[..] else {
+            unreachable!()
+        };
+        let points: usize = p.series.iter().map(|s| s.x.len()).sum();
+        assert!((90_000..=MOST_POINTS).contains(&points), "{points}");
+        assert_eq!(p.series[40].x.len(), 50);
+        let broken = &p.series[7];
+        assert!(broken.y.contains(&9.0) && broken.x.is_sorted());
+        assert_eq!(broken.y.iter().filter(|y| y.is_nan()).count(), 1);
     }
 
     #[test]

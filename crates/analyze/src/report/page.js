@@ -179,7 +179,7 @@
         const u = Math.min(1, Math.max(0, (spec.image[i][j] - lo) / (hi - lo))) * (data.map.length - 1);
         const a = Math.min(data.map.length - 2, Math.floor(u)), f = u - a, at = 4 * ((rows - 1 - j) * cols + i);
         for (let k = 0; k < 3; k++) pixels.data[at + k] = data.map[a][k] + f * (data.map[a + 1][k] - data.map[a][k]);
-        pixels.data[at + 3] = 255;
+        pixels.data[at + 3] = spec.image[i][j] === null ? 0 : 255;
       }
       ctx.putImageData(pixels, 0, 0);
       const group = el(this.svg, "g", { "clip-path": `url(#clip${plots.indexOf(this)})` });

@@ -2,7 +2,8 @@
 
 use crate::envelope::outline;
 use crate::examine::{Analysis, MOST_SERIES};
-use crate::inputs::{Even, Window, about_mean, stretches};
+use crate::inputs::{Even, Window, stretches};
+use crate::line::whole;
 use crate::peaks::SpectrumSummary;
 use crate::phase;
 use crate::spectrum::{Mode, Options, spectrogram};
@@ -100,8 +101,7 @@ impl Panel {
 
     /// A curve of what is finite, with a NaN in each of its holes: nothing is drawn through them.
     fn line(&mut self, name: impl Into<String>, t_s: &[f64], x: &[f64]) {
-        let known = t_s.iter().zip(x).filter(|(_, x)| x.is_finite());
-        let (t_s, values): (Vec<f64>, Vec<f64>) = known.unzip();
+        let (t_s, values) = finite(t_s, x);
         let mut parts = stretches(&t_s, 0.0);
         if parts.len() > MOST_PARTS {
             parts = vec![Range {
@@ -131,6 +131,12 @@ impl Panel {
     }
 }
 
+/// Times and values of what is finite.
+fn finite(t_s: &[f64], x: &[f64]) -> (Vec<f64>, Vec<f64>) {
+    let known = t_s.iter().zip(x).filter(|(_, x)| x.is_finite());
+    known.unzip()
+}
+
 /// A curve in more parts than this is something else than a signal with holes.
 const MOST_PARTS: usize = 50;
 
@@ -151,7 +157,7 @@ pub struct Image {
     pub x_range: (f64, f64),
     /// Lowest and highest frequency (Hz).
     pub y_range: (f64, f64),
-    /// `values[time][frequency]`.
+    /// `values[time][frequency]`; NaN where nothing was measured.
     pub values: Vec<Vec<f64>>,
 }
 
@@ -501,16 +507,10 @@ fn portrait(a: &Analysis) -> Option<Panel> {
         return None;
     }
     let range = inside(&i.t_s, a.window);
-    let (t_s, roll) = (&i.t_s[range.clone()], &i.roll_rad[range]);
+    let (t_s, roll_rad) = finite(&i.t_s[range.clone()], &i.roll_rad[range]);
     // A rath that does not roll has no portrait.
-    if !moves(roll) {
+    if !moves(&roll_rad) {
         return None;
-    }
-    let mut rate = vec![f64::NAN; roll.len()];
-    for stretch in stretches(t_s, 0.0) {
-        if let Some((first, _)) = derivatives(&t_s[stretch.clone()], &roll[stretch.clone()]) {
-            rate[stretch].copy_from_slice(&first);
-        }
     }
     let mut p = Panel::new(
         "portrait",
@@ -519,16 +519,26 @@ fn portrait(a: &Analysis) -> Option<Panel> {
         "roll rate, deg/s",
     );
     p.note = "A closed loop is a steady swing; a spiral grows or dies.".into();
-    let (x, y): (Vec<f64>, Vec<f64>) = roll
-        .iter()
-        .zip(&rate)
-        .filter(|(a, b)| a.is_finite() && b.is_finite())
-        .map(|(a, b)| (a.to_degrees(), b.to_degrees()))
-        .unzip();
+    let degrees = |x: &f64| x.to_degrees();
+    let step = thinned(roll_rad.len());
+    let (mut x, mut y) = (Vec::new(), Vec::new());
+    for part in stretches(&t_s, 0.0) {
+        let roll_rad = &roll_rad[part.clone()];
+        let Some((rate, _)) = derivatives(&t_s[part], roll_rad) else {
+            continue;
+        };
+        // Nobody knows the way through a hole.
+        if let Some(last) = x.last() {
+            x.push(*last);
+            y.push(f64::NAN);
+        }
+        x.extend(roll_rad.iter().step_by(step).map(degrees));
+        y.extend(rate.iter().step_by(step).map(degrees));
+    }
     p.series.push(Series {
         name: "roll".into(),
-        x: thin(x),
-        y: thin(y),
+        x,
+        y,
         ..Series::default()
     });
     Some(p)
@@ -551,25 +561,26 @@ fn force_plane(a: &Analysis) -> Option<Panel> {
         "force of handle 2, N",
     );
     p.note = "On the diagonal the handles carry alike; on an axis one of them is slack.".into();
+    let step = thinned(range.len());
     let both = first[range.clone()]
         .iter()
         .zip(&second[range])
-        .filter(|(a, b)| a.is_finite() && b.is_finite());
-    let (x, y): (Vec<f64>, Vec<f64>) = both.map(|(a, b)| (*a, *b)).unzip();
+        .filter(|(a, b)| a.is_finite() && b.is_finite())
+        .step_by(step);
+    let (x, y) = both.unzip();
     p.series.push(Series {
         name: "samples".into(),
-        x: thin(x),
-        y: thin(y),
+        x,
+        y,
         ..Series::default()
     });
     p.points = true;
     Some(p)
 }
 
-/// One in so many of a long curve in a plane: at most 4000.
-fn thin(x: Vec<f64>) -> Vec<f64> {
-    let step = x.len().div_ceil(4000).max(1);
-    x.into_iter().step_by(step).collect()
+/// Of so many points of a curve in a plane one in so many is drawn: at most 4000.
+fn thinned(points: usize) -> usize {
+    points.div_ceil(4000).max(1)
 }
 
 /// Length of a spectrogram's segment (s).
@@ -578,19 +589,19 @@ const SPECTROGRAM_SEGMENT_S: f64 = 8.0;
 /// Density of the roll over time, in decibels, over the whole recording.
 fn roll_spectrogram(a: &Analysis) -> Option<Image> {
     let i = &a.inputs;
-    if i.roll_rad.len() != i.t_s.len() || i.roll_rad.iter().any(|x| !x.is_finite()) {
+    if i.roll_rad.len() != i.t_s.len() || !moves(&i.roll_rad) {
         return None;
     }
-    // Dark where nothing was measured; not at all where that is most of it.
+    let (t_s, known_rad) = finite(&i.t_s, &i.roll_rad);
+    // Not at all where most of it was not measured.
     let Even {
-        x: roll, step_s, ..
-    } = about_mean(&i.t_s, &i.roll_rad)?;
-    if !moves(&i.roll_rad) {
-        return None;
-    }
+        x: roll,
+        step_s,
+        holes,
+    } = whole(&t_s, &known_rad)?;
     let fs_hz = 1.0 / step_s;
     let nperseg = (SPECTROGRAM_SEGMENT_S * fs_hz).round() as usize;
-    if roll.len() < i.roll_rad.len() || roll.len() < 2 * nperseg {
+    if roll.len() < known_rad.len() || roll.len() < 2 * nperseg {
         return None;
     }
     // About 240 columns, whatever the length.
@@ -614,16 +625,20 @@ fn roll_spectrogram(a: &Analysis) -> Option<Image> {
         return None;
     }
     let every = s.power.len().div_ceil(300).max(1);
-    let values: Vec<Vec<f64>> = s
-        .power
-        .iter()
+    // Whether nothing was measured in most of a segment.
+    let unknown = |k: usize| {
+        let (from, to) = (k * step, k * step + nperseg);
+        let lost = |hole: &Range<usize>| hole.end.min(to).saturating_sub(hole.start.max(from));
+        2 * holes.iter().map(lost).sum::<usize>() > nperseg
+    };
+    let values: Vec<Vec<f64>> = (s.power.iter().enumerate())
         .step_by(every)
         // Each segment is counted from its own mean: what is left at 0 Hz is none of the roll's.
-        .map(|p| {
-            p[1..bins]
-                .iter()
+        .map(|(k, p)| match unknown(k) {
+            true => vec![f64::NAN; bins - 1],
+            false => (p[1..bins].iter())
                 .map(|p| 10.0 * p.max(1e-12).log10())
-                .collect()
+                .collect(),
         })
         .collect();
     // A cell reaches half a step to either side of its middle.
@@ -633,12 +648,16 @@ fn roll_spectrogram(a: &Analysis) -> Option<Image> {
         id: "spectrogram",
         title: "Spectrogram of the roll".into(),
         note: format!(
-            "Segments of {SPECTROGRAM_SEGMENT_S:.0} s, {:.3} Hz apart.",
-            s.hz[1]
+            "Segments of {SPECTROGRAM_SEGMENT_S:.0} s, {:.3} Hz apart{}.",
+            s.hz[1],
+            match holes.is_empty() {
+                true => "",
+                false => "; blank where most of one was not measured",
+            }
         ),
         y_label: "frequency, Hz".into(),
         value_label: "dB re 1 deg²/Hz".into(),
-        x_range: (i.t_s[0] + s.t_s[0] - half_s, i.t_s[0] + last_s + half_s),
+        x_range: (t_s[0] + s.t_s[0] - half_s, t_s[0] + last_s + half_s),
         y_range: (s.hz[1] - half_hz, s.hz[bins - 1] + half_hz),
         values,
     })

@@ -9,6 +9,8 @@ use crate::metrics::{self, Datum, Value};
 
 /// Signals shown before the rest is only counted, unless the user named signals.
 const MOST_SIGNALS: usize = 40;
+/// Topics shown before the rest is only counted.
+const MOST_TOPICS: usize = 16;
 /// Events of one kind told one by one; more are counted.
 const MOST_EVENTS: usize = 3;
 /// Width of the whole table.
@@ -21,6 +23,7 @@ pub fn table(a: &Analysis, all_signals: bool) -> String {
     metrics_section(&mut out, a);
     spectra_section(&mut out, a);
     events_section(&mut out, a);
+    topics_section(&mut out, a);
     signals_section(&mut out, a, all_signals);
     quality_section(&mut out, a);
     out
@@ -90,6 +93,38 @@ fn head(out: &mut String, a: &Analysis) {
                 n => format!("{} messages are", thousands(n)),
             }
         );
+    }
+}
+
+fn topics_section(out: &mut String, a: &Analysis) {
+    if a.topics.is_empty() {
+        return;
+    }
+    line!(
+        out,
+        "\n{:<35} {:>9} {:>8}  schema, encoding",
+        "Topics",
+        "messages",
+        "Hz"
+    );
+    for t in a.topics.iter().take(MOST_TOPICS) {
+        let schema = match t.schema.as_str() {
+            "" => "–",
+            schema => schema,
+        };
+        let kind = format!("{}, {}", shortened(schema, 31), t.encoding);
+        line!(
+            out,
+            "  {:<33} {:>9} {:>8}  {}",
+            shortened(&t.name, 33),
+            thousands(t.messages),
+            t.hz.map_or("–".into(), short),
+            shortened(&kind, WIDTH - 56)
+        );
+    }
+    if a.topics.len() > MOST_TOPICS {
+        let more = a.topics.len() - MOST_TOPICS;
+        line!(out, "  … and {more} more: --format json lists all");
     }
 }
 

@@ -77,12 +77,13 @@ impl Cdr {
         let (big_endian, second) = match representation {
             0x00 => (true, false),
             0x01 => (false, false),
-            0x06 => (true, true),
-            0x07 => (false, true),
-            0x02 | 0x03 | 0x0a | 0x0b => {
+            // Writers number XCDR2 in two ways.
+            0x06 | 0x10 => (true, true),
+            0x07 | 0x11 => (false, true),
+            0x02 | 0x03 | 0x0a | 0x0b | 0x12 | 0x13 => {
                 return Err("the message is a CDR parameter list, which has no decoder".to_owned());
             }
-            0x08 | 0x09 => {
+            0x08 | 0x09 | 0x14 | 0x15 => {
                 return Err("the message is delimited CDR, which has no decoder".to_owned());
             }
             other => {

@@ -25,9 +25,12 @@ pub(super) mod op {
     pub const MESSAGE: u8 = 0x05;
     pub const CHUNK: u8 = 0x06;
     pub const MESSAGE_INDEX: u8 = 0x07;
+    pub const CHUNK_INDEX: u8 = 0x08;
     pub const ATTACHMENT: u8 = 0x09;
+    pub const ATTACHMENT_INDEX: u8 = 0x0a;
     pub const STATISTICS: u8 = 0x0b;
     pub const METADATA: u8 = 0x0c;
+    pub const METADATA_INDEX: u8 = 0x0d;
     pub const SUMMARY_OFFSET: u8 = 0x0e;
     pub const DATA_END: u8 = 0x0f;
 }
@@ -546,7 +549,24 @@ impl<'a> Walk<'a> {
             op::METADATA => fields.skip_text().and_then(|_| fields.u32()).is_some(),
             op::STATISTICS => body.len() >= 42,
             op::DATA_END => body.len() >= 4,
-            0x08 | 0x0a | 0x0d | op::SUMMARY_OFFSET => true,
+            op::CHUNK_INDEX => fields
+                .take(8 * 4)
+                .and_then(|_| fields.u32())
+                .and_then(|length| fields.take(u64::from(length)))
+                .and_then(|_| fields.u64())
+                .and_then(|_| fields.skip_text())
+                .and_then(|_| fields.take(8 + 8))
+                .is_some(),
+            op::ATTACHMENT_INDEX => fields
+                .take(8 * 5)
+                .and_then(|_| fields.skip_text())
+                .and_then(|_| fields.skip_text())
+                .is_some(),
+            op::METADATA_INDEX => fields
+                .take(8 + 8)
+                .and_then(|_| fields.skip_text())
+                .is_some(),
+            op::SUMMARY_OFFSET => body.len() >= 1 + 8 + 8,
             // Opcodes from 0x80 on are private; those between are unknown, and readers must step over them.
             _ => opcode != 0,
         };
@@ -581,6 +601,16 @@ impl<'a> Walk<'a> {
         })
     }
 
+    /// Whether the record at `at`, which ends at `end`, is followed by another, whole or cut. Where its inner lengths could vouch for its own and do not,
+    /// one that only may be a record is not enough: in the midst of a chunk there are many. No record begins inside an index.
+    fn followed(&self, at: usize, end: usize) -> bool {
+        match self.bytes[at] {
+            op::MESSAGE_INDEX => false,
+            op::CHUNK => self.plausible(end) || self.cut_record(end),
+            _ => self.possible(end).is_some() || self.cut_record(end),
+        }
+    }
+
     /// Whether the record at `at` vouches for its own length: its inner lengths use it up.
     fn tight(&self, at: usize, end: usize) -> bool {
         let body = &self.bytes[at + 9..end];
@@ -612,9 +642,8 @@ impl<'a> Walk<'a> {
                 Some(end) => {
                     let believed = end == end_of_file
                         || self.bytes[at] == op::FOOTER
-                        || self.possible(end).is_some()
-                        || self.cut_record(end)
-                        || self.tight(at, end);
+                        || self.tight(at, end)
+                        || self.followed(at, end);
                     // A record that leads nowhere is sound where nothing better begins inside it.
                     match if believed { None } else { self.resync(at + 9) } {
                         Some(next) if next < end => Some(next),

@@ -216,6 +216,10 @@ impl<'a> Input<'a> {
 /// The plan of one message, at one place.
 struct Node {
     fields: Vec<(u64, Plan)>,
+    /// By field number of a member of a oneof: which one that is.
+    oneofs: HashMap<u64, usize>,
+    /// By oneof: the place of the member that came last.
+    chosen: Vec<usize>,
     present: bool,
     stamp: bool,
 }
@@ -337,7 +341,13 @@ impl Node {
             field,
             "timestamp" | "stamp" | "header.stamp" | "header.timestamp"
         ) && descriptor.full_name() == "google.protobuf.Timestamp";
+        let mut oneofs = HashMap::new();
+        for (k, oneof) in descriptor.oneofs().enumerate() {
+            oneofs.extend(oneof.fields().map(|field| (u64::from(field.number()), k)));
+        }
         Node {
+            chosen: vec![0; descriptor.oneofs().len()],
+            oneofs,
             fields,
             present: false,
             stamp,
@@ -379,6 +389,13 @@ impl Node {
                 continue;
             };
             hint = position + 1;
+            // Of a oneof the last member counts, and the others are as if they had not come.
+            if let Some(&oneof) = self.oneofs.get(&number) {
+                let before = std::mem::replace(&mut self.chosen[oneof], position);
+                if before != position && self.oneofs.get(&self.fields[before].0) == Some(&oneof) {
+                    self.fields[before].1.flush(rows, false);
+                }
+            }
             self.fields[position]
                 .1
                 .read(input, wire, number, depth, rows)?;

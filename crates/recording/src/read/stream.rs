@@ -235,6 +235,23 @@ fn wait_for(
     }
 }
 
+/// Runs of messages whose log times are `kept`, with their stamps, where there are some.
+fn known<'a>(
+    times: &'a [i64],
+    stamps: &'a [i64],
+    kept: impl Fn(i64) -> bool + 'a,
+) -> impl Iterator<Item = (&'a [i64], &'a [i64])> {
+    let mut from = 0;
+    std::iter::from_fn(move || {
+        from += times[from..].iter().take_while(|t| !kept(**t)).count();
+        let run = times[from..].iter().take_while(|t| kept(**t)).count();
+        let to = from + run;
+        let found = (&times[from..to], stamps.get(from..to).unwrap_or_default());
+        from = to;
+        (run > 0).then_some(found)
+    })
+}
+
 /// What is known about a channel while its batches come in.
 #[derive(Default)]
 struct Watch {
@@ -399,10 +416,17 @@ impl<'a> Taker<'a> {
     fn batch(&mut self, batch: &mut ChannelBatch, sink: &mut dyn FnMut(&Batch<'_>)) {
         let watch = &mut self.watches[batch.channel];
         watch.messages += batch.times.len() as u64;
-        watch.log.observe(&batch.times);
-        if !batch.stamps.is_empty() {
-            watch.clocks.observe(&batch.times, &batch.stamps);
-            watch.stamps.observe(&batch.stamps);
+        // What is dated long before all others tells neither order nor drift.
+        let from_ns = match self.recording.info.early {
+            0 => i64::MIN,
+            _ => self.start_ns,
+        };
+        for (times, stamps) in known(&batch.times, &batch.stamps, |t| t >= from_ns) {
+            watch.log.observe(times);
+            if !stamps.is_empty() {
+                watch.clocks.observe(times, stamps);
+                watch.stamps.observe(stamps);
+            }
         }
         add(&mut watch.absent, std::mem::take(&mut batch.absent));
         add(&mut watch.long, std::mem::take(&mut batch.long));
