@@ -196,6 +196,6 @@ mod tests {
         };
         // 0.3/√n, and where they differ by more Student's t: 12.7062 of SD/√2, which is a half of their distance.
         assert!((half(&[2.0, 2.0, 2.0, 2.0].map(file)) - 0.15).abs() < 1e-12);
-        assert!((half(&[2.0, 3.0].map(file)) - 12.7062 * 0.5).abs() < 1e-9);
+        assert!((half(&[2.0, 3.0].map(file)) - 12.706_204_736 * 0.5).abs() < 1e-9);
     }
 }
