@@ -93,15 +93,15 @@ pub struct RolesFile {
     roll: Option<String>,
     pitch: Option<String>,
     yaw: Option<String>,
-    #[serde(default)]
+    #[serde(default, deserialize_with = "one_or_more")]
     forces: Vec<String>,
-    #[serde(default)]
+    #[serde(default, deserialize_with = "one_or_more")]
     phases: Vec<String>,
     beat_phase: Option<String>,
     /// The first is what motion is estimated from; others on the load are held against it.
     #[serde(default, deserialize_with = "one_or_more")]
     imu: Vec<String>,
-    #[serde(default)]
+    #[serde(default, deserialize_with = "one_or_more")]
     carriers: Vec<String>,
     beats: Option<String>,
     truth: Option<String>,
@@ -146,7 +146,7 @@ pub enum AngleUnit {
 /// One name, or a list of them.
 fn one_or_more<'de, D: serde::Deserializer<'de>>(from: D) -> Result<Vec<String>, D::Error> {
     #[derive(Deserialize)]
-    #[serde(untagged, expecting = "expected a topic or a list of topics")]
+    #[serde(untagged, expecting = "expected a name or a list of names")]
     enum Names {
         One(String),
         More(Vec<String>),
@@ -243,6 +243,9 @@ impl RolesFile {
         }
     }
 }
+
+/// Schema of a sound.
+pub(crate) const SOUND: &str = "foxglove.RawAudio";
 
 /// How a message type plays roles when nobody says otherwise: (schema, role, field pattern).
 const BY_SCHEMA: &[(&str, Role, &str)] = &[
@@ -416,14 +419,72 @@ impl Roles {
                 accel_bias_m_per_s2: user.accel_bias_m_per_s2,
             };
             for role in Role::ALL {
-                let said = user.patterns(role);
-                if !said.is_empty() {
-                    roles.patterns.insert(role, said);
-                    roles.said.insert(role);
+                let mut said = user.patterns(role);
+                if said.is_empty() {
+                    continue;
                 }
+                if role.is_topic() {
+                    said = roles.topics(role, &said, &channels);
+                }
+                roles.patterns.insert(role, said);
+                roles.said.insert(role);
             }
         }
+        // One sensor is not on the load and on who carries it; and beats are heard in a sound without a role.
+        let load = roles.patterns(Role::Imu).to_vec();
+        let is_sound = |topic: &String| channels.iter().any(|(t, s)| t == topic && s == SOUND);
+        roles.leave_out(Role::Carriers, |topic| load.contains(topic));
+        roles.leave_out(Role::Beats, is_sound);
         roles
+    }
+
+    /// The topics that patterns of a role name, each once: `*` stands for those that are there, of inertial sensors where some are meant. What is
+    /// not there stays, to be told.
+    fn topics(
+        &mut self,
+        role: Role,
+        patterns: &[String],
+        channels: &[(&str, String)],
+    ) -> Vec<String> {
+        let what = match role {
+            Role::Imu => Some("what is carried is taken to move as this sensor says"),
+            Role::Beats => Some("beats are taken from this topic"),
+            Role::Truth => Some("estimates are judged by this topic"),
+            _ => None,
+        };
+        let mut out: Vec<String> = Vec::new();
+        for pattern in patterns {
+            let fit = channels.iter().filter(|(t, _)| matches(pattern, t));
+            let (sensors, others): (Vec<_>, Vec<_>) =
+                fit.partition(|(_, s)| s == "sensor_msgs/Imu");
+            let found = match role {
+                Role::Imu | Role::Carriers if !sensors.is_empty() => sensors,
+                _ => [sensors, others].concat(),
+            };
+            let mut found: Vec<String> = found.iter().map(|(t, _)| (*t).to_owned()).collect();
+            if found.is_empty() {
+                found.push(pattern.clone());
+            }
+            if role == Role::Carriers {
+                found = natural_order(found);
+            }
+            if let Some(what) = what {
+                self.choose(&found, what);
+            }
+            found.retain(|topic| !out.contains(topic));
+            out.extend(found);
+        }
+        out
+    }
+
+    /// Leaves topics out of a role.
+    fn leave_out(&mut self, role: Role, is_left_out: impl Fn(&String) -> bool) {
+        if let Some(topics) = self.patterns.get_mut(&role) {
+            topics.retain(|topic| !is_left_out(topic));
+            if topics.is_empty() {
+                self.patterns.remove(&role);
+            }
+        }
     }
 
     /// Remarks what the first of several topics is taken for, where nothing but its name says so.
@@ -643,6 +704,45 @@ mod tests {
         let roles = Roles::infer(poses.into_iter(), None);
         assert_eq!(roles.chosen[0].0, "/aaa");
         assert!(roles.chosen[0].1.contains("(/odom)"));
+    }
+
+    #[test]
+    fn a_pattern_stands_for_the_topics_that_fit_it() {
+        let imu = "sensor_msgs/msg/Imu";
+        let channels = [
+            ("/imu/rath", imu),
+            ("/imu/rath_2", imu),
+            ("/rath/state", "rath.State"),
+            ("/imu/c_10", imu),
+            ("/imu/c_2", imu),
+            ("/beat", "rath.Beat"),
+            ("/audio/drum", "foxglove.RawAudio"),
+        ];
+        let roles = |said: &str| {
+            let user: RolesFile = toml::from_str(said).unwrap();
+            Roles::infer(channels.into_iter(), Some(&user))
+        };
+        let found = roles("imu = \"*rath\"\ncarriers = \"/imu/c_*\"");
+        assert_eq!(found.patterns(Role::Imu), ["/imu/rath"]);
+        assert_eq!(found.patterns(Role::Carriers), ["/imu/c_2", "/imu/c_10"]);
+        assert!(found.chosen.is_empty());
+        // Several: one is taken, and it is said.
+        let found = roles("imu = \"/imu/rath*\"\ncarriers = [\"/imu/*\", \"/imu/c_2\"]");
+        assert_eq!(found.patterns(Role::Imu), ["/imu/rath", "/imu/rath_2"]);
+        assert_eq!(found.patterns(Role::Carriers), ["/imu/c_2", "/imu/c_10"]);
+        let [(topic, why)] = &found.chosen[..] else {
+            panic!("{:?}", found.chosen)
+        };
+        assert!(topic == "/imu/rath" && why.contains("of 2") && why.contains("/imu/rath_2"));
+        // A sensor is one thing, a list is a choice, what is not there stays.
+        let found =
+            roles("imu = [\"/imu/c_2\", \"/none*\"]\ncarriers = [\"/imu/c_2\", \"/imu/c_10\"]");
+        assert_eq!(found.patterns(Role::Imu), ["/imu/c_2", "/none*"]);
+        assert_eq!(found.patterns(Role::Carriers), ["/imu/c_10"]);
+        assert!(found.chosen.is_empty());
+        // Beats are heard in a sound; its messages are none.
+        assert_eq!(roles("").topic(Role::Beats), Some("/beat"));
+        assert_eq!(roles("beats = \"/audio/drum\"").topic(Role::Beats), None);
     }
 
     #[test]

@@ -305,6 +305,33 @@ fn a_sound_that_nothing_dates_gives_no_lead() {
     assert!(!adrift(&one) && one.metrics.number("beat_lead_deg").is_some());
 }
 
+/// What a roles file says of a topic that does not play that role is told.
+#[test]
+fn a_role_that_a_topic_does_not_play_is_told() {
+    let files = ["carrier_1.zip", "carrier_2.zip", "drum.wav"];
+    let (_folder, recording) = put_together(&files.map(|name| (name, name)));
+    let told = |roles: &str| {
+        let found = examined(&recording, roles, DeviceClocks::One);
+        let its = |w: &&String| w.contains("the roles file's");
+        let told: Vec<String> = found.warnings.iter().filter(its).cloned().collect();
+        (told, found)
+    };
+    let (said, found) = told("beats = \"/audio/drum\"");
+    assert!(
+        said.len() == 1 && said[0].contains("beats, /audio/drum, is a sound"),
+        "{said:?}"
+    );
+    assert!((found.metrics.number("beat_hz").unwrap() - 2.1507).abs() < 5e-4);
+    let (said, _) =
+        told("imu = \"/imu/carrier_1\"\ncarriers = [\"/imu/carrier_1\", \"/imu/carrier_2\"]");
+    assert!(
+        said.len() == 1 && said[0].contains("carriers, /imu/carrier_1, is named as the load's"),
+        "{said:?}"
+    );
+    let (said, found) = told("carriers = \"/imu/*\"");
+    assert!(said.is_empty() && found.metrics.number("synchrony").is_some());
+}
+
 /// A walker's only phone tells steps too; a sensor that is said to sit on the load does not.
 #[test]
 fn a_sensor_on_the_load_does_not_walk() {

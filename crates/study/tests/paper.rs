@@ -84,7 +84,10 @@ fn programs_get_the_same_numbers() {
     let roll = &json["conditions"]["music"]["metrics"]["rms_roll_deg"];
     assert_eq!((&roll["mean"], &roll["sd"]), (&19.0.into(), &1.0.into()));
     let half = roll["ci95"].as_f64().unwrap();
-    assert!((half - 4.3027 / 3.0_f64.sqrt()).abs() < 1e-9, "{half}");
+    assert!(
+        (half - 4.302_652_730 / 3.0_f64.sqrt()).abs() < 1e-9,
+        "{half}"
+    );
     assert_eq!(
         json["conditions"]["music"]["metrics"]["onset_time_s"]["runs"],
         2

@@ -47,17 +47,27 @@ impl Onsets {
         let edges = band_edges(rate_hz, window);
         let bands = edges.len() - 1;
         let taper = Taper::Hann.values(window);
+        let sways = sways(&taper);
         let plan = RealFftPlanner::<f64>::new().plan_fft_forward(window);
         let (mut input, mut output) = (plan.make_input_vec(), plan.make_output_vec());
-        let frames = (sound.len() as f64 / rate_hz * FRAME_HZ) as usize;
+        // None reaches past the end: silence there would end what sounds, in every band at once.
+        let frames = (sound.len().checked_sub(window))
+            .map_or(0, |last| (last as f64 / rate_hz * FRAME_HZ) as usize + 1);
         let mut energy = vec![0.0; frames * bands];
         let mut heard = vec![true; frames];
         for frame in 0..frames {
             let first = (frame as f64 / FRAME_HZ * rate_hz) as usize;
-            for (k, (x, w)) in input.iter_mut().zip(&taper).enumerate() {
-                let s = sound.get(first + k).map_or(0.0, |s| f64::from(*s));
+            let within = sound[first..first + window].iter().zip(&taper);
+            for (x, (s, w)) in input.iter_mut().zip(within) {
+                let s = f64::from(*s);
                 heard[frame] &= s.is_finite();
                 *x = if s.is_finite() { s * w } else { 0.0 };
+            }
+            for sway in &sways {
+                let size: f64 = sway.iter().zip(&input).map(|(q, x)| q * x).sum();
+                for ((x, q), w) in input.iter_mut().zip(sway).zip(&taper) {
+                    *x -= size * q * w;
+                }
             }
             // OK because both buffers were made by the plan.
             plan.process(&mut input, &mut output)
@@ -106,6 +116,28 @@ impl Onsets {
     pub fn time_s(&self, frame: f64) -> f64 {
         self.start_s + frame / FRAME_HZ
     }
+}
+
+/// Parabolas, orthonormal under a window: what sways through it as they do, wind or a hand at the microphone, is below the lowest band and would
+/// leak into it. Without them 10 Hz are 40 dB weaker there, 20 Hz 11 dB, and a drum of 60 Hz 2 dB.
+fn sways(taper: &[f64]) -> [Vec<f64>; 3] {
+    let mut out = [const { Vec::new() }; 3];
+    for power in 0..3 {
+        let place = |k: usize| 2.0 * k as f64 / taper.len() as f64 - 1.0;
+        let mut sway: Vec<f64> = (0..taper.len()).map(|k| place(k).powi(power)).collect();
+        let under = |a: &[f64], b: &[f64]| -> f64 {
+            let both = a.iter().zip(b).zip(taper);
+            both.map(|((a, b), w)| a * b * w).sum()
+        };
+        for other in &out[..power as usize] {
+            let size = under(other, &sway);
+            sway.iter_mut().zip(other).for_each(|(x, q)| *x -= size * q);
+        }
+        let norm = under(&sway, &sway).sqrt();
+        sway.iter_mut().for_each(|x| *x /= norm);
+        out[power as usize] = sway;
+    }
+    out
 }
 
 /// Bins at which the bands begin, ascending, each band at least one bin wide.
@@ -184,6 +216,9 @@ fn top_mean(x: &[f64]) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::beat::beats;
+    use crate::beat::synth::{Drums, drums};
+    use crate::steps::agreement;
 
     #[test]
     fn clicks_are_found_where_they_are() {
@@ -212,6 +247,45 @@ mod tests {
             }
             println!("{rate_hz}: {mean}");
             assert!(mean.abs() < 0.005, "{rate_hz}: {mean}");
+        }
+    }
+
+    /// Wind and a hand at the microphone, twice as strong as the drum and more.
+    #[test]
+    fn what_sways_below_the_lowest_band_hides_no_drum() {
+        for (hz, loud) in [(0.0, 20.0), (3.0, 10.0), (10.0, 3.0), (15.0, 1.5)] {
+            let (mut sound, truth) = drums(&Drums::default());
+            let power: f32 = sound.iter().map(|x| x * x).sum();
+            let rms = f64::from(power / sound.len() as f32).sqrt();
+            for (k, x) in sound.iter_mut().enumerate() {
+                let t = k as f64 / 22_050.0;
+                *x += (loud * rms * (std::f64::consts::TAU * hz * t + 1.0).sin()) as f32;
+            }
+            let found = beats(&sound, 22_050.0).unwrap();
+            let f1 = agreement(&found.beat_s, &truth, 0.07).f1;
+            println!("{hz} Hz: {f1}");
+            assert!(f1 >= 0.95, "{hz} Hz: {f1}");
+        }
+    }
+
+    /// A file is cut off while something sounds: nothing begins there, nor where it begins.
+    #[test]
+    fn nothing_begins_where_a_file_ends() {
+        let rate_hz = 16_000.0;
+        for hz in [0.0, 50.0, 110.0, 220.0] {
+            let sound: Vec<f32> = (0..160_000)
+                .map(|k| {
+                    let t = f64::from(k) / rate_hz;
+                    let struck = (-(t % 0.5) / 0.02).exp() * (t * 2e3).sin();
+                    let drum = if (1.0..9.0).contains(&t) { struck } else { 0.0 };
+                    (drum + 0.1 * (std::f64::consts::TAU * hz * t + 1.0).sin()) as f32
+                })
+                .collect();
+            let onsets = Onsets::of(&sound, rate_hz);
+            let far = |t: &&f64| !(0.9..8.7).contains(*t);
+            assert_eq!(onsets.times_s().iter().find(far), None, "{hz}");
+            let last = onsets.strength.len() - 1;
+            assert!((onsets.time_s(last as f64) - 10.0).abs() < 0.03);
         }
     }
 }

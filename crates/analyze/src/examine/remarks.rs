@@ -8,7 +8,7 @@ use super::pass::{Entry, Pass, field};
 use crate::field::{ACCEL, GYRO};
 use crate::inputs::Window;
 use crate::quality::Quality;
-use crate::roles::{Role, RolesFile, is_carrier, matches, meant, stands_beside};
+use crate::roles::{Role, RolesFile, SOUND, is_carrier, matches, meant, stands_beside};
 
 /// A topic that begins so late or ends so early is worth a word: this share of the window, and this long (s).
 const LEAST_ABSENT: f64 = 0.02;
@@ -203,6 +203,7 @@ impl Pass<'_> {
             };
             for pattern in &patterns {
                 if names.iter().any(|name| matches(pattern, name)) {
+                    out.extend(self.plays_none(role, pattern));
                     continue;
                 }
                 let hint = meant(pattern, names.iter().copied());
@@ -219,5 +220,25 @@ impl Pass<'_> {
             }
         }
         out
+    }
+
+    /// Why the topics that a pattern of a roles file names do not play the role, where they are there.
+    fn plays_none(&self, role: Role, pattern: &str) -> Option<String> {
+        let channels = self.recording.info().channels.iter();
+        let mut named = channels.filter(|c| matches(pattern, &c.topic));
+        let load = self.roles.patterns(Role::Imu);
+        let (found, why) = match role {
+            Role::Beats => (
+                named.find(|c| c.schema == SOUND),
+                "is a sound: its beats are heard without a role, and its messages are none",
+            ),
+            Role::Carriers if !pattern.contains('*') => (
+                named.find(|c| load.contains(&c.topic)),
+                "is named as the load's imu too: it is taken for that, and not for a carrier's",
+            ),
+            _ => return None,
+        };
+        let topic = &found?.topic;
+        Some(format!("the roles file's {}, {topic}, {why}", role.name()))
     }
 }

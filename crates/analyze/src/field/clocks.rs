@@ -213,17 +213,19 @@ impl Clocks {
     }
 
     fn say(&mut self, topic: &str, clock: &Clock, ahead: [f64; 2]) {
+        let apart = ahead[0].abs() > 1.96 * clock.offset_sd_s;
+        let (kind, done) = match self.leave {
+            true if apart => ("clocks_apart", "left as it is"),
+            true => ("clock_offset", "left as it is"),
+            false => ("clock_offset", "put right"),
+        };
         self.remarks.push(Quality::remark(
             topic,
-            "clock_offset",
+            kind,
             format!(
-                "{}, by {} taps; {}",
+                "{}, by {} taps; {done}",
                 self.against(clock, ahead),
                 clock.points,
-                match self.leave {
-                    true => "left as it is",
-                    false => "put right",
-                }
             ),
         ));
         self.any_set = true;

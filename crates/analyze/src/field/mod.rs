@@ -64,6 +64,8 @@ pub struct Field {
     no_motion: Option<String>,
     /// What the sensor of the motion did not tell within the window.
     lost: Vec<Lost>,
+    /// What those of the carriers did not.
+    carriers_lost: Vec<Lost>,
     carriers: Carriers,
     beat_s: Vec<f64>,
     /// Their numbers, where they have some.
@@ -207,6 +209,7 @@ impl Field {
             let said = said.map(|(kind, text)| Quality::remark(topic, kind, text));
             field.quality.extend(said);
             let is_rath = roles.topic(Role::Imu) == Some(topic.as_str());
+            let carries = roles.patterns(Role::Carriers).contains(topic);
             let within = window.range(&track.t_s);
             let mut lost = |kind, told: String, samples: &[usize], what: Option<Lost>| {
                 field.quality.push(Quality {
@@ -214,8 +217,12 @@ impl Field {
                     t_s: Some(track.t_s[samples[0]]),
                     ..Quality::remark(topic, kind, told)
                 });
-                if is_rath && samples.iter().any(|k| within.contains(k)) {
-                    field.lost.extend(what);
+                if samples.iter().any(|k| within.contains(k)) {
+                    match is_rath {
+                        true => field.lost.extend(what),
+                        false if carries => field.carriers_lost.extend(what),
+                        false => {}
+                    }
                 }
             };
             for end in saturated(&track) {
@@ -537,6 +544,9 @@ impl Field {
                 &others,
                 by_taps,
             );
+            for lost in &self.carriers_lost {
+                interval::without_those(&mut together, *lost, carriers::gives);
+            }
             let adrift = |name: &&str| self.sound_is_adrift && BY_SOUNDS_CLOCK.contains(name);
             for (_, value) in together.0.iter_mut().filter(|(name, _)| adrift(name)) {
                 value.withhold("nothing tells when the sound began beside the steps: tap the sensors near the microphone or say --one-clock");

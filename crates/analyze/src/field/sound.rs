@@ -9,6 +9,7 @@ use recording::schema::foxglove::RawAudio;
 use recording::text::counted;
 
 use crate::beat::{BeatError, Beats, beats_among, onsets};
+use crate::roles::SOUND;
 
 /// Sound is thinned to no less than this, Hz: enough for what a drum begins.
 const RATE_HZ: u32 = 16_000;
@@ -144,7 +145,7 @@ pub fn listen(recording: &Recording) -> Result<Option<Heard>, ReadError> {
     let Some(channel) = info
         .channels
         .iter()
-        .find(|c| c.schema == "foxglove.RawAudio" && c.encoding == "protobuf")
+        .find(|c| c.schema == SOUND && c.encoding == "protobuf")
     else {
         return Ok(None);
     };

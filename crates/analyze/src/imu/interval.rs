@@ -231,6 +231,14 @@ pub enum Lost {
 
 /// Takes the intervals from numbers that rest on what was lost, which is in no budget. An accelerometer's missing peaks hardly turn the attitude.
 pub fn without(metrics: &mut Metrics, lost: Lost) {
+    let attitude = lost != Lost::Peaks(Instrument::Accelerometer);
+    without_those(metrics, lost, |name| {
+        attitude || is_of_height(name) || name == "t_float"
+    });
+}
+
+/// The same of those that `rests_on` names.
+pub fn without_those(metrics: &mut Metrics, lost: Lost, rests_on: impl Fn(&str) -> bool) {
     let (instrument, why) = match lost {
         Lost::Peaks(of) => (of, "came to the end of its range"),
         Lost::All(of) => (of, "gave one reading while the device moved"),
@@ -243,10 +251,8 @@ pub fn without(metrics: &mut Metrics, lost: Lost) {
             "shows gravity elsewhere than below the load as the sensor is said to be mounted",
         ),
     };
-    let attitude = lost != Lost::Peaks(Instrument::Accelerometer);
     for (name, value) in &mut metrics.0 {
-        let rests_on = attitude || is_of_height(name) || *name == "t_float";
-        if rests_on && value.ci95.take().is_some() {
+        if rests_on(name) && value.ci95.take().is_some() {
             let why = format!("without an interval: the {} {why}", instrument.name());
             value.reason = Some(match value.reason.take() {
                 Some(reason) => format!("{why}; {reason}"),

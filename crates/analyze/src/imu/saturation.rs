@@ -2,11 +2,11 @@
 
 use super::track::{Instrument, Track};
 
-/// No sensor has a smaller range: ±125 °/s and ±2 g, less a tenth for scale and offset.
+/// No sensor has a smaller range: ±50 °/s and ±1.5 g, less a tenth for scale and offset.
 const fn least_end(of: Instrument) -> f64 {
     match of {
-        Instrument::Gyroscope => 0.9 * 2.18,
-        Instrument::Accelerometer => 0.9 * 19.6,
+        Instrument::Gyroscope => 0.9 * 0.873,
+        Instrument::Accelerometer => 0.9 * 14.7,
     }
 }
 /// So many samples at the end, three of them in a row, and so many times as many as at one of the values below it: the crest of a sine has four times as many.
@@ -136,6 +136,13 @@ mod tests {
                 "{quantum}: {share} of {truth}"
             );
         }
+        // The smallest that there are: ±50 °/s and ±1.5 g.
+        let mut least = turning(0.001, 0.873);
+        for (force, turn) in least.accel_m_per_s2.iter_mut().zip(&least.gyro_rad_per_s) {
+            force[2] = (9.8 + 6.0 * turn[1]).min(14.7);
+        }
+        let ends: Vec<f64> = saturated(&least).iter().map(|found| found.end).collect();
+        assert_eq!(ends, [0.873, 14.7]);
     }
 
     /// Neither noise behind the converter, a bias that was taken off, axes made square, nor a turned case hide an end.

@@ -23,8 +23,8 @@ pub struct Args {
     /// TOML that says which signal plays which role, and what the sensors do not say of themselves, as for `analyze`
     #[arg(long, value_name = "FILE")]
     roles: Option<PathBuf>,
-    /// Put the carriers' clocks on the rath's first, by taps and by their heave. That takes away some of the lag by which a pull is seen, so
-    /// it is for clocks that are known to differ. A millisecond that they are still off moves the stiffness by some 70 N/m.
+    /// Put the carriers' clocks on the rath's first, by taps or else by their heave. The heave takes away some of the lag by which a pull is
+    /// seen, and leaves clocks 20 ms off: a millisecond moves the stiffness by some 70 N/m, so that and damping are then not told.
     #[arg(long)]
     put_clocks_right: bool,
     /// What to print.
@@ -38,11 +38,11 @@ const EXAMPLES: &str = "Examples:
   study fit field.mcap --scene rath.toml --format json
 
 A field recording (inertial sensors on the rath and on every carrier, stamped by one clock) gives the beat, amplitudes and, where all \
-handles carry for long enough, stiffness and damping; it may have come through `analyze FILE --annotate OUT.mcap` or not.";
+handles carry for long enough, stiffness and damping; where clocks differ and taps have not set them, these have a reason instead; it may have come through `analyze FILE --annotate OUT.mcap` or not.";
 
 /// Fits every file, and says what they have in common.
 pub fn run(args: &Args) -> Result<Input> {
-    let said = match &args.scene {
+    let given = match &args.scene {
         Some(scene) => Some(load(scene, &[])?),
         None => None,
     };
@@ -53,10 +53,11 @@ pub fn run(args: &Args) -> Result<Input> {
     };
     let mut input = Input::Whole;
     let mut all: Vec<(String, Vec<Outcome>)> = Vec::new();
+    let mut said: Vec<Vec<String>> = Vec::new();
     for file in &args.files {
         let name = file.display().to_string();
         let (mut field, told) = Field::read(file, roles.as_ref(), args.put_clocks_right)?;
-        let known = said.as_ref().or(told.scene.as_ref());
+        let known = given.as_ref().or(told.scene.as_ref());
         let scene = known.unwrap_or(&usual);
         (field.onset_s, field.build_up_s) = match &scene.effects.music {
             Some(music) => (music.onset_s, music.build_up_s),
@@ -68,17 +69,16 @@ pub fn run(args: &Args) -> Result<Input> {
         if known.is_some() {
             field.inputs.mass_kg.get_or_insert(scene.body.mass_kg);
         }
-        for clock in &told.clocks_apart {
-            recording::note!("study: {name}: {clock}: --put-clocks-right");
-        }
-        for hole in holes(&field) {
-            recording::note!("study: {name}: {hole}");
+        let remarks = [told.clocks_apart, holes(&field)].concat();
+        for remark in &remarks {
+            recording::note!("study: {name}: {remark}");
         }
         if let Some(damage) = told.damage {
             recording::note!("study: {damage}");
             input = Input::Damaged;
         }
         all.push((name, fit(&field, told.window)));
+        said.push(remarks);
     }
     let together = common(&all);
     match args.format {
@@ -92,9 +92,10 @@ pub fn run(args: &Args) -> Result<Input> {
             };
             let files: Vec<_> = all
                 .iter()
-                .map(|(name, found)| {
+                .zip(&said)
+                .map(|((name, found), remarks)| {
                     let parameters: serde_json::Map<_, _> = found.iter().map(one).collect();
-                    json!({"file": name, "parameters": parameters})
+                    json!({"file": name, "parameters": parameters, "remarks": remarks})
                 })
                 .collect();
             let mean: serde_json::Map<_, _> = together
@@ -196,6 +197,6 @@ mod tests {
         };
         // 0.3/√n, and where they differ by more Student's t: 12.7062 of SD/√2, which is a half of their distance.
         assert!((half(&[2.0, 2.0, 2.0, 2.0].map(file)) - 0.15).abs() < 1e-12);
-        assert!((half(&[2.0, 3.0].map(file)) - 12.7062 * 0.5).abs() < 1e-9);
+        assert!((half(&[2.0, 3.0].map(file)) - 12.706_204_736 * 0.5).abs() < 1e-9);
     }
 }

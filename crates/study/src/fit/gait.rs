@@ -4,9 +4,7 @@ use super::squares::{Block, bootstrapped, unexplained};
 use super::{BLOCK_S, Estimate, Field, Outcome, budgeted, estimate, unwrapped};
 use analyze::beat::adler::Adler;
 use analyze::imu::budget::Budget;
-use analyze::inputs::{
-    Inputs, Window, between, longest_step_s, mean_step_in, mean_step_s, stretches,
-};
+use analyze::inputs::{Window, between, longest_step_s, mean_step_in, mean_step_s, stretches};
 use nalgebra::{DMatrix, DVector};
 use std::f64::consts::{PI, TAU};
 use std::ops::Range;
@@ -23,7 +21,7 @@ pub(super) fn gait(field: &Field) -> Result<Vec<Outcome>, String> {
         return Err("too few phases after the onset of the music".into());
     }
     if i.phases_are_measured {
-        return gait_from_steps(i, from);
+        return gait_from_steps(field, from);
     }
     let phases: Vec<Vec<f64>> = i.phase_rad.iter().map(|p| unwrapped(&p[from..])).collect();
     if phases.iter().flatten().any(|p| !p.is_finite()) {
@@ -680,7 +678,8 @@ fn half(variance: f64) -> f64 {
 
 /// The same where steps tell the phases and a recorder or a topic the beats: Adler's test, which knows what a step detector does. What is walked
 /// before the music is in it.
-fn gait_from_steps(i: &Inputs, from: usize) -> Result<Vec<Outcome>, String> {
+fn gait_from_steps(field: &Field, from: usize) -> Result<Vec<Outcome>, String> {
+    let i = &field.inputs;
     // Before the first beat that was heard, in pauses and after the last, nobody knows its phase, nor how many beats a pause holds: the tempo is
     // that of the longest stretch without one.
     let heard = longest_heard(
@@ -690,7 +689,13 @@ fn gait_from_steps(i: &Inputs, from: usize) -> Result<Vec<Outcome>, String> {
     let (t_s, psi) = heard
         .filter(|(t_s, _)| t_s.len() >= 100)
         .ok_or("too few beats after the onset of the music")?;
-    let mut out = vec![Tempo::of(&t_s, &unwrapped(&psi)).told()];
+    let mut beat = Tempo::of(&t_s, &unwrapped(&psi)).told();
+    // A course through many beats errs less than they do, and slower: what it leaves of them tells no interval.
+    if let (Ok(found), Some((hz, half))) = (&mut beat, field.heard_hz) {
+        let half = half.max(LEAST_SURE * hz);
+        (found.value, found.interval) = (hz, [hz - half, hz + half]);
+    }
+    let mut out = vec![beat];
     match Adler::of(i) {
         Ok(found) => {
             let interval = found.pull_ci95_rad_per_s;
@@ -741,6 +746,9 @@ fn longest_heard(t_s: &[f64], beat_rad: &[f64]) -> Option<(Vec<f64>, Vec<f64>)> 
     Some(longest.iter().copied().unzip())
 }
 
+/// No clock is surer, a part of itself.
+const LEAST_SURE: f64 = 1e-6;
+
 /// A beat that was heard: a straight line through its phase, every beat one observation, and never surer than a clock's ppm.
 struct Tempo {
     /// rad/s.
@@ -778,7 +786,7 @@ impl Tempo {
         });
         Self {
             rate,
-            half: half.max(1e-6 * rate.abs()),
+            half: half.max(LEAST_SURE * rate.abs()),
             strays: misses().fold(0.0, f64::max),
             range,
         }

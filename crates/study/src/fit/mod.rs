@@ -60,6 +60,30 @@ pub struct Field {
     pub onset_s: f64,
     /// How long it builds up, s.
     pub build_up_s: f64,
+    /// What is known of the sensors' clocks.
+    pub clocks: Clocks,
+    /// Beats per second as they were heard, and half of the 95 % interval, Hz, where single beats tell it.
+    pub heard_hz: Option<(f64, f64)>,
+}
+
+/// Why parameters that rest on several clocks have no value, where they have none.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub struct Clocks {
+    /// Of the rath's clock beside the carriers': stiffness and damping.
+    pub no_contact: Option<&'static str>,
+    /// Of the carriers' clocks beside each other and the beat's: pull and gait.
+    pub no_pull: Option<&'static str>,
+}
+
+impl Clocks {
+    fn spoil(&self, name: &str) -> Option<&'static str> {
+        match name {
+            "stiffness" | "damping" => self.no_contact,
+            "pull" => self.no_pull,
+            _ if name.starts_with("gait") => self.no_pull,
+            _ => None,
+        }
+    }
 }
 
 /// A parameter.
@@ -105,6 +129,13 @@ pub fn fit(field: &Field, window: Window) -> Vec<Outcome> {
     out.extend(
         pendulum(field, window).unwrap_or_else(|why| missing(&["pendulum", "roll damping"], why)),
     );
+    // No interval knows of a clock that is wrong.
+    for outcome in &mut out {
+        let (Ok(Estimate { name, .. }) | Err((name, _))) = &*outcome;
+        if let Some(why) = field.clocks.spoil(name) {
+            *outcome = Err((name.clone(), why.to_owned()));
+        }
+    }
     out
 }
 

@@ -1,11 +1,11 @@
 //! A recording becomes what a fit is made from.
 
-use super::Field;
+use super::{Clocks, Field};
 use analyze::Window;
 use analyze::examine::{Request, examine};
 use analyze::field::DeviceClocks;
 use analyze::quality::Quality;
-use analyze::roles::RolesFile;
+use analyze::roles::{Role, RolesFile};
 use anyhow::{Result, anyhow};
 use recording::import::{ImportOptions, ingest};
 use recording::read::{ReadOptions, Recording};
@@ -21,9 +21,15 @@ pub struct Told {
     pub scene: Option<Scene>,
     /// What is lost, where it is damaged: one sentence.
     pub damage: Option<String>,
-    /// How the clocks of sensors differ, where it was not asked to put them right.
+    /// How the clocks of sensors differ, where that is not put right but by motion, or not known.
     pub clocks_apart: Vec<String>,
 }
+
+const LEFT: &str =
+    "clocks differ and were left as they are, which no interval knows of: --put-clocks-right";
+const BY_MOTION: &str = "the carriers' clocks were put right by motion alone, to 20 ms, and a millisecond moves the stiffness by some 70 N/m: tap the sensors together";
+const ADRIFT: &str =
+    "nothing tells when the sound began beside the steps: tap the sensors near the microphone";
 
 impl Field {
     /// The columns of a recording, or of a log of the paper's archive (.npz), and what else it says; `roles` says what it does not. With
@@ -79,14 +85,37 @@ impl Field {
             .attachment("scene.toml")
             .and_then(|text| String::from_utf8(text).ok())
             .and_then(|text| sim::scene::parse("scene.toml", &text, &[]).ok());
-        // Only sensors have clocks of their own.
-        let clocks_apart = match put_clocks_right || analysis.inputs.heave_m.is_empty() {
-            true => Vec::new(),
-            false => {
-                let clocks = analysis.quality.iter().filter(|q| q.kind == "clock_offset");
-                clocks.map(Quality::told).collect()
-            }
+        let (inputs, quality) = (&analysis.inputs, &analysis.quality);
+        let carries = |(role, topics): &(&str, Vec<String>), topic: &String| {
+            *role == Role::Carriers.name() && topics.contains(topic)
         };
+        let is_carrier = |q: &&Quality| analysis.roles.iter().any(|r| carries(r, &q.topic));
+        let apart = || {
+            let apart = quality.iter().filter(|q| q.kind == "clocks_apart");
+            apart.filter(|q| !q.topic.is_empty())
+        };
+        let left = apart().find(is_carrier).map(|_| LEFT);
+        let by_motion: Vec<&Quality> = {
+            let all = quality.iter();
+            all.filter(|q| q.kind == "clock_by_motion").collect()
+        };
+        // Only sensors have clocks of their own.
+        let (lifted, walked) = (!inputs.heave_m.is_empty(), inputs.phases_are_measured);
+        let clocks = Clocks {
+            no_contact: left
+                .or((!by_motion.is_empty()).then_some(BY_MOTION))
+                .filter(|_| lifted),
+            no_pull: left
+                .or_else(|| apart().next().map(|_| ADRIFT))
+                .filter(|_| walked),
+        };
+        let clocks_apart = match lifted || walked {
+            true => apart().chain(by_motion).map(Quality::told).collect(),
+            false => Vec::new(),
+        };
+        let heard_hz = (analysis.metrics.get("beat_hz"))
+            .and_then(|beat| Some((beat.as_f64()?, beat.ci95?)))
+            .map(|(hz, [low, high])| (hz, 0.5 * (high - low)));
         let told = Told {
             window: analysis.window,
             scene,
@@ -96,6 +125,8 @@ impl Field {
         let field = Field {
             inputs: analysis.inputs,
             compression_m,
+            clocks,
+            heard_hz,
             ..Field::default()
         };
         Ok((field, told))

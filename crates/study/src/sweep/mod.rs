@@ -240,7 +240,8 @@ impl Plan {
     }
 
     /// How `runs` runs are best given to `jobs` threads: one at a time, or, where seeds can go abreast, as many as fill the lanes several
-    /// times, and fewer towards the end, so that all threads end together.
+    /// times, and fewer towards the end, so that all threads end together. Only seeds of one point go abreast: a share holds whole points, and no
+    /// more of them than a part needs, since what is not in a part is lost with a kill.
     pub fn shares(&self, runs: u64, jobs: usize) -> Shares {
         if !self.goes_abreast() {
             return Shares {
@@ -250,18 +251,20 @@ impl Plan {
             };
         }
         let threads = jobs as u64;
-        let whole = runs.saturating_sub((threads + 1) * MOST_ABREAST) / MOST_ABREAST;
+        let points = self.block_runs().next_multiple_of(self.spec.seeds);
+        let most = points.clamp(LEAST_ABREAST, MOST_ABREAST);
+        let whole = runs.saturating_sub((threads + 1) * most) / most;
         let mut rest = Vec::new();
-        let mut first = whole * MOST_ABREAST;
+        let mut first = whole * most;
         while first < runs {
             let share = (runs - first) / (threads + 1);
-            let share = share.clamp(LEAST_ABREAST, MOST_ABREAST);
+            let share = share.clamp(LEAST_ABREAST, most);
             let last = runs.min(first + share.next_multiple_of(WORTH_ABREAST));
             rest.push(first..last);
             first = last;
         }
         Shares {
-            size: MOST_ABREAST,
+            size: most,
             whole,
             rest,
         }
