@@ -101,8 +101,22 @@ pub struct Inputs {
     pub gravity_m_per_s2: f64,
     /// The phases are estimates from measurements, with their own chance level: it is found by surrogates.
     pub phases_are_measured: bool,
+    /// How the clocks of the sensors stand to each other.
+    pub clocks: Clocks,
     /// Where the columns come from.
     pub sources: Sources,
+}
+
+/// How the clocks stand to each other, where several sensors have their own.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Clocks {
+    /// They are one, or taps have set them, or nothing tells that they differ.
+    #[default]
+    Agree,
+    /// They differ and were left as they are.
+    LeftApart,
+    /// Motion alone has set the carriers', to some 20 ms.
+    SetByMotion,
 }
 
 impl Default for Inputs {
@@ -126,6 +140,7 @@ impl Default for Inputs {
             mass_kg: None,
             gravity_m_per_s2: 9.80665,
             phases_are_measured: false,
+            clocks: Clocks::Agree,
             sources: Sources::default(),
         }
     }

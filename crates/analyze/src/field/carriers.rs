@@ -164,9 +164,9 @@ impl Carriers {
         let mut out = Vec::new();
         let walking = self.worn.iter_mut().filter(|w| w.steps.is_ok());
         for (k, (worn, offset_s)) in walking.zip(offsets_s).enumerate() {
-            let (kind, done) = match leave {
-                true => ("clocks_apart", "left as it is"),
-                false => ("clock_by_motion", "put right before comparing phases"),
+            let done = match leave {
+                true => "left as it is",
+                false => "put right before comparing phases",
             };
             if !leave {
                 worn.ahead_s = offset_s;
@@ -174,7 +174,7 @@ impl Carriers {
             }
             out.push(Quality::remark(
                 &worn.topic,
-                kind,
+                "clock_offset",
                 format!(
                     "runs {:+.0} ± {:.0} ms off the carriers' common clock, or whole steps more; {done}",
                     1e3 * offset_s,

@@ -40,6 +40,8 @@ pub struct Clocks {
     leave: bool,
     /// Whether taps tell how any other clock goes.
     pub any_set: bool,
+    /// Whether any differs by more than taps err, and was left.
+    pub any_apart: bool,
     /// What there is to say.
     pub remarks: Vec<Quality>,
 }
@@ -213,15 +215,14 @@ impl Clocks {
     }
 
     fn say(&mut self, topic: &str, clock: &Clock, ahead: [f64; 2]) {
-        let apart = ahead[0].abs() > 1.96 * clock.offset_sd_s;
-        let (kind, done) = match self.leave {
-            true if apart => ("clocks_apart", "left as it is"),
-            true => ("clock_offset", "left as it is"),
-            false => ("clock_offset", "put right"),
+        let done = match self.leave {
+            true => "left as it is",
+            false => "put right",
         };
+        self.any_apart |= self.leave && ahead[0].abs() > 1.96 * clock.offset_sd_s;
         self.remarks.push(Quality::remark(
             topic,
-            kind,
+            "clock_offset",
             format!(
                 "{}, by {} taps; {done}",
                 self.against(clock, ahead),

@@ -32,7 +32,7 @@ use crate::imu::rath::{self, Motion, Settings};
 use crate::imu::saturation::saturated;
 use crate::imu::track::Instrument;
 use crate::imu::unloading::unloadings;
-use crate::inputs::{Inputs, Window};
+use crate::inputs::{self, Inputs, Window};
 use crate::metrics::{Metrics, Value, metrics_of};
 use crate::quality::Quality;
 use crate::roles::{Role, Roles, Sensors, about_the_load, stands_beside};
@@ -71,6 +71,7 @@ pub struct Field {
     /// Their numbers, where they have some.
     beat_number: Option<Vec<f64>>,
     beat_source: &'static str,
+    clocks: inputs::Clocks,
     /// Whether nothing tells how the clock of the sound that they were heard in stands to the others.
     sound_is_adrift: bool,
     judge: Option<Judge>,
@@ -320,6 +321,10 @@ impl Field {
                     .push(Quality::remark(&topic, "clocks_apart", why));
             }
         }
+        field.clocks = match clocks.any_apart {
+            true => inputs::Clocks::LeftApart,
+            false => inputs::Clocks::Agree,
+        };
         if !one_clock && !clocks.any_set {
             field.align(roles, leave);
         }
@@ -399,13 +404,20 @@ impl Field {
     /// Puts the carriers' clocks on each other, by the motion of the rath that they all drive, or says how with `leave`.
     fn align(&mut self, roles: &Roles, leave: bool) {
         if roles.patterns(Role::Carriers).len() >= 2 {
-            self.quality
-                .extend(self.carriers.align(self.motion.as_ref(), leave));
+            let said = self.carriers.align(self.motion.as_ref(), leave);
+            if said.iter().any(|q| q.kind == "clock_offset") {
+                self.clocks = match leave {
+                    true => inputs::Clocks::LeftApart,
+                    false => inputs::Clocks::SetByMotion,
+                };
+            }
+            self.quality.extend(said);
         }
     }
 
     /// Gives `inputs` the columns that it lacks.
     pub fn fill(&mut self, inputs: &mut Inputs) {
+        inputs.clocks = self.clocks;
         if let Some(motion) = &self.motion
             && inputs.t_s.is_empty()
         {

@@ -4,8 +4,9 @@ use super::{Clocks, Field};
 use analyze::Window;
 use analyze::examine::{Request, examine};
 use analyze::field::DeviceClocks;
+use analyze::inputs;
 use analyze::quality::Quality;
-use analyze::roles::{Role, RolesFile};
+use analyze::roles::RolesFile;
 use anyhow::{Result, anyhow};
 use recording::import::{ImportOptions, ingest};
 use recording::read::{ReadOptions, Recording};
@@ -86,31 +87,28 @@ impl Field {
             .and_then(|text| String::from_utf8(text).ok())
             .and_then(|text| sim::scene::parse("scene.toml", &text, &[]).ok());
         let (inputs, quality) = (&analysis.inputs, &analysis.quality);
-        let carries = |(role, topics): &(&str, Vec<String>), topic: &String| {
-            *role == Role::Carriers.name() && topics.contains(topic)
+        let of_kind = |kind: &'static str| {
+            let of = quality.iter().filter(move |q| q.kind == kind);
+            of.filter(|q| !q.topic.is_empty()).map(Quality::told)
         };
-        let is_carrier = |q: &&Quality| analysis.roles.iter().any(|r| carries(r, &q.topic));
-        let apart = || {
-            let apart = quality.iter().filter(|q| q.kind == "clocks_apart");
-            apart.filter(|q| !q.topic.is_empty())
-        };
-        let left = apart().find(is_carrier).map(|_| LEFT);
-        let by_motion: Vec<&Quality> = {
-            let all = quality.iter();
-            all.filter(|q| q.kind == "clock_by_motion").collect()
-        };
+        // A sound's, beside the sensors'.
+        let adrift: Vec<String> = of_kind("clocks_apart").collect();
         // Only sensors have clocks of their own.
         let (lifted, walked) = (!inputs.heave_m.is_empty(), inputs.phases_are_measured);
+        let (no_contact, no_pull) = match inputs.clocks {
+            inputs::Clocks::LeftApart => (Some(LEFT), Some(LEFT)),
+            inputs::Clocks::SetByMotion => (Some(BY_MOTION), None),
+            inputs::Clocks::Agree => (None, None),
+        };
         let clocks = Clocks {
-            no_contact: left
-                .or((!by_motion.is_empty()).then_some(BY_MOTION))
-                .filter(|_| lifted),
-            no_pull: left
-                .or_else(|| apart().next().map(|_| ADRIFT))
+            no_contact: no_contact.filter(|_| lifted),
+            no_pull: no_pull
+                .or((!adrift.is_empty()).then_some(ADRIFT))
                 .filter(|_| walked),
         };
         let clocks_apart = match lifted || walked {
-            true => apart().chain(by_motion).map(Quality::told).collect(),
+            true if no_contact.is_some() => of_kind("clock_offset").chain(adrift).collect(),
+            true => adrift,
             false => Vec::new(),
         };
         let heard_hz = (analysis.metrics.get("beat_hz"))
