@@ -30,7 +30,7 @@ fn valid(seed: u64) -> String {
         d.from(0.2, 3.0),
         d.from(1.0, 120.0)
     );
-    let (mut turns, mut moves) = (true, [true; 4]);
+    let mut may = [true; 5];
     if d.chance(0.4) {
         let mut free: Vec<&str> = ["x", "y", "height", "roll", "tilt", "yaw"]
             .into_iter()
@@ -39,12 +39,18 @@ fn valid(seed: u64) -> String {
         if free.is_empty() {
             free.push("height");
         }
-        let has = |all: &[&str]| all.iter().all(|f| free.contains(f));
-        turns = has(&["x", "y", "yaw"]);
         // What is held may not start with a velocity.
-        moves = [&["x"][..], &["height"], &["roll"], &["roll", "tilt", "yaw"]].map(has);
+        may = [
+            &["x", "y", "yaw"][..],
+            &["x"],
+            &["height"],
+            &["roll"],
+            &["roll", "tilt", "yaw"],
+        ]
+        .map(|all: &[&str]| all.iter().all(|f| free.contains(f)));
         t += &format!("freedom = {free:?}\n");
     }
+    let [turns, moves @ ..] = may;
     // Moments of a box: they always belong to a body.
     let (m, a, b, c) = (
         d.from(1.0, 300.0),
