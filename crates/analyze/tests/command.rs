@@ -1072,7 +1072,7 @@ fn early_messages_leave_the_rest_as_it_is() {
     for window in [&[][..], &["--window", "..50"]] {
         let message = |k: u32| {
             let t = f64::from(k) / 100.0;
-            let dated = if k % 3000 == 0 { t - 1.7e9 } else { t };
+            let dated = if k.is_multiple_of(3000) { t - 1.7e9 } else { t };
             (dated, format!("{{\"v\":{}}}", 5.0 + tone(1.2345, t)))
         };
         let file = told(folder.path(), &[("/a", (0..6000).map(message).collect())]);
