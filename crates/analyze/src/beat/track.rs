@@ -86,7 +86,11 @@ pub fn beats(onsets: &Onsets) -> Option<Vec<f64>> {
         })
         .max_by(|a, b| a.0.total_cmp(&b.0))?;
     let (_, chain, periods) = best;
-    let known = |f: usize| onsets.known[near(onsets, f)].iter().all(|k| *k);
+    // Of a stroke at an end of the sound a part is not heard, and its centre lies elsewhere.
+    let known = |f: usize| {
+        let near = near(onsets, f);
+        near.len() == 2 * NEAR + 1 && onsets.known[near].iter().all(|k| *k)
+    };
     let at_s: Vec<f64> = chain.iter().map(|&f| refined(onsets, f)).collect();
     let parts = played(&chain, &strength).into_iter();
     let beats: Vec<f64> = parts
@@ -341,9 +345,12 @@ fn strokes(accent: &[f64]) -> Vec<(usize, f64)> {
         .collect()
 }
 
-/// The frames within 40 ms of one.
+/// 40 ms, in frames.
+const NEAR: usize = 4;
+
+/// The frames within [`NEAR`] of one.
 fn near(onsets: &Onsets, frame: usize) -> Range<usize> {
-    frame.saturating_sub(4)..(frame + 5).min(onsets.strength.len())
+    frame.saturating_sub(NEAR)..(frame + NEAR + 1).min(onsets.strength.len())
 }
 
 /// The beat's time: the centre of the onset strength within 40 ms of the frame.
