@@ -251,7 +251,7 @@ impl Walk {
     ) -> (DVector<f64>, Score) {
         let mut here = self.score(&x);
         // Along the profile of K the fall is wanted to a hundredth only.
-        let enough = if held { 0.02 } else { 1e-3 };
+        let enough = if held { 0.02 } else { 1e-4 };
         let mut damping = LEAST_DAMPING;
         for _ in 0..60 {
             let mut normal = here.information.clone();
