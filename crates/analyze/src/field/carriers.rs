@@ -8,7 +8,7 @@ use crate::imu::orientation::{Options, batch};
 use crate::imu::rath::{ENDS, Motion};
 use crate::imu::track::{BRIDGED_S, period_s};
 use crate::imu::vertical::height;
-use crate::inputs::{Window, interpolate, mean_step_s, stretches};
+use crate::inputs::{Clocks, Window, interpolate, mean_step_s, stretches};
 use crate::median::median;
 use crate::metrics::{Datum, Metrics};
 use crate::phase::hilbert;
@@ -59,6 +59,8 @@ pub struct Carriers {
     worn: Vec<Worn>,
     /// Whether their clocks could not be held against each other.
     apart: bool,
+    /// How their clocks stand to each other, where that is known.
+    pub clocks: Clocks,
 }
 
 /// Whether a metric rests on the carriers' phases.
@@ -161,13 +163,14 @@ impl Carriers {
                 return vec![Quality::remark("", "clocks_apart", text)];
             }
         };
+        let done;
+        (self.clocks, done) = match leave {
+            true => (Clocks::LeftApart, "left as it is"),
+            false => (Clocks::SetByMotion, "put right before comparing phases"),
+        };
         let mut out = Vec::new();
         let walking = self.worn.iter_mut().filter(|w| w.steps.is_ok());
         for (k, (worn, offset_s)) in walking.zip(offsets_s).enumerate() {
-            let done = match leave {
-                true => "left as it is",
-                false => "put right before comparing phases",
-            };
             if !leave {
                 worn.ahead_s = offset_s;
                 worn.or_ahead_s = or_s.iter().map(|or| or[k]).collect();

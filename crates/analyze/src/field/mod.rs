@@ -71,7 +71,6 @@ pub struct Field {
     /// Their numbers, where they have some.
     beat_number: Option<Vec<f64>>,
     beat_source: &'static str,
-    clocks: inputs::Clocks,
     /// Whether nothing tells how the clock of the sound that they were heard in stands to the others.
     sound_is_adrift: bool,
     judge: Option<Judge>,
@@ -321,10 +320,9 @@ impl Field {
                     .push(Quality::remark(&topic, "clocks_apart", why));
             }
         }
-        field.clocks = match clocks.any_apart {
-            true => inputs::Clocks::LeftApart,
-            false => inputs::Clocks::Agree,
-        };
+        if clocks.any_apart {
+            field.carriers.clocks = inputs::Clocks::LeftApart;
+        }
         if !one_clock && !clocks.any_set {
             field.align(roles, leave);
         }
@@ -404,20 +402,14 @@ impl Field {
     /// Puts the carriers' clocks on each other, by the motion of the rath that they all drive, or says how with `leave`.
     fn align(&mut self, roles: &Roles, leave: bool) {
         if roles.patterns(Role::Carriers).len() >= 2 {
-            let said = self.carriers.align(self.motion.as_ref(), leave);
-            if said.iter().any(|q| q.kind == "clock_offset") {
-                self.clocks = match leave {
-                    true => inputs::Clocks::LeftApart,
-                    false => inputs::Clocks::SetByMotion,
-                };
-            }
-            self.quality.extend(said);
+            self.quality
+                .extend(self.carriers.align(self.motion.as_ref(), leave));
         }
     }
 
     /// Gives `inputs` the columns that it lacks.
     pub fn fill(&mut self, inputs: &mut Inputs) {
-        inputs.clocks = self.clocks;
+        inputs.clocks = self.carriers.clocks;
         if let Some(motion) = &self.motion
             && inputs.t_s.is_empty()
         {

@@ -216,8 +216,8 @@ impl<'a> Input<'a> {
 /// The plan of one message, at one place.
 struct Node {
     fields: Vec<(u64, Plan)>,
-    /// By field number of a member of a oneof: which one that is.
-    oneofs: HashMap<u64, usize>,
+    /// Which oneof each of the fields is a member of.
+    oneof: Vec<Option<usize>>,
     /// By oneof: the place of the member that came last.
     chosen: Vec<usize>,
     present: bool,
@@ -347,7 +347,9 @@ impl Node {
         }
         Node {
             chosen: vec![0; descriptor.oneofs().len()],
-            oneofs,
+            oneof: (fields.iter())
+                .map(|(number, _)| oneofs.get(number).copied())
+                .collect(),
             fields,
             present: false,
             stamp,
@@ -390,9 +392,9 @@ impl Node {
             };
             hint = position + 1;
             // Of a oneof the last member counts, and the others are as if they had not come.
-            if let Some(&oneof) = self.oneofs.get(&number) {
+            if let Some(oneof) = self.oneof[position] {
                 let before = std::mem::replace(&mut self.chosen[oneof], position);
-                if before != position && self.oneofs.get(&self.fields[before].0) == Some(&oneof) {
+                if before != position && self.oneof[before] == Some(oneof) {
                     self.fields[before].1.flush(rows, false);
                 }
             }

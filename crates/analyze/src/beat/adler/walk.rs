@@ -55,8 +55,7 @@ pub struct Walk {
     pub begins: bool,
     /// Whether the pull begins there too: nothing had sounded before.
     pub fresh: bool,
-    /// So long before the first beat the pull may have begun unheard, s: a beat where beats are heard, a sample where these are further apart
-    /// than steps.
+    /// So long before the first beat the pull may have begun unheard, s: a beat where beats are heard, a sample where their phase is recorded.
     pub unheard_s: f64,
     /// How long carriers are observed before it, s.
     pub before_s: f64,
