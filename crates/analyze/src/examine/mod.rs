@@ -76,6 +76,7 @@ pub fn examine(
             inputs.gravity_m_per_s2,
             request.truth,
             request.clocks,
+            !inputs.beat_phase_rad.is_empty(),
             |last_s| until(last_s, &mut Vec::new()),
         )?,
         Err(why) => {

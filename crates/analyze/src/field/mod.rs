@@ -98,7 +98,8 @@ struct Filled {
 
 impl Field {
     /// Reads the sensors' topics; nothing when the recording has none. Clocks are put on the rath's by taps, or the carriers' on each other by
-    /// their motion, as `devices` says. `window` is asked with the time of the sensors' last sample (s).
+    /// their motion, as `devices` says. Beats are read beside sensors, and where the beat is not known. `window` is asked with the time of the
+    /// sensors' last sample (s).
     ///
     /// # Errors
     /// Where the file cannot be read.
@@ -108,6 +109,7 @@ impl Field {
         gravity_m_per_s2: f64,
         truth: bool,
         devices: DeviceClocks,
+        beat_is_known: bool,
         window: impl FnOnce(f64) -> Window,
     ) -> Result<Self, ReadError> {
         let topics: Vec<&str> = [Role::Imu, Role::Carriers, Role::Beats, Role::Truth]
@@ -122,8 +124,9 @@ impl Field {
             .chain(roles.patterns(Role::Carriers));
         let mut field = Self::default();
         let sound = field.listen(recording)?;
-        let senses = imus.clone().next().is_some() || roles.topic(Role::Beats).is_some();
-        if topics.is_empty() || !(senses || truth) {
+        let senses = imus.clone().next().is_some();
+        let beats = roles.topic(Role::Beats).is_some() && !beat_is_known;
+        if topics.is_empty() || !(senses || beats || truth) {
             return Ok(field);
         }
         let factors = match thin::factors(recording, roles)? {
