@@ -717,6 +717,23 @@ fn log_of(scene: &sim::scene::Scene, path: &Path, seen: &dyn Fn(&str) -> bool) {
     writer.finish().unwrap();
 }
 
+/// Ten handles and more: [10] stands behind [9], not behind [1].
+#[test]
+fn each_handle_keeps_its_own_compression() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("twelve.mcap");
+    log_of(
+        &scene_of("eight-carriers carriers.count=12 duration_s=30"),
+        &path,
+        &|_| true,
+    );
+    let (field, told) = Field::read(&path, None, false).unwrap();
+    assert_eq!(field.compression_m.len(), 12);
+    let found = fit(&field, told.window);
+    assert_holds(find(&found, "stiffness"), 3000.0, 1.0);
+    assert_holds(find(&found, "damping"), 450.0, 1.0);
+}
+
 /// Fifty field recordings of the music scene, sensors with the noise of a real chip: each true value lies in its interval at least 45
 /// times.
 #[test]

@@ -16,14 +16,15 @@ pub mod viewer;
 use std::hash::{DefaultHasher, Hash, Hasher};
 
 use blueprint::Play;
-use recording::read::Info;
+use recording::read::Recording;
 use store::{Progress, Sink, Store};
 use take::Take;
 
 /// The id under which the viewer keeps a recording: the same for the same file, another for another.
-pub fn recording_id(name: &str, info: &Info) -> String {
+pub fn recording_id(name: &str, recording: &Recording) -> String {
+    let (info, scene) = (recording.info(), recording.attachment("scene.toml"));
     let mut hasher = DefaultHasher::new();
-    (name, info.start_ns, &info.library, &info.metadata).hash(&mut hasher);
+    (name, info.start_ns, &info.library, &info.metadata, scene).hash(&mut hasher);
     format!("{:016x}", hasher.finish())
 }
 

@@ -22,7 +22,7 @@ const PIECE_BYTES: usize = 1 << 16;
 const PAUSE: Duration = Duration::from_millis(100);
 /// A reading may take one part in so many of the time.
 const EFFORT: u32 = 4;
-/// How long an event may take to be recognised, s: younger ones wait while there is more to come.
+/// How long an event may take to be recognised, and an estimate to settle, s: younger ones wait while there is more to come.
 const SETTLE_S: f64 = 10.0;
 
 /// Shows what comes through `input` until it ends. Returns what the reader found odd in the end.
@@ -106,6 +106,7 @@ impl Shown {
         let (mut take, _) = load(STDIN, &recording, Detail::Whole)?;
         let settled_s = whole_s(take.duration_s() - SETTLE_S);
         take.events.retain(|event| event.t_s < settled_s);
+        take.keep_settled(take.start_ns.saturating_add((settled_s * 1e9) as i64));
         // What looks like damage is only what has not come yet.
         take.remarks.clear();
         self.show(&recording, &take, sink)
@@ -126,7 +127,7 @@ impl Shown {
     ) -> anyhow::Result<()> {
         let id = self
             .id
-            .get_or_insert_with(|| crate::recording_id(&take.name, recording.info()))
+            .get_or_insert_with(|| crate::recording_id(&take.name, recording))
             .clone();
         let sent = crate::send_part(sink, &id, take, self.progress.take())?;
         self.progress = Some(sent.progress);

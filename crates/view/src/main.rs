@@ -1,6 +1,6 @@
 //! `view`: opens a recording in the Rerun viewer, or writes what it would show.
 
-use std::io::{BufWriter, Chain, Cursor, Read, Stdin, Write};
+use std::io::{BufWriter, Chain, Cursor, ErrorKind, Read, Stdin, Write};
 use std::net::{TcpStream, ToSocketAddrs};
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
@@ -33,6 +33,9 @@ struct Arguments {
     #[arg(long, value_name = "URL", group = "target")]
     connect: Option<String>,
 }
+
+/// Who does not answer within this does not.
+const ANSWERS: Duration = Duration::from_secs(5);
 
 /// Exit code where the input was damaged and what could be saved was used.
 const DAMAGED: u8 = 3;
@@ -171,7 +174,7 @@ fn source(file: &Path, input: Input) -> anyhow::Result<Source> {
     };
     let (take, findings) = load(&name(file), &recording, Detail::Thinned)?;
     check(file, &take, &findings)?;
-    let id = view::recording_id(&take.name, recording.info());
+    let id = view::recording_id(&take.name, &recording);
     Ok(Source::Whole(Box::new(take), id, findings))
 }
 
@@ -221,7 +224,7 @@ fn save(file: &Path, path: &Path) -> anyhow::Result<Vec<Finding>> {
         let mut encoded = Encoded::new(file)?;
         view::send(
             &mut encoded,
-            &view::recording_id(&take.name, recording.info()),
+            &view::recording_id(&take.name, &recording),
             &take,
         )?;
         encoded.finish()?;
@@ -260,12 +263,28 @@ fn answering(uri: re_uri::ProxyUri, url: &str) -> anyhow::Result<re_uri::ProxyUr
     let place = format!("{}:{}", uri.origin.host, uri.origin.port);
     let mut last = None;
     for address in place.to_socket_addrs().map_err(|e| nobody(&e))? {
-        match TcpStream::connect_timeout(&address, Duration::from_secs(5)) {
-            Ok(_) => return Ok(uri),
+        match TcpStream::connect_timeout(&address, ANSWERS) {
+            Ok(peer) => match greeted(peer) {
+                Ok(()) => return Ok(uri),
+                Err(error) => last = Some(error),
+            },
             Err(error) => last = Some(error),
         }
     }
     Err(last.map_or_else(|| nobody(&"the name has no address"), |e| nobody(&e)))
+}
+
+/// That something is said to a greeting of HTTP/2: its preface and empty settings (RFC 9113, 3.4).
+fn greeted(mut peer: TcpStream) -> std::io::Result<()> {
+    peer.set_read_timeout(Some(ANSWERS))?;
+    peer.write_all(b"PRI * HTTP/2.0\r\n\r\nSM\r\n\r\n\0\0\0\x04\0\0\0\0\0")?;
+    match peer.read(&mut [0]) {
+        Ok(_) => Ok(()),
+        Err(error) if error.kind() == ErrorKind::WouldBlock => Err(std::io::Error::other(
+            "what listens takes the connection and says nothing",
+        )),
+        Err(error) => Err(error),
+    }
 }
 
 /// Starts the viewer, sends the recording into it and waits until it is closed.

@@ -205,6 +205,28 @@ impl Take {
         (mean > 0.0).then_some((mean, "mean support"))
     }
 
+    /// Leaves out what is estimated of times from `until_ns` on: what is still to come changes it.
+    pub fn keep_settled(&mut self, until_ns: i64) {
+        let settled = |times_ns: &[i64]| times_ns.partition_point(|t| *t < until_ns);
+        let i = &mut self.inputs;
+        if i.sources.attitude == "imu" {
+            let n = settled(&self.state_ns);
+            let shared = [&mut i.t_s, &mut i.height_m, &mut i.support_ratio];
+            let angles = [&mut i.roll_rad, &mut i.pitch_rad, &mut i.yaw_rad];
+            let all = shared.into_iter().chain(angles).chain(&mut i.heave_m);
+            all.for_each(|column| column.truncate(n));
+            let times = [&mut self.state_ns, &mut self.height_ns, &mut self.force_ns];
+            times.into_iter().for_each(|t| t.truncate(settled(t)));
+        }
+        if i.phases_are_measured {
+            let n = settled(&self.phase_ns);
+            let columns = [&mut i.phase_t_s, &mut i.beat_phase_rad];
+            let all = columns.into_iter().chain(&mut i.phase_rad);
+            all.for_each(|column| column.truncate(n));
+            self.phase_ns.truncate(n);
+        }
+    }
+
     /// Length, s.
     pub fn duration_s(&self) -> f64 {
         (i128::from(self.end_ns) - i128::from(self.start_ns)) as f64 / 1e9

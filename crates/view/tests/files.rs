@@ -73,6 +73,9 @@ fn nothing_is_left_where_it_cannot_be_done() {
     std::fs::write(path("empty.mcap"), b"").unwrap();
     run(path("run.mcap").as_ref(), 2);
     let before: usize = std::fs::read_dir(folder.path()).unwrap().count();
+    // Takes connections, and says nothing.
+    let silent = std::net::TcpListener::bind("127.0.0.1:0").unwrap();
+    let silent = format!("rerun+http://{}/proxy", silent.local_addr().unwrap());
     for (arguments, words) in [
         (
             vec![path("none.mcap"), "--save".into(), path("out.rrd")],
@@ -106,6 +109,10 @@ fn nothing_is_left_where_it_cannot_be_done() {
                 "rerun+http://127.0.0.1:1/proxy".into(),
             ],
             "nobody answers there",
+        ),
+        (
+            vec![path("run.mcap"), "--connect".into(), silent],
+            "says nothing",
         ),
     ] {
         let output = view(&arguments.iter().map(String::as_str).collect::<Vec<_>>());
@@ -202,6 +209,48 @@ fn what_comes_in_pieces_is_shown_once_and_whole() {
         whole.scalars("/plots/angles/roll")
     );
     assert!(live.0.len() > whole.0.len(), "it came in one piece");
+}
+
+/// What is still to come changes an estimate at the end of what has come.
+#[test]
+fn estimates_of_what_grows_are_sent_when_they_are_settled() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("imu.mcap");
+    imus(&path, 1, 60, 100);
+    let (whole, _) = taken(&path);
+    let mut live = Taken::default();
+    let bytes = std::fs::read(&path).unwrap();
+    view::live::follow(Slow(std::io::Cursor::new(bytes)), &mut live).unwrap();
+    assert!(live.0.len() > whole.0.len(), "it came in one piece");
+    for (curve, off) in [("/plots/height/z", 1e-3), ("/plots/angles/roll", 0.02)] {
+        let (live, whole) = (live.scalars(curve), whole.scalars(curve));
+        assert_eq!(live.len(), whole.len(), "{curve}");
+        for (a, b) in live.iter().zip(&whole) {
+            assert_eq!((a.0, a.1.is_finite()), (b.0, b.1.is_finite()), "{curve}");
+            assert!(!(a.1 - b.1).abs().gt(&off), "{curve}: {a:?}, {b:?}");
+        }
+    }
+}
+
+/// A scene with other settings is another recording.
+#[test]
+fn what_differs_has_another_id() {
+    let folder = tempfile::tempdir().unwrap();
+    let id = |name: &str, beat_hz: f64| {
+        let path = folder.path().join(name);
+        let mut writer = RecordingWriter::create(&path, &WriterOptions::default()).unwrap();
+        let scene = format!("beat_hz = {beat_hz}");
+        writer
+            .attachment("scene.toml", "application/toml", scene.as_bytes())
+            .unwrap();
+        writer.finish().unwrap();
+        view::recording_id(
+            "music, seed 1",
+            &Recording::open(&path, &options()).unwrap(),
+        )
+    };
+    assert_eq!(id("a.mcap", 2.15), id("b.mcap", 2.15));
+    assert_ne!(id("a.mcap", 2.15), id("b.mcap", 2.6));
 }
 
 #[test]

@@ -1,7 +1,7 @@
 //! Names in an order for people.
 
 /// Order of names in which numbers count as numbers: `[2]` before `[10]`.
-pub(super) fn natural(a: &str, b: &str) -> std::cmp::Ordering {
+pub fn natural(a: &str, b: &str) -> std::cmp::Ordering {
     let (mut a, mut b) = (a.as_bytes(), b.as_bytes());
     loop {
         let digits = |s: &[u8]| s.iter().take_while(|c| c.is_ascii_digit()).count();

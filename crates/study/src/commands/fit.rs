@@ -142,7 +142,7 @@ fn line(e: &Estimate, after: &str) -> String {
 }
 
 /// Means over the files, with the 95 % interval of the mean by Student's t from their spread, or that which the files' own intervals leave, if that is wider:
-/// files that one clock kept the beat of agree by more than they know. Of one file that file's own.
+/// files that one clock kept the beat of agree by more than they know. Only of what at least half of the files tell: fewer are a choice.
 fn common(all: &[(String, Vec<Outcome>)]) -> Vec<(Estimate, usize)> {
     let mut names: Vec<(&str, &'static str)> = Vec::new();
     for e in all.iter().flat_map(|(_, found)| found.iter().flatten()) {
@@ -157,7 +157,7 @@ fn common(all: &[(String, Vec<Outcome>)]) -> Vec<(Estimate, usize)> {
                 let all = all.iter().flat_map(|(_, found)| found.iter().flatten());
                 all.filter(|e| e.name == name)
             };
-            let s = summarise(of().map(|e| e.value))?;
+            let s = summarise(of().map(|e| e.value)).filter(|s| 2 * s.runs >= all.len())?;
             if s.runs == 1 {
                 return Some((of().next()?.clone(), 1));
             }
@@ -198,5 +198,9 @@ mod tests {
         // 0.3/√n, and where they differ by more Student's t: 12.7062 of SD/√2, which is a half of their distance.
         assert!((half(&[2.0, 2.0, 2.0, 2.0].map(file)) - 0.15).abs() < 1e-12);
         assert!((half(&[2.0, 3.0].map(file)) - 12.706_204_736 * 0.5).abs() < 1e-9);
+        // One of two tells it, one of three.
+        let none = || ("none".to_owned(), Vec::new());
+        assert_eq!(common(&[file(2.0), none()]).len(), 1);
+        assert!(common(&[file(2.0), none(), none()]).is_empty());
     }
 }

@@ -71,7 +71,8 @@ pub fn run(args: &Args) -> Result<()> {
         .chars()
         .map(|c| if c.is_ascii_alphanumeric() { c } else { '-' })
         .collect();
-    // The study's own copy of itself: what is run is what was submitted, whatever becomes of the file.
+    // The study's own copy of itself: what is run is what was submitted, whatever becomes of the file. Each task is told of how many it is, so that
+    // those that are missing can be submitted again (`sbatch --array=3,5 job.sh`).
     let script = format!(
         "#!/bin/sh\n\
          #SBATCH --job-name=study-{name}\n\
@@ -80,12 +81,13 @@ pub fn run(args: &Args) -> Result<()> {
          #SBATCH --requeue\n\
          #SBATCH --open-mode=append\n\
          #SBATCH --output={}\n\
-         exec {} run {} --out {} --jobs \"${{SLURM_CPUS_PER_TASK:-{}}}\"\n",
+         exec {} run {} --shard \"$SLURM_ARRAY_TASK_ID/{}\" --out {} --jobs \"${{SLURM_CPUS_PER_TASK:-{}}}\"\n",
         args.tasks,
         args.cpus,
         directive(&out.join("task-%a.log"))?,
         shell(&study),
         shell(&out.join("study.toml")),
+        args.tasks,
         shell(&out),
         args.cpus
     );

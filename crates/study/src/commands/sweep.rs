@@ -72,9 +72,13 @@ pub fn plan(file: &Path) -> Result<Plan> {
 /// Computes what is missing, and merges when all is there.
 pub fn run(args: &Args) -> Result<()> {
     let out = folder(&args.file, args.out.as_ref());
+    // The study's own copy knows of `--seeds`.
+    let shard = args
+        .shard
+        .map_or_else(String::new, |s| format!(" --shard {s}"));
     let goes_on = format!(
-        "`study {} --resume --out {}` goes on",
-        args.file.display(),
+        "`study {} --resume --out {}{shard}` goes on",
+        out.join("study.toml").display(),
         out.display()
     );
     let stop = watch_interrupts(format!(
@@ -219,6 +223,7 @@ fn json(
         "runs": summary.runs,
         "failed": summary.failures,
         "reasons": summary.reasons,
+        "other_reasons": summary.other_reasons,
         "metrics": metrics,
         "sensitivity": indices.map(|all| study::sweep::sensitivity::to_json(all)),
     })

@@ -21,17 +21,18 @@
 //! over a second as white noise would be (stronger by half and five standard errors, or weaker by three), or a tenth of it and more comes back with a carrier's own steps, carriers do what the model does not know, and
 //! nothing is told. On a graph, the scene's, the coupling is K_c/(d_i + 1) times the sum over the d_i neighbours.
 //! Nothing reaches across a hole of the record: no increment, no spline, no straight line through a beat.
-//! k, c where compression was recorded, a, b: linear least squares on means over three samples and Lele's slope or second derivative that goes with them, errors
-//! of (ωΔt)⁶/2100 and (ωΔt)⁶/3300. Their intervals are a jackknife's over blocks of two roll periods, all handles together, because neighbours are alike, with Student's t, because
-//! contact may be kept in a few of them only; three sixty-thirds are added of what leaving out every other sample changes, three times the error of such a rule
-//! (Roache 1994). θ̇ is the not-a-knot spline's, as δ̇ is from sensors, whose k, c have intervals from a moving-block bootstrap (500 draws, the same blocks).
+//! k, c where compression was recorded: linear least squares on means over three samples and Lele's slope that goes with them, errors of (ωΔt)⁶/2100; a, b: the
+//! equation under windows of four roll periods that vanish with their derivatives at both ends, so that no rate of the roll is taken. Their intervals are a jackknife's over
+//! blocks of 2 s, all handles together, and of one such window, because neighbours are alike, with Student's t, because contact may be kept in a few of them only;
+//! three sixty-thirds count of what leaving out every other sample changes, three times the error of a rule of the sixth order (Roache 1994).
+//! δ̇ from sensors is the not-a-knot spline's; k, c have intervals from a moving-block bootstrap (500 draws, the same blocks) then.
 //! Where steps tell the phases, pull and gait are those of Adler's test
 //! ([`analyze::beat::adler`]), which knows that a step detector smooths them and finds τ by itself. Contact from sensors adds what it changes by when every other
 //! sample is left out: a bound, 15 times over, of what the sampling does. From sensors z_i is the shoulder's and the body's motion about
 //! their slow course, δ_i = z_i − (body's height + (R p_i)_z), N_tot the body's specific force times its mass; a handle carries where
 //! k δ_i + c δ̇_i + e/N, its share of the load, is above a seventh of the weight over N. The intervals of k and c reach to what they would be if all
 //! that is missed were an error of δ, or of δ̇, and not of the force (Frisch 1934); one that is wider than its value tells none. Source: Seber & Wild, Nonlinear Regression (1989);
-//! Künsch, Ann. Stat. 17 (1989); Lele, J. Comput. Phys. 103 (1992) 16; docs/reproduction.md.
+//! Künsch, Ann. Stat. 17 (1989); Lele, J. Comput. Phys. 103 (1992) 16; Shinbrot, Trans. ASME 79 (1957) 547; docs/reproduction.md.
 
 mod contact;
 mod gait;

@@ -2,7 +2,7 @@
 
 use super::{Clocks, Field};
 use analyze::Window;
-use analyze::examine::{Request, examine};
+use analyze::examine::{Request, examine, natural};
 use analyze::field::DeviceClocks;
 use analyze::inputs;
 use analyze::quality::Quality;
@@ -70,7 +70,7 @@ impl Field {
         let analysis = examine(&name, &recording, &request)?;
         let (mut signals, _) =
             recording.signals(&|path| path.starts_with("/handles/forces.compression_m"))?;
-        signals.sort_by(|a, b| a.path.cmp(&b.path));
+        signals.sort_by(|a, b| natural(&a.path, &b.path));
         let forces = analysis.inputs.force_times().len();
         let compression_m: Vec<Vec<f64>> = signals
             .into_iter()

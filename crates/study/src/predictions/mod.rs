@@ -304,7 +304,7 @@ pub fn page(findings: &[(&str, Finding)], pictures: &str, seeds: u64) -> String 
     }
     let mut out = format!(
         "# The paper's predictions, tried\n\n    $ cargo run --release -p study -- predictions{words} --out docs\n\n\
-         wrote this page and its pictures, with {seeds} seeds for every ensemble. What the scenes are: docs/reproduction.md; what the\n\
+         wrote this page and its pictures, with {seeds} seeds for an ensemble where nothing else is said. What the scenes are: docs/reproduction.md; what the\n\
          metrics are: docs/metrics.md. Everything said here is said of this model, not of any procession.\n\n\
          | prediction | verdict | condition |\n|---|---|---|\n"
     );
@@ -315,7 +315,7 @@ pub fn page(findings: &[(&str, Finding)], pictures: &str, seeds: u64) -> String 
                 "| {} | **{}** | {} |",
                 f.title,
                 verdict.word(),
-                f.because
+                cell(&f.because)
             );
         }
     }

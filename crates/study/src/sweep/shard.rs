@@ -91,9 +91,17 @@ impl Shard {
                 None => s.first.1,
             };
             let told = s.count.and_then(|name| Some((name, get(name)?)));
+            let told = told
+                .map(|(name, text)| Ok::<_, String>((name, number(name, &text)?)))
+                .transpose()?;
             let count = match (shards, told) {
+                (Some(n), Some((name, count))) if n != count => {
+                    return Err(format!(
+                        "--shards is {n}, but {name} is {count}: which of {n} a task is, a part of them does not tell; give --shard K/{n}"
+                    ));
+                }
                 (Some(n), _) => n,
-                (None, Some((name, text))) => number(name, &text)?,
+                (None, Some((_, count))) => count,
                 (None, None) => {
                     return Err(format!(
                         "{} says which task this is, but not of how many: give --shards N",
@@ -166,6 +174,10 @@ mod tests {
             "SLURM_ARRAY_TASK_COUNT" => Some("4".into()),
             _ => None,
         };
+        let found = Shard::of_environment(Some(4), slurm).unwrap().unwrap();
+        assert_eq!(found.0, Shard { index: 2, count: 4 });
+        let part = Shard::of_environment(Some(8), slurm).unwrap_err();
+        assert!(part.contains("--shard K/8"), "{part}");
         let found = Shard::of_environment(None, slurm).unwrap().unwrap();
         assert_eq!(found, (Shard { index: 2, count: 4 }, "SLURM_ARRAY_TASK_ID"));
         let kubernetes = |name: &str| (name == "JOB_COMPLETION_INDEX").then(|| "1".into());

@@ -277,7 +277,10 @@ fn check_axis(axis: &Axis) -> Result<(), String> {
     if axis.key.is_empty() || axis.key == "seed" {
         return Err("expected a key of the scene; seeds have a line of their own, `seeds`".into());
     }
-    if let Some((key, _)) = axis.along.iter().find(|(_, v)| number(v).is_none()) {
+    if let Some((key, _)) = flatten(&axis.along)
+        .iter()
+        .find(|(_, v)| number(v).is_none())
+    {
         return Err(format!("with.{key}: expected the factor as a number"));
     }
     match (axis.values.is_empty(), axis.from, axis.to) {

@@ -132,8 +132,10 @@ pub struct Found {
     pub runs: u64,
     /// Of these, without a result.
     pub failures: u64,
-    /// Reasons and how often each was given.
+    /// Reasons and how often each was given, of the first that differ.
     pub reasons: Vec<(String, u64)>,
+    /// Failed runs whose reason is none of these.
+    pub other_reasons: u64,
 }
 
 impl<W: Write> Summary<W> {
@@ -196,7 +198,7 @@ impl<W: Write> Summary<W> {
                 Some(k) => found.reasons[k].1 += 1,
                 // Enough to see what is wrong; a reason that names a time differs in every run.
                 None if found.reasons.len() < 20 => found.reasons.push((reason.clone(), 1)),
-                None => {}
+                None => found.other_reasons += 1,
             }
         }
         for (values, place) in self.values.iter_mut().zip(&self.places) {
@@ -298,6 +300,10 @@ impl Found {
             let times = recording::text::counted(*count, "time", "times");
             out += &format!("failed {times}: {reason}\n");
         }
+        if self.other_reasons > 0 {
+            let times = recording::text::counted(self.other_reasons, "time", "times");
+            out += &format!("failed {times} for other reasons: `failed` in the table of runs\n");
+        }
         out
     }
 }
@@ -307,6 +313,7 @@ fn place(axes: &[Cell]) -> String {
         .iter()
         .map(|c| match c {
             Cell::Text(x) => x.clone(),
+            Cell::Truth(x) => x.to_string(),
             other => other.number().map_or("–".into(), short),
         })
         .collect();
@@ -366,11 +373,18 @@ mod tests {
             ranges: vec![Range::default(); 3],
             points: 4,
             runs: 16,
-            failures: 1,
+            failures: 3,
             reasons: vec![("too steep".into(), 1)],
+            other_reasons: 2,
             ..Found::default()
         };
-        let place = |x: f64| [Cell::Real(x), Cell::Text("bristle".into())];
+        let place = |x: f64| {
+            [
+                Cell::Real(x),
+                Cell::Text("bristle".into()),
+                Cell::Truth(x < 15.0),
+            ]
+        };
         let spread = |values: &[f64], turn| Spread::of_turning(values, turn).unwrap();
         for (at, values) in [
             (10.0, &[2.0, 3.0, 4.0][..]),
@@ -391,19 +405,22 @@ mod tests {
             line.split_whitespace().collect()
         };
         assert!(
-            text.starts_with("4 points, 16 runs, 1 without a result"),
+            text.starts_with("4 points, 16 runs, 3 without a result"),
             "{text}"
         );
-        let ends = "1.000 2.000 3.000 (20.00, bristle), (10.00, bristle) in 10 of 16 runs";
+        let ends =
+            "1.000 2.000 3.000 (20.00, bristle, false), (10.00, bristle, true) in 10 of 16 runs";
         assert_eq!(cells("a ")[1..].join(" "), ends);
         // −176° is 184°.
-        let ends = "170.0 176.0 184.0 (10.00, bristle), (20.00, bristle) in 12 of 16 runs";
+        let ends =
+            "170.0 176.0 184.0 (10.00, bristle, true), (20.00, bristle, false) in 12 of 16 runs";
         assert_eq!(cells("turning")[1..].join(" "), ends);
         assert_eq!(
             cells("few")[1..].join(" "),
             "– in 1 of 16 runs, at no point in half of them"
         );
-        assert!(text.ends_with("failed 1 time: too steep\n"), "{text}");
+        let reasons = "failed 1 time: too steep\nfailed 2 times for other reasons: `failed` in the table of runs\n";
+        assert!(text.ends_with(reasons), "{text}");
         let near = spread(&[-3.0, -2.0, -1.0], None).near(359.0, 360.0);
         assert_eq!((near.mean, near.quantiles[1]), (358.0, 358.0));
     }

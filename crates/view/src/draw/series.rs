@@ -601,7 +601,7 @@ fn stored(take: &Take) -> Option<(String, Vec<Line<'_>>)> {
         "Stored energy [J]",
         &[
             ("kinetic", palette::BLUE, "blue"),
-            ("potential about its mean", palette::YELLOW, "yellow"),
+            ("potential since the beginning", palette::YELLOW, "yellow"),
             ("elastic", palette::ORANGE, "orange"),
         ],
     )

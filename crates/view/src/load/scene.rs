@@ -153,11 +153,11 @@ fn beside(take: &Take) -> Option<Vec<[f64; 3]>> {
     )
 }
 
-/// The ledger; the potential, whose zero is arbitrary, is counted from its mean.
+/// The ledger; the potential, whose zero is arbitrary, is counted from its beginning, which no later sample changes.
 pub fn energy(signals: &BTreeMap<&str, &Signal>) -> Option<Ledger> {
     const COLUMNS: [(&str, &str); 6] = [
         ("kinetic", "kinetic_j"),
-        ("potential about its mean", "potential_j"),
+        ("potential since the beginning", "potential_j"),
         ("elastic", "elastic_j"),
         ("work in", "work_in_j"),
         ("dissipated", "dissipated_j"),
@@ -172,8 +172,8 @@ pub fn energy(signals: &BTreeMap<&str, &Signal>) -> Option<Ledger> {
             ledger.times_ns = signal.times_ns.to_vec();
         }
         if signal.times_ns[..] == ledger.times_ns[..] {
-            let mean = || signal.values.iter().sum::<f64>() / signal.values.len().max(1) as f64;
-            let from = if field == "potential_j" { mean() } else { 0.0 };
+            let first = signal.values.iter().find(|j| j.is_finite());
+            let from = first.filter(|_| field == "potential_j").unwrap_or(&0.0);
             ledger
                 .columns
                 .push((name, signal.values.iter().map(|j| j - from).collect()));

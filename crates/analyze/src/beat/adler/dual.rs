@@ -41,7 +41,10 @@ impl<const N: usize> Dual<N> {
     /// It and `more`, whose slopes are those of these numbers, each times its factor.
     #[inline(always)]
     pub fn with<const M: usize>(&self, more: f64, by: [(f64, &Self); M]) -> Self {
-        let slope = |k: usize| by.iter().fold(self.slope[k], |s, (c, x)| s + c * x.slope[k]);
+        let slope = |k: usize| {
+            by.iter()
+                .fold(self.slope[k], |s, (c, x)| s + c * x.slope[k])
+        };
         Dual {
             value: self.value + more,
             slope: std::array::from_fn(slope),
