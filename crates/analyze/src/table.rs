@@ -330,6 +330,7 @@ fn quaternions(columns: &[Column]) -> Vec<Column> {
             if !named.contains_key(path.as_str()) {
                 out.push(Column {
                     signal: Signal {
+                        topic: w.signal.topic.clone(),
                         path,
                         unit: "rad".into(),
                         times_ns: times_ns.clone(),

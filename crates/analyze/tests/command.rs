@@ -1328,6 +1328,46 @@ fn angles_are_in_the_messages_that_hold_all_of_a_quaternion() {
     }
 }
 
+/// A rath that rolls by 15° at 1 Hz, and an accelerometer that now and then says nothing: what it missed is a hole, not a shift.
+#[test]
+fn a_sample_that_lacks_a_value_is_a_hole() {
+    let folder = tempfile::tempdir().unwrap();
+    let message = |k: u32| {
+        let t = 0.01 * f64::from(k);
+        let turn = std::f64::consts::TAU;
+        let (roll, rate) = (
+            15f64.to_radians() * tone(1.0, t),
+            15f64.to_radians() * turn * (turn * t).cos(),
+        );
+        let felt = match k % 30 {
+            7 => "null,\"y\":null,\"z\":null".to_owned(),
+            _ => format!(
+                "0,\"y\":{},\"z\":{}",
+                9.80665 * roll.sin(),
+                9.80665 * roll.cos()
+            ),
+        };
+        let text = format!(
+            "{{\"angular_velocity\":{{\"x\":{rate},\"y\":0,\"z\":0}},\"linear_acceleration\":{{\"x\":{felt}}}}}"
+        );
+        (t, text)
+    };
+    let file = told(
+        folder.path(),
+        &[("/imu/rath", (0..6000).map(message).collect())],
+    );
+    let found = with_roles(folder.path(), &file, "imu = \"/imu/rath\"");
+    let roll = metric(&found, "rms_roll_deg");
+    // 15°/√2.
+    assert!((roll - 10.607).abs() < 0.01, "{roll}");
+    assert!(
+        kinds(&found).contains(&"left_out".to_owned()),
+        "{:?}",
+        found["quality"]
+    );
+    assert!(found["quality"].to_string().contains("200 of 6000 samples"));
+}
+
 /// Fields that some messages lack do not make more rows of a thinned topic, nor uneven ones.
 #[test]
 fn a_topic_is_thinned_by_its_messages() {
