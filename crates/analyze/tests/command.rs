@@ -1397,6 +1397,56 @@ fn a_topic_is_thinned_by_its_messages() {
     let expected: Vec<f64> = (0..60).map(|k| f64::from(10 * k)).collect();
     assert_eq!(found, expected);
     assert_eq!(column(&table, "/t.a").len(), 65);
+    // A row that another topic keeps at one of its times is none of its own.
+    let beside = |k: u32| (0.05 + 0.1 * f64::from(k), "{\"s\":1}".to_owned());
+    let topics = [
+        ("/t", (0..600).map(message).collect()),
+        ("/s", (0..50).map(beside).collect()),
+    ];
+    let file = told(folder.path(), &topics);
+    let done = analyze(&[&file, "--downsample", "10", "--out", out]);
+    assert!(done.status.success(), "{}", text(&done.stderr));
+    let found: Vec<f64> = column(&table, "/t.a").into_iter().flatten().collect();
+    assert_eq!(found, expected);
+    assert_eq!(column(&table, "/s.s").into_iter().flatten().count(), 5);
+    // Without a table nothing is thinned.
+    let alone = analyze(&[&file, "--downsample", "10"]);
+    assert_eq!(alone.status.code(), Some(2));
+}
+
+/// `/a` with a field `b.x`, and `/a.b` with a field `x`: what the listing lists is what the table holds, by topic and by the name that tells them apart.
+#[test]
+fn a_table_holds_the_topics_that_were_asked_for() {
+    let folder = tempfile::tempdir().unwrap();
+    let topic =
+        |message: fn(u32) -> String| (0..100).map(|k| (0.1 * f64::from(k), message(k))).collect();
+    let topics = [
+        ("/a", topic(|k| format!("{{\"b\":{{\"x\":{k}}}}}"))),
+        (
+            "/a.b",
+            topic(|k| format!("{{\"x\":{},\"y\":{k}}}", 1000 + k)),
+        ),
+        ("/forces", topic(|k| format!("{{\"n\":{k}}}"))),
+        ("/left", topic(|k| format!("{{\"force\":{{\"z\":{k}}}}}"))),
+    ];
+    let file = told(folder.path(), &topics);
+    let table = folder.path().join("x.csv");
+    for (asked, held) in [
+        (["--topic", "/a"], &["/a.b.x"][..]),
+        (["--topic", "/a.b"], &["/a.b.y", "/a.b:x"]),
+        (["--topic", "*force*"], &["/forces.n"]),
+        (["--signal", "/a.b:x"], &["/a.b:x"]),
+    ] {
+        let out = ["--format", "json", "--out", table.to_str().unwrap()];
+        let found = json(&[&[&*file], &asked[..], &out].concat());
+        let listed: Vec<&String> = found["signals"].as_object().unwrap().keys().collect();
+        assert_eq!(listed, held, "{asked:?}");
+        let written = std::fs::read_to_string(&table).unwrap();
+        let names = written.lines().next().unwrap().split(',').skip(2);
+        assert_eq!(names.collect::<Vec<_>>(), held, "{asked:?}");
+    }
+    let x = column(&table, "/a.b:x");
+    assert_eq!((x[0], x[99]), (Some(1000.0), Some(1099.0)));
 }
 
 /// Messages of one time have a row each, whatever their fields are, and from whichever channel of the topic they come; other topics stand in the first. What is
