@@ -300,6 +300,40 @@ fn tables_for_people_fit_a_terminal() {
     assert!(csv.starts_with("file,metric,value,unit,source,per,ci95,reason\n"));
 }
 
+/// Signals of two rates: each spectrum stands under its own resolution, each line has its count and jitter.
+#[test]
+fn spectra_are_told_with_their_own_resolution() {
+    let folder = tempfile::tempdir().unwrap();
+    let at = |hz: f64, n: u32| {
+        let each = (0..n).map(|k| f64::from(k) / hz);
+        each.map(|t| (t, format!("{{\"x\":{}}}", tone(1.0, t))))
+            .collect()
+    };
+    let file = told(
+        folder.path(),
+        &[("/a", at(10.0, 600)), ("/b", at(50.0, 1500))],
+    );
+    let out = analyze(&[&file, "--signal", "*.x"]);
+    let table = text(&out.stdout);
+    let heads: Vec<&str> = table
+        .lines()
+        .filter(|l| l.starts_with("Spectra ("))
+        .collect();
+    assert!(heads.len() == 2 && heads[0] != heads[1], "{table}");
+    let cells = |start: &str| -> Vec<String> {
+        let line = table.lines().rfind(|l| l.trim_start().starts_with(start));
+        line.unwrap()
+            .split_whitespace()
+            .map(str::to_owned)
+            .collect()
+    };
+    let names = [
+        "Signals", "count", "Hz", "jitter", "s", "min", "mean", "max", "SD", "peak", "Hz",
+    ];
+    assert_eq!(cells("Signals"), names);
+    assert_eq!(cells("/b.x")[1..3], ["1,500", "50"]);
+}
+
 #[test]
 fn roles_name_what_is_what() {
     let folder = tempfile::tempdir().unwrap();
@@ -2018,6 +2052,20 @@ fn an_onset_before_the_window_is_told() {
             .contains("may have begun before"),
         "{onset}"
     );
+    // People are told what scripts are; what is said of several numbers, once.
+    let roles = folder.path().join("roles.toml");
+    let out = analyze(&[&file, "--roles", roles.to_str().unwrap()]);
+    let table = text(&out.stdout);
+    let words: Vec<&str> = table.split_whitespace().collect();
+    let table = words.join(" ");
+    for said in [
+        "may have begun before",
+        "dz_pp_m, rms_z_m: of what heaves faster than",
+        "t_float, h2_ratio, growth_ratio: as if the sensor sat at the centre of mass",
+    ] {
+        assert_eq!(table.matches(said).count(), 1, "{said}: {table}");
+    }
+    assert_eq!(table.matches("of what heaves faster").count(), 1, "{table}");
 }
 
 /// A recording is not written under the name of a table.
