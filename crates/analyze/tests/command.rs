@@ -334,6 +334,42 @@ fn spectra_are_told_with_their_own_resolution() {
     assert_eq!(cells("/b.x")[1..3], ["1,500", "50"]);
 }
 
+/// Leads of 170° and −170° are 20° apart.
+#[test]
+fn leads_are_averaged_around_the_circle() {
+    let folder = tempfile::tempdir().unwrap();
+    let roles = folder.path().join("roles.toml");
+    std::fs::write(&roles, "phases = \"/p.phi[*]\"\nbeat_phase = \"/p.psi\"\n").unwrap();
+    let led = |name: &str, lead_deg: f64| {
+        let folder = folder.path().join(name);
+        std::fs::create_dir(&folder).unwrap();
+        let message = |k: u32| {
+            let t = f64::from(k) / 30.0;
+            let psi = std::f64::consts::TAU * 2.0 * t;
+            let phi = psi + lead_deg.to_radians();
+            (t, format!("{{\"phi\":[{phi},{phi}],\"psi\":{psi}}}"))
+        };
+        told(&folder, &[("/p", (0..900).map(message).collect())])
+    };
+    let files = [led("a", 170.0), led("b", -170.0)];
+    let out = analyze(&[&files[0], &files[1], "--roles", roles.to_str().unwrap()]);
+    let table = text(&out.stdout);
+    let line = table
+        .lines()
+        .find(|l| l.ends_with("beat_lead_deg"))
+        .unwrap();
+    let cells: Vec<f64> = line
+        .split_whitespace()
+        .filter_map(|x| x.parse().ok())
+        .collect();
+    let [mean, sd, min, max, 2.0] = cells[..] else {
+        panic!("{line}")
+    };
+    assert_eq!((mean.abs(), max - min), (180.0, 20.0), "{line}");
+    // 10° each way: √(2 · 10²).
+    assert!((sd - 14.142).abs() < 1e-9, "{line}");
+}
+
 #[test]
 fn roles_name_what_is_what() {
     let folder = tempfile::tempdir().unwrap();
