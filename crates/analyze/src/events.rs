@@ -1,5 +1,8 @@
 //! What happened when: contact lost and regained, jumps, the beat, the onset of instability.
 
+use std::f64::consts::TAU;
+
+use crate::beat::adler::turns::Turns;
 use crate::inputs::{Inputs, Window, stretches};
 use crate::metrics::Context;
 use crate::phase;
@@ -19,6 +22,8 @@ pub struct Event {
 const LOCKED: f64 = 0.95;
 /// Length of a stretch judged for locking (s).
 const LOCK_STRETCH_S: f64 = 5.0;
+/// The tempo is that of the beat's first so many seconds (s).
+const TEMPO_S: f64 = 10.0;
 /// A beat has ended when none comes for so many beats.
 const AWAITED: f64 = 1.5;
 /// The support below this share of the weight is a jump's flight.
@@ -121,39 +126,52 @@ fn jumps(c: &Context, out: &mut Vec<Event>) {
 
 fn beat(inputs: &Inputs, out: &mut Vec<Event>) {
     let (t_s, psi) = (inputs.phase_times(), &inputs.beat_phase_rad);
-    let sounding: Vec<bool> = psi.iter().map(|p| p.is_finite()).collect();
-    let tempo_hz = |k: usize| {
-        let next = k + 1 + psi[k + 1..].iter().position(|p| p.is_finite())?;
-        let step = (psi[next] - psi[k]).rem_euclid(std::f64::consts::TAU);
-        (next < t_s.len() && t_s[next] > t_s[k])
-            .then(|| step / std::f64::consts::TAU / (t_s[next] - t_s[k]))
-    };
-    // Where the recording ends before another beat was due, the beat may go on.
+    let n = psi.len().min(t_s.len());
+    let (t_s, psi) = (&t_s[..n], &psi[..n]);
     let ends_s = t_s.last().copied().unwrap_or_default();
-    let last_beat_s = |k: usize| {
-        k.checked_sub(2)
-            .and_then(tempo_hz)
-            .map_or(0.0, |hz| 1.0 / hz)
-    };
-    for k in 0..sounding.len().min(t_s.len()) {
-        let before = k > 0 && sounding[k - 1];
-        if sounding[k] && !before {
-            let what = tempo_hz(k).map_or("a beat begins".into(), |hz| {
+    let mut start = 0;
+    for sounding in psi.chunk_by(|a, b| a.is_finite() == b.is_finite()) {
+        let (from, to) = (start, start + sounding.len());
+        start = to;
+        if !sounding[0].is_finite() {
+            continue;
+        }
+        let times_s = &t_s[from..to];
+        let early = times_s.partition_point(|t| *t <= t_s[from] + TEMPO_S);
+        let what = tempo_hz(&times_s[..early], &sounding[..early])
+            .map_or("a beat begins".into(), |hz| {
                 format!("a beat of {hz:.3} Hz begins")
             });
+        out.push(Event {
+            t_s: t_s[from],
+            kind: "beat_start",
+            what,
+        });
+        if to == n {
+            continue;
+        }
+        let late = times_s.partition_point(|t| *t < t_s[to - 1] - TEMPO_S);
+        let last_beat_s = tempo_hz(&times_s[late..], &sounding[late..]).map_or(0.0, |hz| 1.0 / hz);
+        // Where the recording ends before another beat was due, the beat may go on.
+        if !(ends_s - t_s[to] < AWAITED * last_beat_s) {
             out.push(Event {
-                t_s: t_s[k],
-                kind: "beat_start",
-                what,
-            });
-        } else if before && !sounding[k] && !(ends_s - t_s[k] < AWAITED * last_beat_s(k)) {
-            out.push(Event {
-                t_s: t_s[k],
+                t_s: t_s[to],
                 kind: "beat_end",
                 what: "the beat ends".into(),
             });
         }
     }
+}
+
+/// Tempo of a beat by its advance from the first sample to the last (Hz); `None` where the samples do not tell how often it turns between them.
+fn tempo_hz(t_s: &[f64], psi_rad: &[f64]) -> Option<f64> {
+    let turns = Turns::of(t_s, psi_rad);
+    let each = t_s.windows(2).zip(psi_rad.windows(2));
+    let turned: f64 = each
+        .map(|(t, x)| turns.over(t[1] - t[0], x[1] - x[0]))
+        .sum();
+    let hz = turned / TAU / (t_s.last()? - t_s.first()?);
+    (hz > 0.0 && hz.is_finite() && !turns.folded()).then_some(hz)
 }
 
 /// The end of the first stretch of 5 s whose mean r exceeds 0.95, if an earlier stretch was looser.
@@ -170,8 +188,12 @@ fn locking(inputs: &Inputs, out: &mut Vec<Event>) {
     let m = ((LOCK_STRETCH_S / step_s).round() as usize).max(1);
     let (mut sum, mut first) = (0.0, 0);
     let mut loose = false;
+    // Behind a hole the stretch begins anew, as where somebody's phase is not known.
+    let begin: Vec<usize> = stretches(t_s, 0.0).iter().map(|s| s.start).collect();
     for k in 0..r.len().min(t_s.len()) {
-        // Where somebody's phase is not known the stretch begins anew.
+        if begin.binary_search(&k).is_ok() {
+            (sum, first) = (0.0, k);
+        }
         if !r[k].is_finite() {
             (sum, first) = (0.0, k + 1);
             continue;
@@ -246,6 +268,52 @@ mod tests {
                 (5.0, "beat_start")
             ]
         );
+    }
+
+    /// 2.15 Hz: unwrapped at a sample a second, wrapped at 30 Hz with steps that scatter, and wrapped at a sample a second, which tells no tempo.
+    #[test]
+    fn a_beat_begins_with_its_tempo() {
+        let at = |t: &f64| TAU * 2.15 * t;
+        let told = |t_s: Vec<f64>, phase: fn(f64) -> f64| -> Vec<String> {
+            let psi = t_s.iter().map(|t| match *t {
+                t if t < 10.0 => f64::NAN,
+                t => phase(at(&t)),
+            });
+            let inputs = Inputs {
+                beat_phase_rad: psi.collect(),
+                phase_t_s: t_s,
+                ..Inputs::default()
+            };
+            let told = events(&inputs, Window::ALL).into_iter();
+            told.map(|e| e.what).collect()
+        };
+        let slow = || (0..120).map(f64::from).collect();
+        let loose = (0..1800).map(|k| f64::from(k) / 30.0 + 0.015 * f64::from(7 * k % 11) / 11.0);
+        let begins = "a beat of 2.150 Hz begins";
+        assert_eq!(told(slow(), |x| x), [begins]);
+        assert_eq!(told(loose.collect(), phase::wrap), [begins]);
+        assert_eq!(told(slow(), phase::wrap), ["a beat begins"]);
+    }
+
+    /// Loose up to 20 s, together from there on, but nothing is known from 23 s to 43 s.
+    #[test]
+    fn nobody_walks_together_through_a_hole() {
+        let seen = (0..1800).map(|k| f64::from(k) / 30.0);
+        let t_s: Vec<f64> = seen.filter(|t| !(23.0..43.0).contains(t)).collect();
+        let inputs = Inputs {
+            phase_rad: vec![
+                t_s.iter().map(|t| 12.0 * t).collect(),
+                t_s.iter()
+                    .map(|t| 12.0 * t + 1.3 * (t - 20.0).min(0.0))
+                    .collect(),
+            ],
+            t_s,
+            ..Inputs::default()
+        };
+        let events = events(&inputs, Window::ALL);
+        assert_eq!(events.len(), 1, "{events:?}");
+        // 5 s behind the hole.
+        assert!((events[0].t_s - 48.0).abs() < 0.05, "{events:?}");
     }
 
     #[test]

@@ -6,10 +6,9 @@ use std::io::Write;
 use std::path::Path;
 
 use recording::read::{ReadError, Recording};
-use recording::signal::field_of;
 use recording::{Finding, Kind, Signal};
 
-use crate::examine::Request;
+use crate::examine::{Request, with_angles};
 use crate::quaternion::{ANGLES, angles};
 use crate::report::quoted;
 
@@ -75,6 +74,19 @@ impl Column {
 
     fn rows(&self) -> impl Iterator<Item = Row> {
         (0..self.signal.times_ns.len()).map(|k| self.row(k))
+    }
+
+    /// Leaves the values that are in these rows, which ascend.
+    fn keep(&mut self, rows: &[Row]) {
+        let values = on_axis(self, &mut 0, rows);
+        let there = rows.iter().zip(values);
+        let there = there.filter_map(|(row, value)| Some((*row, value?)));
+        let (rows, values): (Vec<Row>, Vec<f64>) = there.unzip();
+        self.signal.times_ns = rows.iter().map(|row| row.0).collect();
+        self.signal.values = values;
+        if !self.nth.is_empty() {
+            self.nth = rows.iter().map(|row| row.1).collect();
+        }
     }
 }
 
@@ -154,14 +166,7 @@ impl From<std::io::Error> for Trouble {
 
 /// Reads the wanted signals and joins them by time.
 fn collect(recording: &Recording, request: &Request, downsample: u64) -> Result<Table, ReadError> {
-    let lists = |path: &str| request.lists_path(path);
-    let select = |path: &str| {
-        lists(path)
-            || path
-                .rsplit_once('.')
-                .filter(|(_, last)| matches!(*last, "x" | "y" | "z" | "w"))
-                .is_some_and(|(prefix, _)| ANGLES.iter().any(|a| lists(&format!("{prefix}.{a}"))))
-    };
+    let select = |path: &str| with_angles(path, |path| request.may_list(path));
     let (signals, findings) = recording.signals(&select)?;
     let shared = match may_share(recording, &findings) {
         true => shared(recording, &select)?,
@@ -174,23 +179,19 @@ fn collect(recording: &Recording, request: &Request, downsample: u64) -> Result<
     let mut columns: Vec<Column> = columns.collect();
     let derived = quaternions(&columns);
     columns.extend(derived);
-    columns.retain(|c| lists(&c.signal.path));
+    columns.retain(|c| request.lists(&c.signal.topic, &c.signal.path));
     columns.sort_by(|a, b| a.signal.path.cmp(&b.signal.path));
     let start_ns = recording.info().start_ns;
     let seconds = |t: i64| (i128::from(t) - i128::from(start_ns)) as f64 / 1e9;
     let inside = |row: &Row| request.holds(seconds(row.0));
-    let channels = &recording.info().channels;
-    let mut topics: BTreeMap<&str, Vec<Row>> = BTreeMap::new();
+    let mut topics: BTreeMap<String, Vec<Row>> = BTreeMap::new();
     let mut axes: Vec<*const i64> = Vec::new();
     for c in &columns {
         let s = &c.signal;
         // Complete signals of one topic share their axis: take it once.
         if !axes.contains(&s.times_ns.as_ptr()) {
             axes.push(s.times_ns.as_ptr());
-            let of = |topic: &&str| s.path == *topic || field_of(&s.path, topic).is_some();
-            let topic = channels.iter().map(|c| c.topic.as_str()).filter(of);
-            let topic = topic.max_by_key(|topic| topic.len()).unwrap_or_default();
-            let rows = topics.entry(topic).or_default();
+            let rows = topics.entry(s.topic.clone()).or_default();
             rows.extend(c.rows().filter(inside));
             // Stable: quick where two ascending runs become one.
             rows.sort();
@@ -199,8 +200,15 @@ fn collect(recording: &Recording, request: &Request, downsample: u64) -> Result<
     }
     // Each topic is thinned by itself, so that all keep rows.
     let step = usize::try_from(downsample).unwrap_or(usize::MAX).max(1);
-    let kept = topics.values().flat_map(|rows| rows.iter().step_by(step));
-    let mut rows: Vec<Row> = kept.copied().collect();
+    if step > 1 {
+        for rows in topics.values_mut() {
+            *rows = rows.iter().step_by(step).copied().collect();
+        }
+        for column in &mut columns {
+            column.keep(&topics[&column.signal.topic]);
+        }
+    }
+    let mut rows: Vec<Row> = topics.into_values().flatten().collect();
     rows.sort_unstable();
     rows.dedup();
     Ok(Table {
@@ -330,6 +338,7 @@ fn quaternions(columns: &[Column]) -> Vec<Column> {
             if !named.contains_key(path.as_str()) {
                 out.push(Column {
                     signal: Signal {
+                        topic: w.signal.topic.clone(),
                         path,
                         unit: "rad".into(),
                         times_ns: times_ns.clone(),

@@ -300,6 +300,76 @@ fn tables_for_people_fit_a_terminal() {
     assert!(csv.starts_with("file,metric,value,unit,source,per,ci95,reason\n"));
 }
 
+/// Signals of two rates: each spectrum stands under its own resolution, each line has its count and jitter.
+#[test]
+fn spectra_are_told_with_their_own_resolution() {
+    let folder = tempfile::tempdir().unwrap();
+    let at = |hz: f64, n: u32| {
+        let each = (0..n).map(|k| f64::from(k) / hz);
+        each.map(|t| (t, format!("{{\"x\":{}}}", tone(1.0, t))))
+            .collect()
+    };
+    let file = told(
+        folder.path(),
+        &[("/a", at(10.0, 600)), ("/b", at(50.0, 1500))],
+    );
+    let out = analyze(&[&file, "--signal", "*.x"]);
+    let table = text(&out.stdout);
+    let heads: Vec<&str> = table
+        .lines()
+        .filter(|l| l.starts_with("Spectra ("))
+        .collect();
+    assert!(heads.len() == 2 && heads[0] != heads[1], "{table}");
+    let cells = |start: &str| -> Vec<String> {
+        let line = table.lines().rfind(|l| l.trim_start().starts_with(start));
+        line.unwrap()
+            .split_whitespace()
+            .map(str::to_owned)
+            .collect()
+    };
+    let names = [
+        "Signals", "count", "Hz", "jitter", "s", "min", "mean", "max", "SD", "peak", "Hz",
+    ];
+    assert_eq!(cells("Signals"), names);
+    assert_eq!(cells("/b.x")[1..3], ["1,500", "50"]);
+}
+
+/// Leads of 170° and −170° are 20° apart.
+#[test]
+fn leads_are_averaged_around_the_circle() {
+    let folder = tempfile::tempdir().unwrap();
+    let roles = folder.path().join("roles.toml");
+    std::fs::write(&roles, "phases = \"/p.phi[*]\"\nbeat_phase = \"/p.psi\"\n").unwrap();
+    let led = |name: &str, lead_deg: f64| {
+        let folder = folder.path().join(name);
+        std::fs::create_dir(&folder).unwrap();
+        let message = |k: u32| {
+            let t = f64::from(k) / 30.0;
+            let psi = std::f64::consts::TAU * 2.0 * t;
+            let phi = psi + lead_deg.to_radians();
+            (t, format!("{{\"phi\":[{phi},{phi}],\"psi\":{psi}}}"))
+        };
+        told(&folder, &[("/p", (0..900).map(message).collect())])
+    };
+    let files = [led("a", 170.0), led("b", -170.0)];
+    let out = analyze(&[&files[0], &files[1], "--roles", roles.to_str().unwrap()]);
+    let table = text(&out.stdout);
+    let line = table
+        .lines()
+        .find(|l| l.ends_with("beat_lead_deg"))
+        .unwrap();
+    let cells: Vec<f64> = line
+        .split_whitespace()
+        .filter_map(|x| x.parse().ok())
+        .collect();
+    let [mean, sd, min, max, 2.0] = cells[..] else {
+        panic!("{line}")
+    };
+    assert_eq!((mean.abs(), max - min), (180.0, 20.0), "{line}");
+    // 10° each way: √(2 · 10²).
+    assert!((sd - 14.142).abs() < 1e-9, "{line}");
+}
+
 #[test]
 fn roles_name_what_is_what() {
     let folder = tempfile::tempdir().unwrap();
@@ -1328,6 +1398,46 @@ fn angles_are_in_the_messages_that_hold_all_of_a_quaternion() {
     }
 }
 
+/// A rath that rolls by 15° at 1 Hz, and an accelerometer that now and then says nothing: what it missed is a hole, not a shift.
+#[test]
+fn a_sample_that_lacks_a_value_is_a_hole() {
+    let folder = tempfile::tempdir().unwrap();
+    let message = |k: u32| {
+        let t = 0.01 * f64::from(k);
+        let turn = std::f64::consts::TAU;
+        let (roll, rate) = (
+            15f64.to_radians() * tone(1.0, t),
+            15f64.to_radians() * turn * (turn * t).cos(),
+        );
+        let felt = match k % 30 {
+            7 => "null,\"y\":null,\"z\":null".to_owned(),
+            _ => format!(
+                "0,\"y\":{},\"z\":{}",
+                9.80665 * roll.sin(),
+                9.80665 * roll.cos()
+            ),
+        };
+        let text = format!(
+            "{{\"angular_velocity\":{{\"x\":{rate},\"y\":0,\"z\":0}},\"linear_acceleration\":{{\"x\":{felt}}}}}"
+        );
+        (t, text)
+    };
+    let file = told(
+        folder.path(),
+        &[("/imu/rath", (0..6000).map(message).collect())],
+    );
+    let found = with_roles(folder.path(), &file, "imu = \"/imu/rath\"");
+    let roll = metric(&found, "rms_roll_deg");
+    // 15°/√2.
+    assert!((roll - 10.607).abs() < 0.01, "{roll}");
+    assert!(
+        kinds(&found).contains(&"left_out".to_owned()),
+        "{:?}",
+        found["quality"]
+    );
+    assert!(found["quality"].to_string().contains("200 of 6000 samples"));
+}
+
 /// Fields that some messages lack do not make more rows of a thinned topic, nor uneven ones.
 #[test]
 fn a_topic_is_thinned_by_its_messages() {
@@ -1357,6 +1467,56 @@ fn a_topic_is_thinned_by_its_messages() {
     let expected: Vec<f64> = (0..60).map(|k| f64::from(10 * k)).collect();
     assert_eq!(found, expected);
     assert_eq!(column(&table, "/t.a").len(), 65);
+    // A row that another topic keeps at one of its times is none of its own.
+    let beside = |k: u32| (0.05 + 0.1 * f64::from(k), "{\"s\":1}".to_owned());
+    let topics = [
+        ("/t", (0..600).map(message).collect()),
+        ("/s", (0..50).map(beside).collect()),
+    ];
+    let file = told(folder.path(), &topics);
+    let done = analyze(&[&file, "--downsample", "10", "--out", out]);
+    assert!(done.status.success(), "{}", text(&done.stderr));
+    let found: Vec<f64> = column(&table, "/t.a").into_iter().flatten().collect();
+    assert_eq!(found, expected);
+    assert_eq!(column(&table, "/s.s").into_iter().flatten().count(), 5);
+    // Without a table nothing is thinned.
+    let alone = analyze(&[&file, "--downsample", "10"]);
+    assert_eq!(alone.status.code(), Some(2));
+}
+
+/// `/a` with a field `b.x`, and `/a.b` with a field `x`: what the listing lists is what the table holds, by topic and by the name that tells them apart.
+#[test]
+fn a_table_holds_the_topics_that_were_asked_for() {
+    let folder = tempfile::tempdir().unwrap();
+    let topic =
+        |message: fn(u32) -> String| (0..100).map(|k| (0.1 * f64::from(k), message(k))).collect();
+    let topics = [
+        ("/a", topic(|k| format!("{{\"b\":{{\"x\":{k}}}}}"))),
+        (
+            "/a.b",
+            topic(|k| format!("{{\"x\":{},\"y\":{k}}}", 1000 + k)),
+        ),
+        ("/forces", topic(|k| format!("{{\"n\":{k}}}"))),
+        ("/left", topic(|k| format!("{{\"force\":{{\"z\":{k}}}}}"))),
+    ];
+    let file = told(folder.path(), &topics);
+    let table = folder.path().join("x.csv");
+    for (asked, held) in [
+        (["--topic", "/a"], &["/a.b.x"][..]),
+        (["--topic", "/a.b"], &["/a.b.y", "/a.b:x"]),
+        (["--topic", "*force*"], &["/forces.n"]),
+        (["--signal", "/a.b:x"], &["/a.b:x"]),
+    ] {
+        let out = ["--format", "json", "--out", table.to_str().unwrap()];
+        let found = json(&[&[&*file], &asked[..], &out].concat());
+        let listed: Vec<&String> = found["signals"].as_object().unwrap().keys().collect();
+        assert_eq!(listed, held, "{asked:?}");
+        let written = std::fs::read_to_string(&table).unwrap();
+        let names = written.lines().next().unwrap().split(',').skip(2);
+        assert_eq!(names.collect::<Vec<_>>(), held, "{asked:?}");
+    }
+    let x = column(&table, "/a.b:x");
+    assert_eq!((x[0], x[99]), (Some(1000.0), Some(1099.0)));
 }
 
 /// Messages of one time have a row each, whatever their fields are, and from whichever channel of the topic they come; other topics stand in the first. What is
@@ -1928,6 +2088,20 @@ fn an_onset_before_the_window_is_told() {
             .contains("may have begun before"),
         "{onset}"
     );
+    // People are told what scripts are; what is said of several numbers, once.
+    let roles = folder.path().join("roles.toml");
+    let out = analyze(&[&file, "--roles", roles.to_str().unwrap()]);
+    let table = text(&out.stdout);
+    let words: Vec<&str> = table.split_whitespace().collect();
+    let table = words.join(" ");
+    for said in [
+        "may have begun before",
+        "dz_pp_m, rms_z_m: of what heaves faster than",
+        "t_float, h2_ratio, growth_ratio: as if the sensor sat at the centre of mass",
+    ] {
+        assert_eq!(table.matches(said).count(), 1, "{said}: {table}");
+    }
+    assert_eq!(table.matches("of what heaves faster").count(), 1, "{table}");
 }
 
 /// A recording is not written under the name of a table.

@@ -5,7 +5,9 @@ use std::sync::Arc;
 /// One numeric field of one topic over time.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Signal {
-    /// `TOPIC.field.path`, sequence items as `[i]`: `/imu/rath.angular_velocity.x`.
+    /// The topic; it may have dots of its own, so it is never cut out of the path.
+    pub topic: String,
+    /// `TOPIC.field.path`, sequence items as `[i]`: `/imu/rath.angular_velocity.x`; `TOPIC:field.path` where a field of another topic is called so.
     pub path: String,
     /// The unit where the field's name or the message's convention gives one (`m/s^2`), otherwise empty.
     pub unit: String,

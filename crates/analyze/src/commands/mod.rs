@@ -80,7 +80,7 @@ struct AnalyzeArgs {
     #[arg(long, value_name = "FILE.parquet|.csv")]
     out: Option<PathBuf>,
     /// Write one row of each topic in so many, for --out
-    #[arg(long, value_name = "N", default_value_t = 1, value_parser = clap::value_parser!(u64).range(1..))]
+    #[arg(long, value_name = "N", default_value_t = 1, requires = "out", value_parser = clap::value_parser!(u64).range(1..))]
     downsample: u64,
     /// Write the recording again with what was found beside it
     #[arg(long, value_name = "FILE.mcap")]

@@ -11,6 +11,7 @@ mod request;
 pub use analysis::{Analysis, Topic, Trace};
 pub(crate) use listing::MOST_SERIES;
 pub use natural::natural;
+pub(crate) use pass::with_angles;
 pub use request::Request;
 
 use recording::read::{ReadError, Recording};

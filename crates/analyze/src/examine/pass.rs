@@ -373,13 +373,13 @@ impl<'a> Pass<'a> {
 
 /// Whether a field has to be decoded: it is listed, plays a role, or is part of a quaternion whose angles are or do.
 pub(super) fn wanted(path: &str, request: &Request, roles: &Roles) -> bool {
-    let wants = |path: &str| request.lists_path(path) || roles.of_signal(path).is_some();
+    let wants = |path: &str| request.may_list(path) || roles.of_signal(path).is_some();
     let times = |topic: &str| roles.feeds(topic);
     path.strip_suffix(".time_s").is_some_and(times) || with_angles(path, wants)
 }
 
 /// Whether a field is wanted, or an angle of the quaternion that it is part of.
-fn with_angles(path: &str, wants: impl Fn(&str) -> bool) -> bool {
+pub(crate) fn with_angles(path: &str, wants: impl Fn(&str) -> bool) -> bool {
     if wants(path) {
         return true;
     }

@@ -29,10 +29,12 @@ impl Request {
             && (self.signals.is_empty() || self.signals.iter().any(|p| matches(p, path)))
     }
 
-    /// The same where the topic is not known apart from the path.
-    pub(crate) fn lists_path(&self, path: &str) -> bool {
+    /// Whether a field may have to be read for that, before it is known where in the path the topic ends, and whether the signal will be called
+    /// `TOPIC:field` because another topic has a field of its name.
+    pub(crate) fn may_list(&self, path: &str) -> bool {
+        let named = |p: &String| matches(p, path) || matches(&p.replace(':', "."), path);
         (self.topics.is_empty() || self.topics.iter().any(|t| of_topic(t, path)))
-            && (self.signals.is_empty() || self.signals.iter().any(|p| matches(p, path)))
+            && (self.signals.is_empty() || self.signals.iter().any(named))
     }
 
     /// How long the window may be that was asked for, s.

@@ -1,5 +1,8 @@
 //! What is read of sensors and beats: their columns by topic, and when each value was taken.
 
+use std::collections::BTreeMap;
+use std::sync::Arc;
+
 use recording::read::{ReadError, Recording};
 use recording::signal::{Signal, field_of, seconds_since};
 
@@ -47,6 +50,33 @@ pub(super) struct Columns {
 }
 
 impl Columns {
+    /// The signals of a topic are put on one axis, that of all its messages: a message that lacks a field is NaN in it, so that what stands side by
+    /// side was measured together.
+    pub(super) fn new(mut signals: Vec<Signal>, start_ns: i64) -> Self {
+        let mut topics: BTreeMap<&str, Vec<usize>> = BTreeMap::new();
+        for (k, signal) in signals.iter().enumerate() {
+            topics.entry(&signal.topic).or_default().push(k);
+        }
+        let topics: Vec<Vec<usize>> = topics.into_values().collect();
+        for of_topic in topics {
+            let mut axis = signals[of_topic[0]].times_ns.clone();
+            for k in &of_topic[1..] {
+                let own = &signals[*k].times_ns;
+                if !Arc::ptr_eq(&axis, own) && axis != *own {
+                    axis = union(&axis, own).into();
+                }
+            }
+            for k in of_topic {
+                let signal = &mut signals[k];
+                if signal.times_ns != axis {
+                    signal.values = placed(signal, &axis);
+                }
+                signal.times_ns = axis.clone();
+            }
+        }
+        Columns { signals, start_ns }
+    }
+
     pub(super) fn get(&self, topic: &str, field: &str) -> Option<&Signal> {
         self.signals
             .iter()
@@ -126,7 +156,7 @@ impl Columns {
         let without = (0..n).filter(|k| marked(*k)).count();
         let turns = gyro.is_some() && without < n;
         let feels = self.get(topic, ACCEL_MARK);
-        let feels = feels.is_none_or(|mark| mark.values.iter().any(|m| *m != -1.0));
+        let feels = feels.is_none_or(|mark| mark.values.iter().any(|m| !m.is_nan() && *m != -1.0));
         if turns && without > 0 {
             for (k, t) in t_s.iter_mut().enumerate() {
                 if marked(k) {
@@ -209,6 +239,35 @@ impl Columns {
     }
 }
 
+/// Ascending times of both, each as often as in that which has it more often.
+fn union(a: &[i64], b: &[i64]) -> Vec<i64> {
+    let mut out = Vec::with_capacity(a.len().max(b.len()));
+    let (mut i, mut j) = (0, 0);
+    while let Some(next) = a.get(i).into_iter().chain(b.get(j)).min() {
+        i += usize::from(a.get(i) == Some(next));
+        j += usize::from(b.get(j) == Some(next));
+        out.push(*next);
+    }
+    out
+}
+
+/// The signal's values on an axis that holds its times; NaN where it has none, and at times that several messages share unless all have one:
+/// nobody knows then whose is missing.
+fn placed(signal: &Signal, axis: &[i64]) -> Vec<f64> {
+    let mut out = Vec::with_capacity(axis.len());
+    let mut next = 0;
+    for messages in axis.chunk_by(|a, b| a == b) {
+        let own = signal.times_ns[next..].iter();
+        let count = own.take_while(|t| **t == messages[0]).count();
+        match count == messages.len() {
+            true => out.extend_from_slice(&signal.values[next..next + count]),
+            false => out.resize(out.len() + messages.len(), f64::NAN),
+        }
+        next += count;
+    }
+    out
+}
+
 /// When the messages of a topic were stamped, or else that they came, whatever is in them: of beats, each is one.
 ///
 /// # Errors
@@ -230,6 +289,7 @@ pub(super) fn came(recording: &Recording, topic: &str) -> Result<Signal, ReadErr
     let differ = own_s.windows(2).any(|w| w[0] != w[1]);
     let field = if stamped && differ { BEAT[1] } else { "log" };
     Ok(Signal {
+        topic: topic.to_owned(),
         path: format!("{topic}.{field}"),
         unit: "s".into(),
         times_ns: times_ns.into(),
@@ -266,8 +326,9 @@ mod tests {
 
     /// Of 100 samples every 10 ms those that have a rate.
     fn read(has_rate: impl Fn(usize) -> bool) -> Sensor {
-        let times_ns: std::sync::Arc<[i64]> = (0..100).map(|k| k * 10_000_000).collect();
+        let times_ns: Arc<[i64]> = (0..100).map(|k| k * 10_000_000).collect();
         let column = |field: &str, values: Vec<f64>| Signal {
+            topic: "/imu/rath".into(),
             path: format!("/imu/rath.{field}"),
             unit: String::new(),
             times_ns: times_ns.clone(),
@@ -279,7 +340,7 @@ mod tests {
             signals.push(column(field, vec![1.0; 100]));
         }
         let start_ns = 0;
-        let columns = Columns { signals, start_ns };
+        let columns = Columns::new(signals, start_ns);
         let dates = columns
             .dates("/imu/rath", ACCEL[0], &["/imu/rath"])
             .unwrap();
@@ -304,6 +365,36 @@ mod tests {
         assert!(!never.turns && never.track.len() == 100);
     }
 
+    /// Fields that some messages lack; three messages share a time, and one of them lacks a field.
+    #[test]
+    fn a_message_that_lacks_a_field_is_a_hole_in_it() {
+        let nan = f64::NAN;
+        let signal = |field: &str, times_ns: &[i64], values: &[f64]| Signal {
+            topic: "/t".into(),
+            path: format!("/t.{field}"),
+            unit: String::new(),
+            times_ns: times_ns.into(),
+            values: values.to_vec(),
+        };
+        let signals = vec![
+            signal(
+                "a",
+                &[1, 3, 4, 4, 4, 5],
+                &[10.0, 30.0, 40.0, 41.0, 42.0, 50.0],
+            ),
+            signal("b", &[1, 2, 4, 4, 6], &[11.0, 21.0, 43.0, 44.0, 61.0]),
+        ];
+        let columns = Columns::new(signals, 0);
+        let [a, b] = columns.values("/t", ["a", "b"]).unwrap();
+        let same = |x: &[f64], y: &[f64]| {
+            let bits = |x: &[f64]| x.iter().map(|x| x.to_bits()).collect::<Vec<_>>();
+            assert_eq!(bits(x), bits(y), "{x:?}");
+        };
+        same(a, &[10.0, nan, 30.0, 40.0, 41.0, 42.0, 50.0, nan]);
+        same(b, &[11.0, 21.0, nan, nan, nan, nan, nan, 61.0]);
+        assert_eq!(*columns.signals[0].times_ns, [1, 2, 3, 4, 4, 4, 5, 6]);
+    }
+
     #[test]
     fn sensors_of_a_log_that_was_written_at_once_keep_their_clock() {
         // One began 2 s after the other; ROS 1 and ROS 2 name their stamps differently.
@@ -315,6 +406,7 @@ mod tests {
         for (topic, nanosec, begins_s) in since_s {
             let mut column = |field: &str, value: &dyn Fn(i64) -> f64| {
                 signals.push(Signal {
+                    topic: topic.into(),
                     path: format!("{topic}.{field}"),
                     unit: String::new(),
                     times_ns: vec![9; 600].into(),
@@ -328,7 +420,7 @@ mod tests {
             column(&format!("header.stamp.{nanosec}"), &rest);
         }
         let start_ns = 9;
-        let columns = Columns { signals, start_ns };
+        let columns = Columns::new(signals, start_ns);
         let topics = since_s.map(|s| s.0);
         for (topic, _, begins_s) in since_s {
             let dates = columns.dates(topic, ACCEL[0], &topics).unwrap();
@@ -388,8 +480,9 @@ mod tests {
                 let late_ns = if packets { together(*k) } else { late_ns[*k] };
                 (*k as f64 * 4.65e8 + late_ns) as i64
             };
-            let times_ns: std::sync::Arc<[i64]> = number.iter().map(came).collect();
+            let times_ns: Arc<[i64]> = number.iter().map(came).collect();
             let column = |field: &str, scale: f64| Signal {
+                topic: "/beat".into(),
                 path: format!("/beat.{field}"),
                 unit: String::new(),
                 times_ns: times_ns.clone(),
@@ -397,7 +490,7 @@ mod tests {
             };
             let signals = vec![column("number", 1.0), column("time_s", 0.465)];
             let start_ns = 0;
-            let (t_s, numbers, _) = Columns { signals, start_ns }.beats("/beat");
+            let (t_s, numbers, _) = Columns::new(signals, start_ns).beats("/beat");
             let course = Course::of(&t_s, numbers.as_deref());
             let (hz, _) = course.tempo(Window::ALL).unwrap();
             assert!((hz * 0.465 - 1.0).abs() < 1e-9, "{hz}");

@@ -58,7 +58,9 @@ pub fn ends_s(t_s: impl Iterator<Item = f64>) -> Option<(f64, f64)> {
 /// From log times (s since the recording begins) and, where every sample has one, header stamps (s, moved by [`delay_s`]), in the order of the log.
 pub fn dated(log_s: Vec<f64>, stamp_s: Option<Vec<f64>>) -> Dated {
     let of_log = scatter_s(&log_s);
-    if let Some(stamp_s) = stamp_s.filter(|s| s.len() == log_s.len()) {
+    if let Some(stamp_s) =
+        stamp_s.filter(|s| s.len() == log_s.len() && s.iter().all(|s| s.is_finite()))
+    {
         let back = stamp_s.windows(2).filter(|w| w[1] < w[0]).count();
         let overtaken = back > SET_BACK;
         let mut ordered = stamp_s.clone();

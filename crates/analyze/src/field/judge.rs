@@ -9,6 +9,7 @@ use recording::signal::Signal;
 
 use super::carriers::{self, Carriers};
 use super::columns::{ACCEL, Columns};
+use crate::beat::adler::turns::Turns;
 use crate::clock::{Clock, from_signals};
 use crate::filter::{Band, butter, sosfiltfilt};
 use crate::imu::orientation::causal;
@@ -525,7 +526,14 @@ fn cycles_hz(inputs: &Inputs, window: Window) -> Option<f64> {
         seen.end.checked_sub(1).filter(|l| *l > seen.start)?,
     );
     let went_s = inputs.phase_t_s[last] - inputs.phase_t_s[first];
-    let went = |phase: &Vec<f64>| Some((phase.get(last)? - phase.get(first)?) / TAU / went_s);
+    let went = |phase: &Vec<f64>| {
+        let (t_s, phase) = (
+            inputs.phase_t_s.get(first..=last)?,
+            phase.get(first..=last)?,
+        );
+        let phase = Turns::of(t_s, phase).straightened(phase);
+        Some((phase.last()? - phase.first()?) / TAU / went_s)
+    };
     let all: Vec<f64> = inputs.phase_rad.iter().map(went).collect::<Option<_>>()?;
     (!all.is_empty() && went_s > 0.0).then(|| all.iter().sum::<f64>() / all.len() as f64)
 }
@@ -770,6 +778,11 @@ mod tests {
         };
         let hz = cycles_hz(&inputs, window).unwrap();
         assert!((hz - 2.1).abs() < 1e-12, "{hz}");
+        let mut wrapped = inputs.clone();
+        let phases = wrapped.phase_rad.iter_mut().flatten();
+        phases.for_each(|x| *x = crate::phase::wrap(*x));
+        let hz = cycles_hz(&wrapped, window).unwrap();
+        assert!((hz - 2.1).abs() < 1e-9, "{hz}");
         let outside = Window {
             start_s: 40.0,
             end_s: 50.0,

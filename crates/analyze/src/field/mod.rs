@@ -181,7 +181,7 @@ impl Field {
                 format!("motion is estimated from means over {factor} samples each, so that memory stays small"),
             ));
         }
-        let columns = Columns { signals, start_ns };
+        let columns = Columns::new(signals, start_ns);
         let sensors: Vec<&str> = imus.clone().map(String::as_str).collect();
         let stamped = [&sensors, roles.topic(Role::Truth).as_slice()].concat();
         let dates = |topic: &&str| columns.dates(topic, ACCEL[0], &stamped);

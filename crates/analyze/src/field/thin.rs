@@ -1,9 +1,10 @@
 //! Long logs of fast sensors, thinned while they are read: the mean of so many samples stands for them, so that memory stays bounded.
 
+use std::borrow::Cow;
 use std::collections::{BTreeMap, BTreeSet};
 
 use recording::Signal;
-use recording::read::{Batch, ReadError, Recording};
+use recording::read::{Batch, Column, ReadError, Recording};
 use recording::signal::field_of;
 
 use super::columns::{ACCEL, GYRO, GYRO_MARK, STAMPS};
@@ -181,24 +182,31 @@ impl Sensor {
     }
 
     fn take(&mut self, batch: &Batch<'_>) {
-        let mut parts: [Option<&[f64]>; COLUMNS.len()] = [None; COLUMNS.len()];
-        let mut mark: Option<&[f64]> = None;
+        let mut parts: [Option<Cow<'_, [f64]>>; COLUMNS.len()] = Default::default();
+        let mut mark = None;
         for column in batch.columns {
             let field = column.path.get(batch.topic.len() + 1..).unwrap_or_default();
-            // Fields of a message of fixed layout are in every row.
-            if let (Some(k), None) = (COLUMNS.iter().position(|c| *c == field), column.rows) {
-                parts[k] = Some(column.values);
-                self.has[k] = true;
-            } else if let (GYRO_MARK, None) = (field, column.rows) {
-                mark = Some(column.values);
+            if let Some(k) = COLUMNS.iter().position(|c| *c == field) {
+                parts[k] = Some(by_row(column, batch.times_ns.len()));
+                // Samples until now lacked it.
+                if !std::mem::replace(&mut self.has[k], true) {
+                    self.columns[k].fill(f64::NAN);
+                    self.sums[k] = if self.count > 0 { f64::NAN } else { 0.0 };
+                }
+            } else if field == GYRO_MARK {
+                mark = Some(by_row(column, batch.times_ns.len()));
             }
         }
         for (row, &t_ns) in batch.times_ns.iter().enumerate() {
-            let sample = parts.map(|part| part.map_or(0.0, |values| values[row]));
+            let sample: [f64; COLUMNS.len()] = std::array::from_fn(|k| match &parts[k] {
+                Some(values) => values[row],
+                None if self.has[k] => f64::NAN,
+                None => 0.0,
+            });
             if !sample.iter().all(|x| x.is_finite()) {
                 continue;
             }
-            match mark.is_some_and(|mark| mark[row] == -1.0) {
+            match mark.as_ref().is_some_and(|mark| mark[row] == -1.0) {
                 true => {
                     self.marked += 1;
                     if self.turns {
@@ -237,6 +245,7 @@ impl Sensor {
 
     fn signals(self, topic: &str) -> Vec<Signal> {
         let signal = |field: &str, times_ns: &[i64], values: Vec<f64>| Signal {
+            topic: topic.to_owned(),
             path: format!("{topic}.{field}"),
             unit: String::new(),
             times_ns: times_ns.into(),
@@ -256,12 +265,24 @@ impl Sensor {
     }
 }
 
+/// A column's value in each message of a batch of so many, NaN where it has none.
+fn by_row<'a>(column: &Column<'a>, messages: usize) -> Cow<'a, [f64]> {
+    let Some(rows) = column.rows else {
+        return column.values.into();
+    };
+    let mut out = vec![f64::NAN; messages];
+    for (row, x) in rows.iter().zip(column.values) {
+        out[*row as usize] = *x;
+    }
+    out.into()
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
 
-    fn column<'a>(path: &'a str, values: &'a [f64]) -> recording::read::Column<'a> {
-        recording::read::Column {
+    fn column<'a>(path: &'a str, values: &'a [f64]) -> Column<'a> {
+        Column {
             id: 0,
             path,
             rows: None,
@@ -270,7 +291,7 @@ mod tests {
         }
     }
 
-    fn batch<'a>(times_ns: &'a [i64], columns: &'a [recording::read::Column<'a>]) -> Batch<'a> {
+    fn batch<'a>(times_ns: &'a [i64], columns: &'a [Column<'a>]) -> Batch<'a> {
         Batch {
             channel: 0,
             topic: "/a",
@@ -318,6 +339,32 @@ mod tests {
         // 0 1 2 3, 4 5 7 8, 9 10 11 12, 13 14 15 16.
         assert_eq!(signals[0].values, [1.5, 6.0, 10.5, 14.5]);
         assert_eq!(*signals[0].times_ns, [1_500, 6_000, 10_500, 14_500]);
+    }
+
+    /// A sensor that has a value in some messages of a batch, in none of another, and of another field only from some batch on.
+    #[test]
+    fn a_message_without_a_value_is_no_sample() {
+        let values: Vec<f64> = (0..12).map(f64::from).collect();
+        let times_ns: Vec<i64> = (0..12).collect();
+        let mut sensor = Sensor::new(2);
+        let x = column("/a.linear_acceleration.x", &values[..6]);
+        sensor.take(&batch(&times_ns[..6], &[x]));
+        let rows = [0, 2, 3];
+        let x = Column {
+            rows: Some(&rows),
+            ..column("/a.linear_acceleration.x", &[6.0, 8.0, 9.0])
+        };
+        let y = column("/a.linear_acceleration.y", &values[6..]);
+        sensor.take(&batch(&times_ns[6..], &[x, y]));
+        sensor.take(&batch(&times_ns[6..], &[y]));
+        let signals = sensor.signals("/a");
+        let [x, y] = &signals[..] else {
+            panic!("{signals:?}")
+        };
+        assert_eq!(x.values, [0.5, 2.5, 4.5, 7.0]);
+        assert!(y.values[..3].iter().all(|y| y.is_nan()), "{y:?}");
+        assert_eq!(y.values[3], 7.0);
+        assert_eq!(*y.times_ns, [0, 2, 4, 7]);
     }
 
     #[test]

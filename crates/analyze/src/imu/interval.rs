@@ -10,6 +10,7 @@ use super::track::Instrument;
 use super::unloading::unloadings;
 use crate::inputs::{Inputs, Window, between};
 use crate::line::rival_hz;
+use crate::mechanism::Verdict;
 use crate::median::median;
 use crate::metrics::{Datum, Metrics, metrics_of};
 use crate::random::Random;
@@ -113,6 +114,13 @@ pub fn metrics(motion: &Motion, window: Window) -> Metrics {
             value.reason = doubtful(others, other).or_else(|| by_holes(found));
             continue;
         }
+        let placed = motion.settings.lever_is_known || !OF_PLACE.contains(name);
+        if let (Datum::Word(word), Some(reason)) = (&value.datum, &mut value.reason)
+            && !placed
+            && *word != Verdict::Quiet.word()
+        {
+            *reason += &format!("; the fit is {UNPLACED}, for {PLACE_IT}");
+        }
         let Datum::Number(x) = value.datum else {
             continue;
         };
@@ -181,7 +189,8 @@ pub fn metrics(motion: &Motion, window: Window) -> Metrics {
             let corner_hz = motion.settings.height_corner_hz;
             format!("of what heaves faster than {corner_hz} Hz: an inertial sensor loses a slower course of the height")
         });
-        let of_place = (OF_PLACE.contains(name) && !motion.settings.lever_is_known).then(|| "as if the sensor sat at the centre of mass, and the interval knows no better, for nobody says where it sits; give imu_place_m in a roles file".to_owned());
+        let of_place = (!placed)
+            .then(|| format!("{UNPLACED}, and the interval knows no better, for {PLACE_IT}"));
         let of_rate = (OF_EDGES.contains(name) && rate_hz < ENOUGH_HZ).then(|| {
             format!("at {rate_hz:.0} Hz touch-downs fall between samples, and their overtones onto slower lines; 100 Hz or more are wanted")
         });
@@ -263,7 +272,16 @@ pub fn without_those(metrics: &mut Metrics, lost: Lost, rests_on: impl Fn(&str) 
 }
 
 /// What a sensor off the centre of mass feels otherwise, by its lever.
-const OF_PLACE: &[&str] = &["dz_pp_m", "rms_z_m", "t_float"];
+const OF_PLACE: &[&str] = &[
+    "dz_pp_m",
+    "rms_z_m",
+    "t_float",
+    "growth_ratio",
+    "h2_ratio",
+    "mechanism",
+];
+const UNPLACED: &str = "as if the sensor sat at the centre of mass";
+const PLACE_IT: &str = "nobody says where it sits; give imu_place_m in a roles file";
 
 /// What the moments of touch-down decide, and the rate from which samples tell them.
 const OF_EDGES: &[&str] = &["dz_pp_m", "t_float"];

@@ -46,7 +46,7 @@ pub fn detuning_rad_per_s(c: &Context) -> Value {
         );
     }
     Value {
-        reason: Some(with_intervals(found)),
+        reason: Some(format!("each carrier's: {}", with_intervals(found))),
         ..Value::number(mean(each)).per(each.clone())
     }
 }

@@ -1,10 +1,12 @@
 //! Several recordings side by side: a line per file, then mean and spread of every metric.
 
+use std::f64::consts::TAU;
 use std::fmt::Write;
 
 use super::table::figures;
 use crate::examine::Analysis;
-use crate::metrics::{METRICS, with_unit};
+use crate::metrics::{METRICS, turn_of, with_unit};
+use crate::phase::circular;
 
 /// The columns of the line per file.
 const COLUMNS: [(&str, &str); 7] = [
@@ -68,6 +70,13 @@ pub fn ensemble(analyses: &[Analysis]) -> String {
                 );
             }
             continue;
+        }
+        // A direction is taken on that turn on which it is nearest to their mean.
+        if let Some(turn) = turn_of(metric.name) {
+            let middle = circular(x.iter().map(|x| x / turn * TAU));
+            let middle = middle.map_or(0.0, |c| c.mean_rad / TAU * turn);
+            x.iter_mut()
+                .for_each(|x| *x -= turn * ((*x - middle) / turn).round());
         }
         x.sort_by(f64::total_cmp);
         let n = x.len() as f64;

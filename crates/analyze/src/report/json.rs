@@ -15,9 +15,9 @@ pub fn json(analyses: &[Analysis], asked: usize) -> String {
 }
 
 /// A map in the order of its entries.
-struct Ordered<'a, V>(&'a [(String, V)]);
+struct Ordered<'a, K, V>(&'a [(K, V)]);
 
-impl<V: Serialize> Serialize for Ordered<'_, V> {
+impl<K: Serialize, V: Serialize> Serialize for Ordered<'_, K, V> {
     fn serialize<S: Serializer>(&self, s: S) -> Result<S::Ok, S::Error> {
         s.collect_map(self.0.iter().map(|(k, v)| (k, v)))
     }
@@ -32,14 +32,6 @@ struct Recording<'a> {
     salvaged: bool,
     skipped_messages: u64,
     warnings: &'a [String],
-}
-
-struct Roles<'a>(&'a [(&'static str, Vec<String>)]);
-
-impl Serialize for Roles<'_> {
-    fn serialize<S: Serializer>(&self, s: S) -> Result<S::Ok, S::Error> {
-        s.collect_map(self.0.iter().map(|(k, v)| (k, v)))
-    }
 }
 
 impl Serialize for Analysis {
@@ -62,7 +54,7 @@ impl Serialize for Analysis {
             },
         )?;
         map.serialize_entry("metadata", &Ordered(&self.metadata))?;
-        map.serialize_entry("roles", &Roles(&self.roles))?;
+        map.serialize_entry("roles", &Ordered(&self.roles))?;
         map.serialize_entry("signals", &Ordered(&self.signals))?;
         map.serialize_entry("quality", &self.quality)?;
         map.serialize_entry("metrics", &self.metrics)?;

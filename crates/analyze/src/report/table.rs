@@ -1,4 +1,4 @@
-//! The form for people: at most 100 columns wide, what matters first.
+//! The form for people: at most 110 columns wide, what matters first.
 
 use std::fmt::Write;
 
@@ -6,6 +6,7 @@ use recording::text::counted;
 
 use crate::examine::Analysis;
 use crate::metrics::{self, Datum, Value};
+use crate::peaks::SpectrumSummary;
 
 /// Signals shown before the rest is only counted, unless the user named signals.
 const MOST_SIGNALS: usize = 40;
@@ -13,7 +14,7 @@ const MOST_SIGNALS: usize = 40;
 const MOST_TOPICS: usize = 16;
 /// Events of one kind told one by one; more are counted.
 const MOST_EVENTS: usize = 3;
-/// Width of the whole table.
+/// Width of text.
 const WIDTH: usize = 100;
 
 /// One recording as text. `all_signals` lists every signal, however many there are.
@@ -134,14 +135,14 @@ fn metrics_section(out: &mut String, a: &Analysis) {
         .iter()
         .filter(|(_, v)| v.datum != Datum::Missing)
         .collect();
-    let mut missing: Vec<(&str, Vec<&str>)> = Vec::new();
-    for (name, value) in a.metrics.iter().filter(|(_, v)| v.datum == Datum::Missing) {
-        let reason = value.reason.as_deref().unwrap_or("");
-        match missing.iter_mut().find(|(r, _)| *r == reason) {
-            Some((_, names)) => names.push(name),
-            None => missing.push((reason, vec![name])),
-        }
-    }
+    // What is said of several is said once, behind them all.
+    let missing = a.metrics.iter().filter(|(_, v)| v.datum == Datum::Missing);
+    let missing = by_reason(missing.map(|(name, v)| (name, v.reason.as_deref().unwrap_or(""))));
+    let said = known
+        .iter()
+        .filter_map(|(name, v)| Some((*name, v.reason.as_deref()?)));
+    let mut shared = by_reason(said);
+    shared.retain(|(_, names)| names.len() > 1);
     if !known.is_empty() {
         line!(out, "\nMetrics");
         let unit_of = |value: &Value| match value.unit {
@@ -173,35 +174,55 @@ fn metrics_section(out: &mut String, a: &Analysis) {
                 out,
                 "  {label:<30} {shown:>10} {unit:<width$} {name:<18} {note}"
             );
-            if let (Datum::Word(_) | Datum::Bool(_), Some(reason)) = (&value.datum, &value.reason) {
+            if let Some(reason) = &value.reason
+                && !shared.iter().any(|(r, _)| r == reason)
+            {
                 wrapped(out, "      ", reason);
             }
         }
+    }
+    for (reason, names) in shared {
+        wrapped(out, "  – ", &format!("{}: {reason}", names.join(", ")));
     }
     for (reason, names) in missing {
         wrapped(out, "  – ", &format!("{reason}: no {}", names.join(", ")));
     }
 }
 
+/// Names by what is said of them, in the order of first sight.
+fn by_reason<'a>(said: impl Iterator<Item = (&'a str, &'a str)>) -> Vec<(&'a str, Vec<&'a str>)> {
+    let mut out: Vec<(&str, Vec<&str>)> = Vec::new();
+    for (name, reason) in said {
+        match out.iter_mut().find(|(r, _)| *r == reason) {
+            Some((_, names)) => names.push(name),
+            None => out.push((reason, vec![name])),
+        }
+    }
+    out
+}
+
 fn spectra_section(out: &mut String, a: &Analysis) {
-    let Some((_, first)) = a.spectra.first() else {
-        return;
+    let head = |s: &SpectrumSummary| {
+        let f = s.f_hz.map(|f| format!(", f = {} Hz", figures(f)));
+        format!(
+            "Spectra (Welch, {} × {} s, {} Hz apart, noise bandwidth {} Hz, 95 %: × {} … {}{})",
+            s.segments,
+            plain(s.segment_s, 1),
+            figures(s.resolution_hz),
+            figures(s.enbw_hz),
+            plain(s.confidence_95[0], 2),
+            plain(s.confidence_95[1], 2),
+            f.unwrap_or_default()
+        )
     };
-    let f = first
-        .f_hz
-        .map(|f| format!(", f = {} Hz", figures(f)))
-        .unwrap_or_default();
-    line!(
-        out,
-        "\nSpectra (Welch, {} × {} s, {} Hz apart, noise bandwidth {} Hz, 95 %: × {} … {}{f})",
-        first.segments,
-        plain(first.segment_s, 1),
-        figures(first.resolution_hz),
-        figures(first.enbw_hz),
-        plain(first.confidence_95[0], 2),
-        plain(first.confidence_95[1], 2)
-    );
+    let mut told_head = String::new();
     for (path, s) in &a.spectra {
+        // Signals of other lengths and rates have others.
+        let head = head(s);
+        if head != told_head {
+            line!(out, "\n{head}");
+            told_head = head;
+        }
         let told: Vec<String> = s
             .peaks
             .iter()
@@ -239,7 +260,7 @@ fn events_section(out: &mut String, a: &Analysis) {
             of_kind.len()
         };
         for e in &of_kind[..told] {
-            wrapped_after(
+            wrapped(
                 out,
                 &format!("  {:>9} s  {:<17} ", plain(e.t_s, 3), e.kind),
                 &e.what,
@@ -274,9 +295,11 @@ fn signals_section(out: &mut String, a: &Analysis, all: bool) {
     };
     line!(
         out,
-        "\n{:<41} {:>8} {:>8} {:>9} {:>9} {:>9} {:>9}",
+        "\n{:<38} {:>9} {:>7} {:>8} {:>8} {:>8} {:>8} {:>8} {:>7}",
         "Signals",
+        "count",
         "Hz",
+        "jitter s",
         "min",
         "mean",
         "max",
@@ -292,9 +315,11 @@ fn signals_section(out: &mut String, a: &Analysis, all: bool) {
         };
         line!(
             out,
-            "  {:<39} {:>8} {:>8} {:>9} {:>9} {:>9} {:>9}",
-            shortened(&name, 39),
+            "  {:<36} {:>9} {:>7} {:>8} {:>8} {:>8} {:>8} {:>8} {:>7}",
+            shortened(&name, 36),
+            thousands(s.count),
             cell(s.hz),
+            cell(s.jitter_s),
             cell(s.min),
             cell(s.mean),
             cell(s.max),
@@ -337,10 +362,6 @@ fn quality_section(out: &mut String, a: &Analysis) {
 
 /// Text after a first indent, broken at blanks before [`WIDTH`]; the following lines are indented as deep.
 fn wrapped(out: &mut String, indent: &str, text: &str) {
-    wrapped_after(out, indent, text);
-}
-
-fn wrapped_after(out: &mut String, indent: &str, text: &str) {
     let depth = indent.chars().count();
     let mut line = indent.to_owned();
     let mut width = depth;

@@ -78,6 +78,7 @@ pub(super) fn signals(
             None => part.values,
         };
         let signal = Signal {
+            topic: recording.info().channels[part.channel].topic.clone(),
             path: part.path,
             unit: part.unit.to_owned(),
             times_ns,

@@ -100,6 +100,7 @@ pub fn collect(
                 .filter_map(|(t, row)| Some((*t, values[*row]?)))
                 .unzip();
             signals.push(Signal {
+                topic: name.clone(),
                 path,
                 unit: String::new(),
                 times_ns: times_ns.into(),

@@ -396,6 +396,36 @@ fn a_course_that_is_seen_stands_for_one_that_is_not() {
 }
 
 /// With a lever each touch-down is off by 0.3 of a sample at 100 Hz and 0.4 at 50 Hz, all to one side: 54 periods of two.
+/// A roll at half the frequency of its heave, once with a sensor that nobody placed.
+#[test]
+fn what_hangs_on_the_sensors_place_says_so() {
+    let mut found = felt(
+        |t| 0.3 * (TAU * 0.9 * t).sin(),
+        |t| 1.0 + 0.8 * (TAU * 1.8 * t).sin(),
+        1.0,
+        [0.0; 3],
+        AS_IT_SITS,
+        Some(0.0),
+    );
+    let say_so = |found: &Motion| -> Vec<&str> {
+        let all = metrics(found, MOST).0.into_iter();
+        all.filter(|(_, v)| v.reason.as_ref().is_some_and(|r| r.contains("imu_place_m")))
+            .map(|(name, _)| name)
+            .collect()
+    };
+    let hang = [
+        "dz_pp_m",
+        "rms_z_m",
+        "t_float",
+        "h2_ratio",
+        "growth_ratio",
+        "mechanism",
+    ];
+    assert_eq!(say_so(&found), hang);
+    found.settings.lever_is_known = true;
+    assert_eq!(say_so(&found), [""; 0]);
+}
+
 #[test]
 fn touch_downs_of_a_sensor_off_the_centre_err_by_parts_of_a_sample() {
     let mut found = felt(
