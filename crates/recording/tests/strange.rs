@@ -421,6 +421,65 @@ fn second_representations_have_two_numbers_each() {
     }
 }
 
+/// Collections of enums in XCDR2, and how writers differ in what stands before them. The first message is that of pycdr2 1.0.0
+/// (`serialize(use_version_2=True)`), Cyclone's, which keeps to the standard; Fast CDR puts a size before structs alone, and others before nothing.
+#[test]
+fn enums_of_second_representations() {
+    let of = |fields: &str, words: &[u32]| {
+        let schema = format!(
+            "module p {{ enum Color {{ RED, GREEN, BLUE }}; struct In {{ long i; }}; struct M {{ {fields} }}; }};"
+        );
+        let found = recording(&WriterOptions::default(), |writer| {
+            let channel = RawChannel {
+                topic: "/e",
+                message_encoding: "cdr",
+                schema_name: "p/M",
+                schema_encoding: "ros2idl",
+                schema_data: schema.as_bytes(),
+                metadata: &BTreeMap::new(),
+            };
+            let channel = writer.raw_channel(&channel).expect("opens");
+            let body: Vec<u8> = words.iter().flat_map(|word| word.to_le_bytes()).collect();
+            let message = [&[0, 7, 0, 0], &body[..]].concat();
+            (writer.message(channel, 0, message.as_slice())).expect("writes");
+        });
+        let (signals, _) = found.signals(&|_| true).expect("reads");
+        let mut values: Vec<(String, f64)> = (signals.iter())
+            .map(|signal| (signal.path[3..].to_owned(), signal.values[0]))
+            .collect();
+        values.sort_by(|a, b| a.0.cmp(&b.0));
+        let values = values.iter().map(|(path, value)| format!("{path} {value}"));
+        (
+            values.collect::<Vec<_>>().join(", "),
+            lines(&found).concat(),
+        )
+    };
+    let array = "unsigned long a; Color c[3]; sequence<Color> s; double d;";
+    let (low, high) = (0, 1.5f64.to_bits().wrapping_shr(32) as u32);
+    let expected = "a 7, c[0] 0, c[1] 1, c[2] 2, d 1.5, s[0] 2, s[1] 0";
+    for words in [
+        &[7, 12, 0, 1, 2, 12, 2, 2, 0, low, high][..],
+        &[7, 0, 1, 2, 2, 2, 0, low, high],
+    ] {
+        assert_eq!(of(array, words), (expected.to_owned(), String::new()));
+    }
+    let both = "sequence<In> x; sequence<Color> s;";
+    for words in [
+        &[8, 1, 5, 16, 3, 2, 1, 0][..],
+        &[8, 1, 5, 3, 2, 1, 0],
+        // Three items of which the first is one less than there are look like a size, two, and two items.
+        &[1, 5, 3, 2, 1, 0],
+    ] {
+        let expected = "s[0] 2, s[1] 1, s[2] 0, x[0].i 5";
+        assert_eq!(of(both, words), (expected.to_owned(), String::new()));
+    }
+    let expected = "s[0] 2, s[1] 1, s[2] 0".to_owned();
+    assert_eq!(
+        of("sequence<Color> s;", &[3, 2, 1, 0]),
+        (expected, String::new())
+    );
+}
+
 /// Words that Python and others write though JSON does not have them are numbers that are not finite; in texts they are text.
 #[test]
 fn json_with_bare_words() {
