@@ -809,6 +809,74 @@ fn of_a_oneof_the_last_counts() {
     }
 }
 
+/// Of a map's entries with one key the last counts, whole, and a value that is missing is an empty one, as Google's parser has it.
+#[test]
+fn of_entries_with_one_key_the_last_counts() {
+    let mut map = field("m", 1, Type::Message, Some(".a.M.MEntry"));
+    map.label = Some(Label::Repeated as i32);
+    let single = |name: &str, number: i32, of: &str| FieldDescriptorProto {
+        label: Some(Label::Optional as i32),
+        ..field(name, number, Type::Message, Some(of))
+    };
+    let message = DescriptorProto {
+        name: Some("M".into()),
+        field: vec![map],
+        nested_type: vec![
+            DescriptorProto {
+                name: Some("MEntry".into()),
+                field: vec![
+                    field("key", 1, Type::Uint32, None),
+                    single("value", 2, ".a.M.Sub"),
+                ],
+                options: Some(MessageOptions {
+                    map_entry: Some(true),
+                    ..MessageOptions::default()
+                }),
+                ..DescriptorProto::default()
+            },
+            DescriptorProto {
+                name: Some("Sub".into()),
+                field: vec![
+                    field("a", 1, Type::Sint32, None),
+                    field("b", 2, Type::Uint32, None),
+                ],
+                ..DescriptorProto::default()
+            },
+        ],
+        ..DescriptorProto::default()
+    };
+    let (three, nine) = ([10, 6, 8, 5, 18, 2, 8, 6], [10, 6, 8, 5, 18, 2, 16, 9]);
+    let none = [10, 2, 8, 5];
+    for (syntax, entries, expected) in [
+        ("proto2", [&three[..], &nine].concat(), &["/p.m[5].b 9"][..]),
+        (
+            "proto3",
+            [&three[..], &nine].concat(),
+            &["/p.m[5].a 0", "/p.m[5].b 9"],
+        ),
+        (
+            "proto3",
+            [&nine[..], &three].concat(),
+            &["/p.m[5].a 3", "/p.m[5].b 0"],
+        ),
+        ("proto3", none.to_vec(), &["/p.m[5].a 0", "/p.m[5].b 0"]),
+        (
+            "proto3",
+            [&nine[..], &none].concat(),
+            &["/p.m[5].a 0", "/p.m[5].b 0"],
+        ),
+        ("proto2", [&nine[..], &none].concat(), &[]),
+    ] {
+        let found = one_message(syntax, message.clone(), &entries);
+        let (signals, _) = found.signals(&|_| true).expect("reads");
+        let mut told: Vec<String> = (signals.iter())
+            .map(|s| format!("{} {}", s.path, s.values[0]))
+            .collect();
+        told.sort();
+        assert_eq!(told, expected, "{syntax} {entries:?}");
+    }
+}
+
 /// Found by fuzzing: the library panics over the first while it words its error, and over the second when asked for the value.
 #[test]
 fn protobuf_schemas_of_no_known_kind() {
