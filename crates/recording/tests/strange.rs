@@ -877,6 +877,39 @@ fn of_entries_with_one_key_the_last_counts() {
     }
 }
 
+/// When messages came is known of those that nobody can decode, too.
+#[test]
+fn messages_without_a_decoder_tell_their_times() {
+    let found = recording(&WriterOptions::default(), |writer| {
+        let channel = RawChannel {
+            topic: "/c",
+            message_encoding: "h264",
+            schema_name: "",
+            schema_encoding: "",
+            schema_data: b"",
+            metadata: &BTreeMap::new(),
+        };
+        let channel = writer.raw_channel(&channel).expect("opens");
+        for i in (0..40).chain(60..80) {
+            (writer.message(channel, START_NS + i * 10_000_000, &[1][..])).expect("writes");
+        }
+    });
+    let mut times = Vec::new();
+    let findings = found.stream(&|_| true, &mut |batch| {
+        assert_eq!(batch.columns.len(), 0);
+        times.extend_from_slice(batch.times_ns);
+    });
+    findings.expect("reads");
+    assert_eq!((times.len(), times[59] - times[0]), (60, 790_000_000));
+    assert_eq!(
+        lines(&found),
+        [
+            "no_decoder /c: skipped 60 messages: encoding \"h264\" with schema encoding \"\" has no decoder",
+            "gap /c: 1 gap in the log times (usual interval 0.010000 s), the longest 0.210 s at 0.390 s"
+        ]
+    );
+}
+
 /// Found by fuzzing: the library panics over the first while it words its error, and over the second when asked for the value.
 #[test]
 fn protobuf_schemas_of_no_known_kind() {
