@@ -421,6 +421,65 @@ fn second_representations_have_two_numbers_each() {
     }
 }
 
+/// Collections of enums in XCDR2, and how writers differ in what stands before them. The first message is that of pycdr2 1.0.0
+/// (`serialize(use_version_2=True)`), Cyclone's, which keeps to the standard; Fast CDR puts a size before structs alone, and others before nothing.
+#[test]
+fn enums_of_second_representations() {
+    let of = |fields: &str, words: &[u32]| {
+        let schema = format!(
+            "module p {{ enum Color {{ RED, GREEN, BLUE }}; struct In {{ long i; }}; struct M {{ {fields} }}; }};"
+        );
+        let found = recording(&WriterOptions::default(), |writer| {
+            let channel = RawChannel {
+                topic: "/e",
+                message_encoding: "cdr",
+                schema_name: "p/M",
+                schema_encoding: "ros2idl",
+                schema_data: schema.as_bytes(),
+                metadata: &BTreeMap::new(),
+            };
+            let channel = writer.raw_channel(&channel).expect("opens");
+            let body: Vec<u8> = words.iter().flat_map(|word| word.to_le_bytes()).collect();
+            let message = [&[0, 7, 0, 0], &body[..]].concat();
+            (writer.message(channel, 0, message.as_slice())).expect("writes");
+        });
+        let (signals, _) = found.signals(&|_| true).expect("reads");
+        let mut values: Vec<(String, f64)> = (signals.iter())
+            .map(|signal| (signal.path[3..].to_owned(), signal.values[0]))
+            .collect();
+        values.sort_by(|a, b| a.0.cmp(&b.0));
+        let values = values.iter().map(|(path, value)| format!("{path} {value}"));
+        (
+            values.collect::<Vec<_>>().join(", "),
+            lines(&found).concat(),
+        )
+    };
+    let array = "unsigned long a; Color c[3]; sequence<Color> s; double d;";
+    let (low, high) = (0, 1.5f64.to_bits().wrapping_shr(32) as u32);
+    let expected = "a 7, c[0] 0, c[1] 1, c[2] 2, d 1.5, s[0] 2, s[1] 0";
+    for words in [
+        &[7, 12, 0, 1, 2, 12, 2, 2, 0, low, high][..],
+        &[7, 0, 1, 2, 2, 2, 0, low, high],
+    ] {
+        assert_eq!(of(array, words), (expected.to_owned(), String::new()));
+    }
+    let both = "sequence<In> x; sequence<Color> s;";
+    for words in [
+        &[8, 1, 5, 16, 3, 2, 1, 0][..],
+        &[8, 1, 5, 3, 2, 1, 0],
+        // Three items of which the first is one less than there are look like a size, two, and two items.
+        &[1, 5, 3, 2, 1, 0],
+    ] {
+        let expected = "s[0] 2, s[1] 1, s[2] 0, x[0].i 5";
+        assert_eq!(of(both, words), (expected.to_owned(), String::new()));
+    }
+    let expected = "s[0] 2, s[1] 1, s[2] 0".to_owned();
+    assert_eq!(
+        of("sequence<Color> s;", &[3, 2, 1, 0]),
+        (expected, String::new())
+    );
+}
+
 /// Words that Python and others write though JSON does not have them are numbers that are not finite; in texts they are text.
 #[test]
 fn json_with_bare_words() {
@@ -748,6 +807,107 @@ fn of_a_oneof_the_last_counts() {
         told.sort();
         assert_eq!(told, expected, "{bytes:?}");
     }
+}
+
+/// Of a map's entries with one key the last counts, whole, and a value that is missing is an empty one, as Google's parser has it.
+#[test]
+fn of_entries_with_one_key_the_last_counts() {
+    let mut map = field("m", 1, Type::Message, Some(".a.M.MEntry"));
+    map.label = Some(Label::Repeated as i32);
+    let single = |name: &str, number: i32, of: &str| FieldDescriptorProto {
+        label: Some(Label::Optional as i32),
+        ..field(name, number, Type::Message, Some(of))
+    };
+    let message = DescriptorProto {
+        name: Some("M".into()),
+        field: vec![map],
+        nested_type: vec![
+            DescriptorProto {
+                name: Some("MEntry".into()),
+                field: vec![
+                    field("key", 1, Type::Uint32, None),
+                    single("value", 2, ".a.M.Sub"),
+                ],
+                options: Some(MessageOptions {
+                    map_entry: Some(true),
+                    ..MessageOptions::default()
+                }),
+                ..DescriptorProto::default()
+            },
+            DescriptorProto {
+                name: Some("Sub".into()),
+                field: vec![
+                    field("a", 1, Type::Sint32, None),
+                    field("b", 2, Type::Uint32, None),
+                ],
+                ..DescriptorProto::default()
+            },
+        ],
+        ..DescriptorProto::default()
+    };
+    let (three, nine) = ([10, 6, 8, 5, 18, 2, 8, 6], [10, 6, 8, 5, 18, 2, 16, 9]);
+    let none = [10, 2, 8, 5];
+    for (syntax, entries, expected) in [
+        ("proto2", [&three[..], &nine].concat(), &["/p.m[5].b 9"][..]),
+        (
+            "proto3",
+            [&three[..], &nine].concat(),
+            &["/p.m[5].a 0", "/p.m[5].b 9"],
+        ),
+        (
+            "proto3",
+            [&nine[..], &three].concat(),
+            &["/p.m[5].a 3", "/p.m[5].b 0"],
+        ),
+        ("proto3", none.to_vec(), &["/p.m[5].a 0", "/p.m[5].b 0"]),
+        (
+            "proto3",
+            [&nine[..], &none].concat(),
+            &["/p.m[5].a 0", "/p.m[5].b 0"],
+        ),
+        ("proto2", [&nine[..], &none].concat(), &[]),
+    ] {
+        let found = one_message(syntax, message.clone(), &entries);
+        let (signals, _) = found.signals(&|_| true).expect("reads");
+        let mut told: Vec<String> = (signals.iter())
+            .map(|s| format!("{} {}", s.path, s.values[0]))
+            .collect();
+        told.sort();
+        assert_eq!(told, expected, "{syntax} {entries:?}");
+    }
+}
+
+/// When messages came is known of those that nobody can decode, too.
+#[test]
+fn messages_without_a_decoder_tell_their_times() {
+    let found = recording(&WriterOptions::default(), |writer| {
+        let channel = RawChannel {
+            topic: "/c",
+            message_encoding: "h264",
+            schema_name: "",
+            schema_encoding: "",
+            schema_data: b"",
+            metadata: &BTreeMap::new(),
+        };
+        let channel = writer.raw_channel(&channel).expect("opens");
+        for i in (0..40).chain(60..80) {
+            (writer.message(channel, START_NS + i * 10_000_000, &[1][..])).expect("writes");
+        }
+    });
+    let mut times = Vec::new();
+    let findings = found.stream(&|_| true, &mut |batch| {
+        assert_eq!(batch.columns.len(), 0);
+        times.extend_from_slice(batch.times_ns);
+    });
+    findings.expect("reads");
+    assert_eq!((times.len(), times[59] - times[0]), (60, 790_000_000));
+    assert_eq!(
+        lines(&found),
+        [
+            "no_decoder /c: skipped 60 messages: encoding \"h264\" with schema encoding \"\" has no decoder",
+            "gap /c: 1 gap in the log times (usual interval 0.010000 s), the longest 0.210 s at 0.390 s"
+        ]
+    );
 }
 
 /// Found by fuzzing: the library panics over the first while it words its error, and over the second when asked for the value.

@@ -457,8 +457,13 @@ impl<'a> ChannelState<'a> {
 
     fn read(&mut self, block: &[u8]) {
         let State::Ready(decoder) = &mut self.state else {
-            // Messages without a decoder are counted.
+            // Messages without a decoder are counted, and tell their times.
             self.closed += self.waiting.len() as u64;
+            self.times
+                .extend(self.waiting.iter().map(|place| place.time));
+            // OK because rows are counted in u32 and a block is far from having as many messages.
+            self.rows
+                .keep_alike(self.waiting.len() as u32, std::iter::empty());
             return;
         };
         let rows = &mut self.rows;

@@ -1,13 +1,13 @@
 //! ROS 2 messages (`cdr`): XCDR1 and plain XCDR2, both byte orders, laid out by `ros2msg` or IDL text.
 //!
 //! Two points of the representation differ between implementations: whether plain XCDR2 puts a size before collections of structs
-//! and strings, and how many bytes a wide character takes. A message tells by being used up exactly; the reading that
+//! and strings, and before those of enums, and how many bytes a wide character takes. A message tells by being used up exactly; the reading that
 //! does so is tried first on the channel's next message. Only where none does, padding may be left.
 
 use super::{
     decode::{Decoder, Place, SchemaRef},
     idl,
-    layout::{Fail, Program, Shape},
+    layout::{Fail, Headers, Program, Shape},
     ros1::describe,
     ros2msg::{self, Dialect},
     rows::Rows,
@@ -22,9 +22,10 @@ const PADDING: usize = 3;
 
 struct Cdr {
     types: Types,
-    /// Whether the message has wide text, or collections of structs and text: where readings differ.
+    /// Whether the message has wide text, collections of structs and text, or collections of enums: where readings differ.
     wide: bool,
     collections: bool,
+    enums: bool,
     programs: Vec<(Shape, Program)>,
     /// The readings to try, by representation; the one that fitted last comes first.
     readings: Vec<(u8, Vec<Shape>)>,
@@ -49,7 +50,7 @@ pub(super) fn open_idl(
 }
 
 fn begin(types: Types) -> Result<Box<dyn Decoder>, String> {
-    let (mut wide, mut collections) = (false, false);
+    let (mut wide, mut collections, mut enums) = (false, false, false);
     for kind in types
         .structs
         .iter()
@@ -57,7 +58,8 @@ fn begin(types: Types) -> Result<Box<dyn Decoder>, String> {
     {
         let mut kind = kind;
         while let Type::Array(inner, _) | Type::Sequence(inner) = kind {
-            collections |= !matches!(**inner, Type::Prim(_));
+            enums |= **inner == Type::Enum;
+            collections |= inner.prim().is_none();
             kind = inner;
         }
         wide |= *kind == Type::WideText;
@@ -66,6 +68,7 @@ fn begin(types: Types) -> Result<Box<dyn Decoder>, String> {
         types,
         wide,
         collections,
+        enums,
         programs: Vec::new(),
         readings: Vec::new(),
     }))
@@ -100,20 +103,18 @@ impl Cdr {
         let shape = Shape {
             big_endian,
             max_align: if second { 4 } else { 8 },
-            collection_headers: false,
+            headers: Headers::None,
             wide: 2,
             empty_takes_byte: true,
         };
-        let mut readings = vec![shape];
-        if second && self.collections {
-            readings.insert(
-                0,
-                Shape {
-                    collection_headers: true,
-                    ..shape
-                },
-            );
-        }
+        let headers = match (second, self.collections, self.enums) {
+            (true, true, true) => &[Headers::All, Headers::NotEnums, Headers::None][..],
+            (true, true, false) | (true, false, true) => &[Headers::All, Headers::None],
+            _ => &[Headers::None],
+        };
+        let mut readings: Vec<Shape> = (headers.iter())
+            .map(|&headers| Shape { headers, ..shape })
+            .collect();
         if self.wide {
             let four: Vec<Shape> = readings
                 .iter()

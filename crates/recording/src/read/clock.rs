@@ -2,7 +2,7 @@
 
 use crate::finding::{Finding, Kind};
 use crate::text::counted;
-use std::cmp::Ordering;
+use std::{cmp::Ordering, collections::BTreeMap};
 
 /// So many intervals are looked at together to learn what is usual, and no more than so many are kept.
 const SAMPLE: usize = 256;
@@ -10,6 +10,8 @@ const SAMPLE: usize = 256;
 const ENOUGH: usize = 16;
 /// An interval longer than so many usual ones is a gap.
 const GAP: i64 = 3;
+/// So many gaps, the latest, may still be filled by messages that come late.
+const OPEN: usize = 1 << 14;
 /// A constant difference between the clocks below this is what networks and drivers do, s.
 const OFFSET_S: f64 = 0.1;
 /// Drift below this is what quartz does, parts per million.
@@ -19,13 +21,14 @@ const DRIFT_PPM: f64 = 20.0;
 #[derive(Debug, Default)]
 pub(super) struct Order {
     last: Option<i64>,
-    /// The latest so far: after a step back nothing is missing up to there.
+    /// The latest so far.
     latest: i64,
     duplicates: Count,
     backward: Count,
-    /// Intervals to learn from what is usual, with where they began; emptied until it is known.
-    sample: Vec<(i64, i64)>,
+    /// Stretches without messages, from where to where: gaps, and all to learn from while it is not known what is usual.
+    open: BTreeMap<i64, i64>,
     usual: Option<i64>,
+    /// Gaps that nothing fills any more.
     gaps: Count,
     longest: (i64, i64),
 }
@@ -85,25 +88,43 @@ impl Order {
         match to.cmp(&from) {
             Ordering::Equal => self.duplicates.add(to),
             Ordering::Less => self.backward.add(to),
-            Ordering::Greater if to <= self.latest => {}
-            Ordering::Greater => {
-                let interval = to.saturating_sub(self.latest);
-                if let Some(usual) = self.usual {
-                    self.judge(interval, usual, self.latest);
-                } else {
-                    self.sample.push((interval, self.latest));
-                    if self.sample.len() >= SAMPLE {
-                        self.learn();
-                    }
-                }
-                self.latest = to;
+            Ordering::Greater => {}
+        }
+        if to > self.latest {
+            let from = std::mem::replace(&mut self.latest, to);
+            self.stretch(from, to);
+        } else if let Some((&from, &end)) = self.open.range(..to).next_back()
+            && to < end
+        {
+            // It comes late: two stretches are left of the one that it lies in.
+            self.open.remove(&from);
+            self.stretch(from, to);
+            self.stretch(to, end);
+        }
+    }
+
+    /// Keeps a stretch without messages that is a gap, or may be one.
+    fn stretch(&mut self, from: i64, to: i64) {
+        let Some(usual) = self.usual else {
+            self.open.insert(from, to);
+            if self.open.len() >= SAMPLE {
+                self.learn();
+            }
+            return;
+        };
+        if is_gap(from, to, usual) {
+            self.open.insert(from, to);
+            if self.open.len() > OPEN {
+                self.close();
             }
         }
     }
 
-    fn judge(&mut self, interval: i64, usual: i64, from: i64) {
-        if interval > usual.saturating_mul(GAP) {
+    /// Counts the earliest of the open gaps.
+    fn close(&mut self) {
+        if let Some((from, to)) = self.open.pop_first() {
             self.gaps.add(from);
+            let interval = to.saturating_sub(from);
             if interval > self.longest.0 {
                 self.longest = (interval, from);
             }
@@ -113,25 +134,29 @@ impl Order {
     /// Decides what interval is usual, if any: the median, where nine of ten intervals are below twice that. Else, as where a queue is emptied when the
     /// recording begins, the next ones tell.
     fn learn(&mut self) {
-        let sample = std::mem::take(&mut self.sample);
+        let mut sample = std::mem::take(&mut self.open);
         if sample.len() < ENOUGH {
             return;
         }
-        let mut sorted: Vec<i64> = sample.iter().map(|(interval, _)| *interval).collect();
+        let mut sorted: Vec<i64> = (sample.iter())
+            .map(|(from, to)| to.saturating_sub(*from))
+            .collect();
         sorted.sort_unstable();
         let usual = sorted[sorted.len() / 2];
         if sorted[sorted.len() * 9 / 10] < usual.saturating_mul(2) {
             self.usual = Some(usual);
-            for (interval, from) in sample {
-                self.judge(interval, usual, from);
-            }
+            sample.retain(|from, to| is_gap(*from, *to, usual));
+            self.open = sample;
         }
     }
 
-    /// Whether there are gaps.
+    /// Whether there are gaps, now that all times have come.
     pub fn has_gaps(&mut self) -> bool {
         if self.usual.is_none() {
             self.learn();
+        }
+        while !self.open.is_empty() {
+            self.close();
         }
         self.gaps.count > 0
     }
@@ -196,6 +221,10 @@ impl Order {
             ),
         );
     }
+}
+
+fn is_gap(from: i64, to: i64, usual: i64) -> bool {
+    to.saturating_sub(from) > usual.saturating_mul(GAP)
 }
 
 /// Log time against header stamp: offset = log time − stamp, and its trend.
@@ -400,6 +429,33 @@ mod tests {
                 found.contains(&(Kind::Gap, 1, Some(at(999) as f64 / 1e9))),
                 "{queued}: {found:?}"
             );
+        }
+    }
+
+    /// Blocks of messages in any order tell what the same messages tell in theirs: nothing, or where one of the blocks is missing.
+    #[test]
+    fn what_comes_late_fills_its_gap() {
+        let at = |k: i64| k * 10_000_000;
+        for block in [7, 40, 300] {
+            for lost in [None, Some(5)] {
+                let mut order = Order::default();
+                for pair in [[0, 1], [3, 2], [5, 4], [8, 9], [7, 6], [11, 10]] {
+                    for b in pair.into_iter().filter(|b| Some(*b) != lost) {
+                        let times: Vec<i64> = (b * block..(b + 1) * block).map(at).collect();
+                        order.observe(&times);
+                    }
+                }
+                let gaps: Vec<_> = words(&mut order)
+                    .into_iter()
+                    .filter(|(kind, ..)| *kind == Kind::Gap)
+                    .collect();
+                let expected = lost.map(|b| (Kind::Gap, 1, Some(at(b * block - 1) as f64 / 1e9)));
+                assert_eq!(
+                    gaps,
+                    Vec::from_iter(expected),
+                    "blocks of {block}, without {lost:?}"
+                );
+            }
         }
     }
 

@@ -109,7 +109,7 @@ fn resolve(
             }
             let inner_scope = full.rsplit_once("::").map_or("", |(scope, _)| scope);
             match definition {
-                Definition::Enum => Type::Prim(Prim::U32),
+                Definition::Enum => Type::Enum,
                 Definition::Unsupported(what) => {
                     return Err(format!("{full} is {what}, which has no decoder"));
                 }
@@ -660,7 +660,7 @@ mod tests {
                 "many: Array(Struct(1), 2)"
             ]
         );
-        assert_eq!(types.structs[1].fields[0].1, Type::Prim(Prim::U32));
+        assert_eq!(types.structs[1].fields[0].1, Type::Enum);
     }
 
     #[test]

@@ -16,12 +16,32 @@ pub(super) struct Shape {
     pub big_endian: bool,
     /// Numbers are aligned to their size, but to no more than this: 8 in XCDR1, 4 in XCDR2, 1 in ROS 1.
     pub max_align: usize,
-    /// Arrays and sequences of structs and strings begin with their size in bytes (XCDR2).
-    pub collection_headers: bool,
+    pub headers: Headers,
     /// Bytes per character of a wide string.
     pub wide: usize,
     /// A struct without fields takes one byte (ROS 2).
     pub empty_takes_byte: bool,
+}
+
+/// Which arrays and sequences begin with their size in bytes.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Headers {
+    None,
+    /// Those of structs and strings, as Fast CDR writes XCDR2.
+    NotEnums,
+    /// All but those of numbers: XTypes 1.3, 7.4.3.5.3, rules 9 and 12.
+    All,
+}
+
+impl Shape {
+    /// Whether an array or sequence of such items begins with its size.
+    fn has_header(self, item: &Type) -> bool {
+        match item {
+            Type::Prim(_) => false,
+            Type::Enum => self.headers == Headers::All,
+            _ => self.headers != Headers::None,
+        }
+    }
 }
 
 /// Why a message could not be decoded.
@@ -342,13 +362,15 @@ impl Program {
                     end_of(context.data, at, bytes, field)?
                 }
                 Op::Sequence(items) => {
-                    let start = items.header(context, at)?;
+                    let (end, start) = items.header(context, at)?;
                     let (count, at) = context.length(start, &items.field)?;
-                    items.read(context, at, count, rows)?
+                    let at = items.read(context, at, count, rows)?;
+                    items.check(end, at)?
                 }
                 Op::Array(items, count) => {
-                    let at = items.header(context, at)?;
-                    items.read(context, at, *count, rows)?
+                    let (end, at) = items.header(context, at)?;
+                    let at = items.read(context, at, *count, rows)?;
+                    items.check(end, at)?
                 }
             };
         }
@@ -421,6 +443,7 @@ impl Compiler<'_, '_> {
         }
         match kind {
             Type::Prim(prim) => self.number(*prim, 1, field, role),
+            Type::Enum => self.number(Prim::U32, 1, field, role),
             Type::Text => self.push(Op::Text(field.to_owned())),
             Type::WideText => self.push(Op::WideText(field.to_owned())),
             Type::Struct(index) => {
@@ -486,10 +509,11 @@ impl Compiler<'_, '_> {
 
     fn array(&mut self, inner: &Type, count: usize, field: &str) -> Result<(), String> {
         let items_wanted = self.take && count <= self.rows.max_items;
-        if let Type::Prim(prim) = inner {
+        let headed = self.shape.has_header(inner);
+        if let Some(prim) = inner.prim().filter(|_| !headed) {
             if !items_wanted {
                 if count > 0 {
-                    self.number(*prim, count, field, Role::Plain);
+                    self.number(prim, count, field, Role::Plain);
                 }
                 if self.take
                     && self.rows.column(&format!("{field}[0]")) != UNWANTED
@@ -501,7 +525,7 @@ impl Compiler<'_, '_> {
             }
             for item in 0..count {
                 self.fields += 1;
-                self.number(*prim, 1, &format!("{field}[{item}]"), Role::Plain);
+                self.number(prim, 1, &format!("{field}[{item}]"), Role::Plain);
             }
             // ROS says with −1 in a covariance's first element that its field is not given.
             if let (Some(given), Prim::F64, Some(first)) = (
@@ -514,7 +538,6 @@ impl Compiler<'_, '_> {
             }
             return Ok(());
         }
-        let headed = self.shape.collection_headers && has_header(inner);
         if items_wanted && !headed {
             for item in 0..count {
                 self.add(inner, &format!("{field}[{item}]"), Role::Plain)?;
@@ -530,11 +553,8 @@ impl Compiler<'_, '_> {
         Box::new(Items {
             field: field.to_owned(),
             kind: inner.clone(),
-            prim: match inner {
-                Type::Prim(prim) => Some(*prim),
-                _ => None,
-            },
-            header: self.shape.collection_headers && has_header(inner),
+            prim: inner.prim(),
+            header: self.shape.has_header(inner),
             programs: Vec::new(),
             skip: None,
         })
@@ -554,17 +574,22 @@ impl Compiler<'_, '_> {
     }
 }
 
-fn has_header(kind: &Type) -> bool {
-    !matches!(kind, Type::Prim(_))
-}
-
 impl Items {
-    /// Steps over the size that XCDR2 puts before collections of non-numbers.
-    fn header(&self, context: &mut Context<'_>, at: usize) -> Result<usize, Fail> {
+    /// Where the items end, if XCDR2 put their size before them, and where they begin.
+    fn header(&self, context: &mut Context<'_>, at: usize) -> Result<(Option<usize>, usize), Fail> {
         if !self.header {
-            return Ok(at);
+            return Ok((None, at));
         }
-        context.length(at, &self.field).map(|(_, at)| at)
+        let (size, at) = context.length(at, &self.field)?;
+        Ok((Some(at.saturating_add(size)), at))
+    }
+
+    /// Whether the items ended at `at`, where their size said: another reading may use up a message too.
+    fn check(&self, end: Option<usize>, at: usize) -> Result<usize, Fail> {
+        match end {
+            Some(end) if end != at => Err(other(at, &self.field, "its size in bytes is another")),
+            _ => Ok(at),
+        }
     }
 
     fn read(

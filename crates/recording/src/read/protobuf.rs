@@ -690,15 +690,20 @@ fn read_entry(
         entries.plans.push(plan);
         entries.plans.len() - 1
     });
-    if !present {
+    let plan = &mut entries.plans[position];
+    if present {
+        // Of entries with one key the last counts.
+        plan.flush(rows, false);
+    } else {
         entries.present.push(position);
     }
-    let plan = &mut entries.plans[position];
-    if values.is_empty()
-        && let Plan::Number { value, .. } = plan
-    {
-        *value = Some(0.0);
+    match (plan, values.as_slice()) {
+        (Plan::Number { value, .. }, []) => *value = Some(0.0),
+        // An empty message.
+        (_, []) => values.push((2, &[0])),
+        _ => {}
     }
+    let plan = &mut entries.plans[position];
     for (wire, rest) in values {
         plan.read(&mut Input { rest }, wire, 2, depth + 1, rows)?;
     }

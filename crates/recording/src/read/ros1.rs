@@ -2,7 +2,7 @@
 
 use super::{
     decode::{Decoder, Place, SchemaRef},
-    layout::{Fail, Problem, Program, Shape},
+    layout::{Fail, Headers, Problem, Program, Shape},
     ros2msg::{self, Dialect},
     rows::Rows,
     types::Types,
@@ -11,7 +11,7 @@ use super::{
 const SHAPE: Shape = Shape {
     big_endian: false,
     max_align: 1,
-    collection_headers: false,
+    headers: Headers::None,
     wide: 2,
     empty_takes_byte: false,
 };

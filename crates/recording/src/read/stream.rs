@@ -16,7 +16,7 @@ use super::{
 };
 use crate::{Finding, Kind, text::counted};
 
-/// Decoded numbers of one channel out of one chunk.
+/// Decoded numbers of one channel out of one chunk; of messages that nothing decodes, when they came.
 #[derive(Clone, Copy, Debug)]
 pub struct Batch<'a> {
     /// Index into [`Info::channels`](super::Info::channels).

@@ -33,12 +33,25 @@ impl Prim {
 #[derive(Clone, Debug, PartialEq)]
 pub(super) enum Type {
     Prim(Prim),
+    /// A `u32` on the wire.
+    Enum,
     Text,
     WideText,
     /// Index into [`Types::structs`].
     Struct(usize),
     Array(Box<Type>, usize),
     Sequence(Box<Type>),
+}
+
+impl Type {
+    /// The number that it is on the wire, if it is one.
+    pub fn prim(&self) -> Option<Prim> {
+        match self {
+            Type::Prim(prim) => Some(*prim),
+            Type::Enum => Some(Prim::U32),
+            _ => None,
+        }
+    }
 }
 
 /// A message type.
