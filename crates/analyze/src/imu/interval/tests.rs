@@ -395,7 +395,6 @@ fn a_course_that_is_seen_stands_for_one_that_is_not() {
     }
 }
 
-/// With a lever each touch-down is off by 0.3 of a sample at 100 Hz and 0.4 at 50 Hz, all to one side: 54 periods of two.
 /// A roll at half the frequency of its heave, once with a sensor that nobody placed.
 #[test]
 fn what_hangs_on_the_sensors_place_says_so() {
@@ -426,6 +425,7 @@ fn what_hangs_on_the_sensors_place_says_so() {
     assert_eq!(say_so(&found), [""; 0]);
 }
 
+/// With a lever each touch-down is off by 0.3 of a sample at 100 Hz and 0.4 at 50 Hz, all to one side: 54 periods of two.
 #[test]
 fn touch_downs_of_a_sensor_off_the_centre_err_by_parts_of_a_sample() {
     let mut found = felt(
