@@ -254,8 +254,16 @@ fn what_cannot_be_replayed_ends_in_one_sentence() {
         );
         assert!(!out.exists() && done.stdout.is_empty());
     }
-    let args = ["replay", gap.to_str().unwrap(), "--from", "nan"];
-    assert_eq!(sim(&args).status.code(), Some(2));
+    let gap_path = gap.to_str().unwrap();
+    for more in [
+        ["--from", "nan"],
+        ["--out", "-"],
+        ["--out", "x.toml"],
+        ["--out", gap_path],
+    ] {
+        let done = sim(&[&["replay", gap_path, "--to", "5"], &more[..]].concat());
+        assert_eq!(done.status.code(), Some(2), "{more:?}: {done:?}");
+    }
     // What is beside the gap is good, wrapped phases are phases, and without the body's motion there is nothing to compare.
     phases(&at("wrapped.mcap"), 2, |_, t| {
         (!(7.0..9.0).contains(&t)).then_some((12.0 * t).rem_euclid(std::f64::consts::TAU))
@@ -272,4 +280,30 @@ fn what_cannot_be_replayed_ends_in_one_sentence() {
         let span = turns(&file);
         assert!((span - 599.0 / 30.0 + 9.5).abs() < 0.034, "{span}");
     }
+}
+
+/// What was begun goes when the user interrupts.
+#[cfg(unix)]
+#[test]
+fn an_interrupted_replay_leaves_nothing() {
+    let folder = tempfile::tempdir().unwrap();
+    let file = record(folder.path(), "baseline", &["--duration", "3"]);
+    let files = || std::fs::read_dir(folder.path()).unwrap().count();
+    let before = files();
+    // Far more steps than anybody waits for.
+    let mut child = Command::new(env!("CARGO_BIN_EXE_sim"))
+        .args(["replay", file.to_str().unwrap(), "--out", "out.mcap"])
+        .args(["--set", "solver.method=rk4", "--set", "solver.step_s=1e-9"])
+        .current_dir(folder.path())
+        .spawn()
+        .unwrap();
+    while files() == before {
+        assert_eq!(child.try_wait().unwrap(), None);
+        std::thread::sleep(std::time::Duration::from_millis(5));
+    }
+    let mut interrupt = Command::new("kill");
+    interrupt.args(["-INT", &child.id().to_string()]);
+    assert!(interrupt.status().unwrap().success());
+    assert_eq!(child.wait().unwrap().code(), Some(130));
+    assert_eq!(files(), before);
 }

@@ -4,6 +4,7 @@ use super::{Format, print, seconds, setting};
 use anyhow::{Context, Result, anyhow, bail};
 use recording::read::{ReadOptions, Recording};
 use recording::topics::{BEAT, FORCES, PHASES, STATE};
+use recording::whole::Usage;
 use recording::write::{ChannelId, RawChannel, RecordingWriter, WriteError, WriterOptions};
 use sim::model::Model;
 use sim::record::Recorder;
@@ -96,7 +97,8 @@ pub enum Input {
 /// Replays, records, compares.
 pub fn run(args: &Args) -> Result<Input> {
     if args.file == Path::new("-") {
-        bail!("-: a replay does not read standard input; expected the path of a recording");
+        let said = "-: a replay does not read standard input; expected the path of a recording";
+        return Err(Usage(said.into()).into());
     }
     // What is given is read first, so that a slip in it does not wait for the recording.
     if let Some(scene) = &args.scene {
