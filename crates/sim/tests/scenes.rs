@@ -2,7 +2,7 @@
 
 use sim::model::Model;
 use sim::run::{Sample, run};
-use sim::scene::{BUILTIN, SceneError, Template, load, parse, to_toml};
+use sim::scene::{BUILTIN, SceneError, Template, load, parse, setting_value, to_toml};
 
 /// The message about a scene that must not pass.
 fn message(text: &str) -> String {
@@ -403,6 +403,33 @@ fn carriers_stand_along_poles_or_by_hand() {
         .unwrap_err()
         .to_string();
     assert!(said.contains(no_poles), "{said}");
+}
+
+/// A template takes what a setting takes, and refuses what a setting is refused.
+#[test]
+fn a_template_is_changed_as_by_settings() {
+    let template = Template::load("baseline", &[]).unwrap();
+    for setting in [
+        "effects.flexure={frequency_hz=5.0}",
+        "effects.flexure=false",
+        "effects.contact=false",
+        "start.height_m=false",
+        "body.inertia_kg_m2=[1.0, 2.0, 2.5]",
+        "effects.flexure=[5.0, 0.1, 3.0]",
+        "effects.flexur=false",
+        "solver=false",
+    ] {
+        let (key, value) = setting.split_once('=').unwrap();
+        let swept = template.with([(key, setting_value(value))]);
+        match load("baseline", &[setting.to_owned()]) {
+            Ok(scene) => assert_eq!(swept, Ok(scene), "{setting}"),
+            Err(why) => {
+                let (why, said) = (why.to_string(), swept.unwrap_err().to_string());
+                let why = why.rsplit_once(": ").unwrap().1;
+                assert!(said.ends_with(why), "{setting}: {said}, not {why}");
+            }
+        }
+    }
 }
 
 /// Every built-in scene is complete, comes back from its own TOML, and runs its first seconds with nothing unexplained.
