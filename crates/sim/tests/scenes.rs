@@ -157,6 +157,19 @@ fn wrong_types_and_signs_are_pointed_at() {
         &["at most 1e9"],
     );
     expect("name = \"a\"\nepoch_s = 2147483600.0", "2:11", &["2038"]);
+    let late = "name = \"a\"\nepoch_s = 1.7e9\n";
+    for (instrument, place) in [
+        (
+            "[effects.imu]\nsensors = [{ clock_offset_s = 1e9 }]",
+            "4:31",
+        ),
+        (
+            "[effects.music]\n[effects.drum]\nclock_offset_s = 1e9",
+            "5:18",
+        ),
+    ] {
+        expect(&format!("{late}{instrument}"), place, &["2038"]);
+    }
     expect(
         "name = \"a\"\n[carriers]\nhandles_m = [[1.0, 2.0, 3.0]]\n[carriers.along_poles]\ncount = 2",
         "3:13",
@@ -254,6 +267,22 @@ fn wrong_types_and_signs_are_pointed_at() {
         "name = \"a\"\n[effects.imu]\nsensors = [{ on = \"carrier_3\" }]",
         "3:19",
         &["carrier_2"],
+    );
+    expect(
+        "name = \"a\"\n[effects.imu]\nsensors = [{ on = \"carrier_+1\" }]",
+        "3:19",
+        &["carrier_+1"],
+    );
+    expect(
+        "name = \"a\"\n[effects.imu]\naccel_resolution_m_per_s2 = 1e9",
+        "3:29",
+        &["1e9", "accel_range_m_per_s2"],
+    );
+    expect(
+        "name = \"a\"\n[[effects.gait.harmonics]]\norder = 2\namplitude_m = [0.0, 0.0, 0.1]\n\
+         [[effects.gait.harmonics]]\norder = 99\namplitude_m = [0.0, 0.0, 0.1]",
+        "6:9",
+        &["harmonics.1.order", "found 99"],
     );
     expect(
         "name = \"a\"\n[effects.music]\npauses = [{ from_s = 3.0, to_s = 2.0 }]",
