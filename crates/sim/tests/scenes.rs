@@ -295,6 +295,11 @@ fn wrong_types_and_signs_are_pointed_at() {
         &["carrier 2"],
     );
     expect(
+        "name = \"a\"\n[effects.coupling]\ngraph = { edges = [[0, 1], [1, 0]] }",
+        "3:9",
+        &["[1, 0] stands there twice"],
+    );
+    expect(
         "name = \"a\"\n[effects.hold]\n[effects.friction]\nlaw = \"bristle\"",
         "4:7",
         &["hold"],
