@@ -177,6 +177,11 @@ const KINDS: [&str; 20] = [
     "yaml", "yml", "html", "htm", "md", "txt", "svg", "png",
 ];
 
+/// What was asked for cannot be, whatever is in the files: wrong usage of a program.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+#[error("{0}")]
+pub struct Usage(pub String);
+
 /// That every output is none of the inputs, nor another output, and is not named as what it will not hold: a pattern or a slip that names a file
 /// would lose it. What is there already is written over only where its name ends in what is written.
 ///
@@ -185,24 +190,24 @@ const KINDS: [&str; 20] = [
 pub fn may_write<'a>(
     outputs: &[Output<'a>],
     inputs: impl IntoIterator<Item = &'a Path>,
-) -> Result<(), String> {
+) -> Result<(), Usage> {
     apart(outputs.iter().map(|output| output.path), inputs)?;
     outputs.iter().try_for_each(named)
 }
 
-fn named(output: &Output<'_>) -> Result<(), String> {
+fn named(output: &Output<'_>) -> Result<(), Usage> {
     let ending = output.path.extension().unwrap_or_default();
     let is = |known: &&str| ending.eq_ignore_ascii_case(known);
     let new = !output.path.exists() && !KINDS.iter().any(is);
     if new || output.endings.iter().any(is) || keeps_nothing(output.path) {
         return Ok(());
     }
-    Err(format!(
+    Err(Usage(format!(
         "{} {}: expected a name that ends in .{}, so that no file of another kind is written over",
         output.option,
         output.path.display(),
         output.endings.join(" or .")
-    ))
+    )))
 }
 
 /// Standard output, a device, a pipe.
@@ -215,7 +220,7 @@ fn keeps_nothing(path: &Path) -> bool {
 fn apart<'a>(
     outputs: impl IntoIterator<Item = &'a Path>,
     inputs: impl IntoIterator<Item = &'a Path>,
-) -> Result<(), String> {
+) -> Result<(), Usage> {
     // What is not there yet may lie in a folder that is.
     let whereabouts = |path: &Path| {
         let folder = path.parent().filter(|p| !p.as_os_str().is_empty());
@@ -231,10 +236,10 @@ fn apart<'a>(
             continue;
         };
         if seen.contains(&place) {
-            return Err(format!(
+            return Err(Usage(format!(
                 "{}: is named twice, and what is read or written there would be lost; give the output another name",
                 path.display()
-            ));
+            )));
         }
         if !keeps_nothing(&place) {
             seen.push(place);
@@ -261,6 +266,7 @@ mod tests {
         assert!(
             apart([&*round_about.join("x")], [&*x])
                 .unwrap_err()
+                .0
                 .contains("twice")
         );
         assert!(apart([&*y, &*round_about.join("y")], [&*x]).is_err());
@@ -290,14 +296,14 @@ mod tests {
             assert_eq!(may_write(&[report(path)], [&*b]), Ok(()), "{path:?}");
         }
         for path in [&a, &odd, &b] {
-            let said = may_write(&[report(path)], []).unwrap_err();
+            let Usage(said) = may_write(&[report(path)], []).unwrap_err();
             let expected = "expected a name that ends in .html or .htm";
             assert!(
                 said.starts_with("--report ") && said.contains(expected),
                 "{said}"
             );
         }
-        let twice = may_write(&[report(&a)], [&*a]).unwrap_err();
+        let Usage(twice) = may_write(&[report(&a)], [&*a]).unwrap_err();
         assert!(twice.contains("twice"), "{twice}");
     }
 

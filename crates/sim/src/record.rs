@@ -151,11 +151,13 @@ impl<'m> Recorder<'m> {
     ///
     /// # Errors
     /// What the writer says, now or at an earlier sample.
-    pub fn finish(self) -> Result<(), WriteError> {
-        match self.failed {
-            Some(error) => Err(error),
-            None => self.writer.finish(),
+    pub fn finish(mut self) -> Result<(), WriteError> {
+        if let Some(error) = self.failed {
+            return Err(error);
         }
+        // The last sample may be long ago.
+        self.write_beats(self.model.scene.duration_s)?;
+        self.writer.finish()
     }
 
     fn stamp_ns(&self, t_s: f64) -> i64 {

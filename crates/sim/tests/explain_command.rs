@@ -38,6 +38,16 @@ fn the_only_freedom_is_not_held() {
     assert!(said.contains("held instead"), "{said}");
 }
 
+/// However seldom a scene is logged, its motion is seen.
+#[test]
+fn a_motion_between_the_samples_of_the_log_is_seen() {
+    let seldom = ["--set", "duration_s=2.0", "--set", "log_rate_hz=0.01"];
+    let said = explain(&[&["music"], &seldom[..]].concat());
+    assert!(said.contains("held instead"), "{said}");
+    let held = said.lines().last().unwrap();
+    assert!(!held.contains("height"), "{said}");
+}
+
 /// A start that moves along what a trial holds is held with it.
 #[test]
 fn a_start_that_moves_can_be_held() {

@@ -408,6 +408,22 @@ fn logged_forces_and_moments_move_the_body() {
     }
 }
 
+/// Beats are written until the run ends, however long ago the last sample was.
+#[test]
+fn every_beat_is_written() {
+    let numbers = |log_rate_hz: f64| {
+        let made = Made::new(&format!(
+            "duration_s = 9.9\nlog_rate_hz = {log_rate_hz}\n{}[effects.contact]\n[effects.gait]\n\
+             [effects.music]\nbeat_hz = 2.0\nonset_s = 0.0\n",
+            carriers()
+        ));
+        made.signal("/beat.number").values.clone()
+    };
+    let all = numbers(30.0);
+    assert!(all.len() >= 19, "{all:?}");
+    assert_eq!(numbers(0.07), all);
+}
+
 /// Carriers go up and down with their phases, face where the party goes, and keep their places in it.
 #[test]
 fn carriers_face_and_step_as_they_must() {

@@ -109,6 +109,60 @@ fn a_stretch_begins_as_it_was_measured() {
     }
 }
 
+/// A sensor whose clock is behind has the first message; the party walks from the scene's start on all the same.
+#[test]
+fn a_clock_that_is_behind_moves_nobody() {
+    let folder = tempfile::tempdir().unwrap();
+    let sets = [
+        "epoch_s=1000",
+        "carriers.walk_m_per_s=[1.2, 0.1, 0.05]",
+        "effects.imu={ideal=true, rate_hz=50, sensors=[{on=\"rath\", clock_offset_s=-2.0}]}",
+    ];
+    let mut more = vec!["--duration", "8"];
+    sets.iter().for_each(|set| more.extend(["--set", set]));
+    let file = record(folder.path(), "music", &more);
+    for drive in [
+        &["--drive", "phases"][..],
+        &["--drive", "shoulders"],
+        &["--drive", "beat"],
+        &["--drive", "shoulders", "--from", "6"],
+    ] {
+        let (found, _) = replay(&file, drive);
+        assert_eq!(found["starts_as_measured"], true, "{drive:?}");
+        for signal in SIGNALS {
+            assert!(share(&found, signal) < 0.02, "{drive:?} {signal}: {found}");
+        }
+    }
+}
+
+/// A party that turns by more than half a turn: the yaw goes on where its numbers jump.
+#[test]
+fn a_yaw_goes_on_through_half_a_turn() {
+    let folder = tempfile::tempdir().unwrap();
+    let turn = [
+        "--duration",
+        "25",
+        "--set",
+        "effects.path={turn_deg=270.0, turn_start_s=5.0, turn_time_s=12.0}",
+    ];
+    let file = record(folder.path(), "music", &turn);
+    let recording = Recording::open(&file, &ReadOptions::default()).unwrap();
+    let wanted = |p: &str| p == "/rath/state.yaw_rad";
+    let yaw = recording.signals(&wanted).unwrap().0.remove(0).values;
+    let jump = yaw.windows(2).position(|w| w[1] < w[0] - 3.0).unwrap();
+    // A party that turns within 11 s is ahead by 270° (s(t/11) − s(t/12)) at most, s the path's smooth step.
+    let (other, _) = replay(&file, &["--set", "effects.path.turn_time_s=11"]);
+    let misfit = &other["misfit"]["yaw_deg"];
+    let rms = misfit["rms"].as_f64().unwrap();
+    assert!((2.0..20.0).contains(&rms), "{misfit}");
+    assert!(misfit["correlation"].as_f64().unwrap() > 0.98, "{misfit}");
+    // Between the two samples that jump.
+    let from = ((jump as f64 + 0.5) / 30.0).to_string();
+    let (found, _) = replay(&file, &["--drive", "shoulders", "--from", &from]);
+    assert_eq!(found["starts_as_measured"], true);
+    assert!(share(&found, "yaw_deg") < 0.01, "{found}");
+}
+
 /// Poles are bent at rest where the recording began; how they were bent later is in no recording.
 #[test]
 fn bent_poles_start_as_they_were_or_settle() {
@@ -254,8 +308,16 @@ fn what_cannot_be_replayed_ends_in_one_sentence() {
         );
         assert!(!out.exists() && done.stdout.is_empty());
     }
-    let args = ["replay", gap.to_str().unwrap(), "--from", "nan"];
-    assert_eq!(sim(&args).status.code(), Some(2));
+    let gap_path = gap.to_str().unwrap();
+    for more in [
+        ["--from", "nan"],
+        ["--out", "-"],
+        ["--out", "x.toml"],
+        ["--out", gap_path],
+    ] {
+        let done = sim(&[&["replay", gap_path, "--to", "5"], &more[..]].concat());
+        assert_eq!(done.status.code(), Some(2), "{more:?}: {done:?}");
+    }
     // What is beside the gap is good, wrapped phases are phases, and without the body's motion there is nothing to compare.
     phases(&at("wrapped.mcap"), 2, |_, t| {
         (!(7.0..9.0).contains(&t)).then_some((12.0 * t).rem_euclid(std::f64::consts::TAU))
@@ -272,4 +334,30 @@ fn what_cannot_be_replayed_ends_in_one_sentence() {
         let span = turns(&file);
         assert!((span - 599.0 / 30.0 + 9.5).abs() < 0.034, "{span}");
     }
+}
+
+/// What was begun goes when the user interrupts.
+#[cfg(unix)]
+#[test]
+fn an_interrupted_replay_leaves_nothing() {
+    let folder = tempfile::tempdir().unwrap();
+    let file = record(folder.path(), "baseline", &["--duration", "3"]);
+    let files = || std::fs::read_dir(folder.path()).unwrap().count();
+    let before = files();
+    // Far more steps than anybody waits for.
+    let mut child = Command::new(env!("CARGO_BIN_EXE_sim"))
+        .args(["replay", file.to_str().unwrap(), "--out", "out.mcap"])
+        .args(["--set", "solver.method=rk4", "--set", "solver.step_s=1e-9"])
+        .current_dir(folder.path())
+        .spawn()
+        .unwrap();
+    while files() == before {
+        assert_eq!(child.try_wait().unwrap(), None);
+        std::thread::sleep(std::time::Duration::from_millis(5));
+    }
+    let mut interrupt = Command::new("kill");
+    interrupt.args(["-INT", &child.id().to_string()]);
+    assert!(interrupt.status().unwrap().success());
+    assert_eq!(child.wait().unwrap().code(), Some(130));
+    assert_eq!(files(), before);
 }

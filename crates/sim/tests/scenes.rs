@@ -2,7 +2,7 @@
 
 use sim::model::Model;
 use sim::run::{Sample, run};
-use sim::scene::{BUILTIN, SceneError, Template, load, parse, to_toml};
+use sim::scene::{BUILTIN, SceneError, Template, load, parse, setting_value, to_toml};
 
 /// The message about a scene that must not pass.
 fn message(text: &str) -> String {
@@ -157,6 +157,19 @@ fn wrong_types_and_signs_are_pointed_at() {
         &["at most 1e9"],
     );
     expect("name = \"a\"\nepoch_s = 2147483600.0", "2:11", &["2038"]);
+    let late = "name = \"a\"\nepoch_s = 1.7e9\n";
+    for (instrument, place) in [
+        (
+            "[effects.imu]\nsensors = [{ clock_offset_s = 1e9 }]",
+            "4:31",
+        ),
+        (
+            "[effects.music]\n[effects.drum]\nclock_offset_s = 1e9",
+            "5:18",
+        ),
+    ] {
+        expect(&format!("{late}{instrument}"), place, &["2038"]);
+    }
     expect(
         "name = \"a\"\n[carriers]\nhandles_m = [[1.0, 2.0, 3.0]]\n[carriers.along_poles]\ncount = 2",
         "3:13",
@@ -256,6 +269,22 @@ fn wrong_types_and_signs_are_pointed_at() {
         &["carrier_2"],
     );
     expect(
+        "name = \"a\"\n[effects.imu]\nsensors = [{ on = \"carrier_+1\" }]",
+        "3:19",
+        &["carrier_+1"],
+    );
+    expect(
+        "name = \"a\"\n[effects.imu]\naccel_resolution_m_per_s2 = 1e9",
+        "3:29",
+        &["1e9", "accel_range_m_per_s2"],
+    );
+    expect(
+        "name = \"a\"\n[[effects.gait.harmonics]]\norder = 2\namplitude_m = [0.0, 0.0, 0.1]\n\
+         [[effects.gait.harmonics]]\norder = 99\namplitude_m = [0.0, 0.0, 0.1]",
+        "6:9",
+        &["harmonics.1.order", "found 99"],
+    );
+    expect(
         "name = \"a\"\n[effects.music]\npauses = [{ from_s = 3.0, to_s = 2.0 }]",
         "3:34",
         &["from_s"],
@@ -264,6 +293,11 @@ fn wrong_types_and_signs_are_pointed_at() {
         "name = \"a\"\n[effects.coupling]\ngraph = { edges = [[0, 2]] }",
         "3:9",
         &["carrier 2"],
+    );
+    expect(
+        "name = \"a\"\n[effects.coupling]\ngraph = { edges = [[0, 1], [1, 0]] }",
+        "3:9",
+        &["[1, 0] stands there twice"],
     );
     expect(
         "name = \"a\"\n[effects.hold]\n[effects.friction]\nlaw = \"bristle\"",
@@ -403,6 +437,33 @@ fn carriers_stand_along_poles_or_by_hand() {
         .unwrap_err()
         .to_string();
     assert!(said.contains(no_poles), "{said}");
+}
+
+/// A template takes what a setting takes, and refuses what a setting is refused.
+#[test]
+fn a_template_is_changed_as_by_settings() {
+    let template = Template::load("baseline", &[]).unwrap();
+    for setting in [
+        "effects.flexure={frequency_hz=5.0}",
+        "effects.flexure=false",
+        "effects.contact=false",
+        "start.height_m=false",
+        "body.inertia_kg_m2=[1.0, 2.0, 2.5]",
+        "effects.flexure=[5.0, 0.1, 3.0]",
+        "effects.flexur=false",
+        "solver=false",
+    ] {
+        let (key, value) = setting.split_once('=').unwrap();
+        let swept = template.with([(key, setting_value(value))]);
+        match load("baseline", &[setting.to_owned()]) {
+            Ok(scene) => assert_eq!(swept, Ok(scene), "{setting}"),
+            Err(why) => {
+                let (why, said) = (why.to_string(), swept.unwrap_err().to_string());
+                let why = why.rsplit_once(": ").unwrap().1;
+                assert!(said.ends_with(why), "{setting}: {said}, not {why}");
+            }
+        }
+    }
 }
 
 /// Every built-in scene is complete, comes back from its own TOML, and runs its first seconds with nothing unexplained.

@@ -183,13 +183,17 @@ fn an_idle_effect_changes_no_motion() {
             .collect(),
         ..driven
     };
-    let mut cases = vec![full.clone(); 4];
+    let mut cases = vec![full.clone(); 5];
     (entry("measured").switch_off)(&mut cases[0].effects);
     (entry("measured").switch_off)(&mut cases[1].effects);
     (entry("contact").switch_off)(&mut cases[1].effects);
     cases[3].effects.measured = Some(shoulders);
     if let Some(path) = &mut cases[3].effects.path {
         path.turn_deg = 0.0;
+    }
+    // A grip alone: it bends poles, too.
+    for name in ["measured", "contact", "friction"] {
+        (entry(name).switch_off)(&mut cases[4].effects);
     }
     let mut seen = std::collections::BTreeSet::new();
     for case in &mut cases {

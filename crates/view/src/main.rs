@@ -10,7 +10,7 @@ use anyhow::{Context, anyhow, bail};
 use clap::Parser;
 use recording::Finding;
 use recording::read::{ReadError, Recording, STDIN};
-use recording::whole::{Output, may_write, write_whole};
+use recording::whole::{Output, Usage, may_write, write_whole};
 use view::load::{Detail, load, options};
 use view::store::{Encoded, Sink};
 use view::take::Take;
@@ -62,7 +62,10 @@ fn main() -> ExitCode {
         Ok(findings) => report(&name(&arguments.file), &findings),
         Err(error) => {
             recording::note!("view: {error:#}");
-            ExitCode::FAILURE
+            match error.is::<Usage>() {
+                true => ExitCode::from(2),
+                false => ExitCode::FAILURE,
+            }
         }
     }
 }
@@ -83,14 +86,15 @@ fn report(name: &str, findings: &[Finding]) -> ExitCode {
 fn run(arguments: &Arguments) -> anyhow::Result<Vec<Finding>> {
     if let Some(path) = &arguments.save {
         if path.as_os_str() == "-" {
-            bail!("--save -: an .rrd is written to a file; give it a name");
+            let said = "--save -: an .rrd is written to a file; give it a name";
+            return Err(Usage(said.into()).into());
         }
         let output = Output {
             option: "--save",
             path,
             endings: &["rrd"],
         };
-        may_write(&[output], [arguments.file.as_path()]).map_err(anyhow::Error::msg)?;
+        may_write(&[output], [arguments.file.as_path()])?;
         return save(&arguments.file, path);
     }
     if let Some(url) = &arguments.connect {

@@ -11,9 +11,9 @@ use analyze::roles::{RolesFile, matches, meant};
 use anyhow::{Context, bail};
 use recording::Kind;
 use recording::read::{ReadOptions, Recording, STDIN};
-use recording::whole::{self, Output};
+use recording::whole::{self, Output, Usage};
 
-use super::{AnalyzeArgs, Done, Format, Limits, Usage, annotate, complain, print};
+use super::{AnalyzeArgs, Done, Format, Limits, annotate, complain, print};
 
 pub(super) fn run(args: &AnalyzeArgs) -> anyhow::Result<Done> {
     let request = request(args)?;
@@ -33,19 +33,21 @@ pub(super) fn run(args: &AnalyzeArgs) -> anyhow::Result<Done> {
     let outputs: Vec<Output<'_>> = single.into_iter().filter_map(named).collect();
     for Output { option, path, .. } in &outputs {
         if *path == Path::new("-") {
-            return Err(Usage::of(format!(
+            return Err(Usage(format!(
                 "{option}: standard output holds the result; name a file"
-            )));
+            ))
+            .into());
         }
         if args.files.len() > 1 {
-            return Err(Usage::of(format!(
+            return Err(Usage(format!(
                 "{option} takes one recording, but {} were given: run it once for each",
                 args.files.len()
-            )));
+            ))
+            .into());
         }
     }
     let inputs = args.files.iter().chain(&args.roles).map(AsRef::as_ref);
-    whole::may_write(&outputs, inputs).map_err(Usage::of)?;
+    whole::may_write(&outputs, inputs)?;
     let mut analyses = Vec::new();
     let mut failed = false;
     for file in &args.files {

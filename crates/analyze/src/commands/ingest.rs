@@ -8,7 +8,7 @@ use recording::import::{self, ImportError};
 use recording::whole::{Output, may_write};
 use recording::write::{RecordingWriter, WriterOptions};
 
-use super::{Done, Usage};
+use super::Done;
 
 const EXAMPLES: &str = "\
 Examples:
@@ -62,7 +62,7 @@ fn ingest(args: &IngestArgs) -> anyhow::Result<Done> {
     };
     let layout = args.layout.iter().map(Path::new);
     let inputs = args.files.iter().map(AsRef::as_ref).chain(layout);
-    may_write(&[output], inputs).map_err(Usage::of)?;
+    may_write(&[output], inputs)?;
     if args.sound_start.abs() > 1e6 || args.sound_start.is_nan() {
         bail!(
             "--sound-start: found {}, expected seconds up to 1000000",

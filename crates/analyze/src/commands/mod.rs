@@ -12,6 +12,7 @@ use std::process::ExitCode;
 use clap::{Args, Parser, Subcommand, ValueEnum};
 use recording::read::ReadOptions;
 use recording::text::plain;
+use recording::whole::Usage;
 
 const EXAMPLES: &str = "\
 Examples:
@@ -142,17 +143,6 @@ enum Done {
     WithLoss,
     /// Some of the files could not be used; the messages are out.
     Partly,
-}
-
-/// What was asked for cannot be, whatever is in the files.
-#[derive(Debug, thiserror::Error)]
-#[error("{0}")]
-struct Usage(String);
-
-impl Usage {
-    fn of(said: String) -> anyhow::Error {
-        Usage(said).into()
-    }
 }
 
 /// Parses the command line and runs the command; the exit code is the contract's.

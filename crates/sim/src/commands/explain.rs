@@ -39,6 +39,8 @@ const GIVEN_UP_S: f64 = 2.0;
 const TELLING_S: f64 = 1.0;
 /// A freedom whose absence changes less than this is named as one that could be held: rad and m.
 const LITTLE: (f64, f64) = (0.017_453, 0.005);
+/// Motions are compared at least so often, Hz, however seldom the scene is logged.
+const LOOKED_AT_HZ: f64 = 30.0;
 
 struct Effect {
     name: &'static str,
@@ -252,6 +254,7 @@ fn try_freedoms(scene: &Scene, most: u64) -> Vec<Trial> {
     for effect in TABLE.iter().filter(|e| ["imu", "drum"].contains(&e.name)) {
         (effect.switch_off)(&mut scene.effects);
     }
+    scene.log_rate_hz = scene.log_rate_hz.max(LOOKED_AT_HZ);
     let Ok(full) = motion(&scene, most) else {
         return Vec::new();
     };

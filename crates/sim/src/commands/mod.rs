@@ -8,7 +8,7 @@ mod replay;
 mod scenes;
 
 use clap::{Subcommand, ValueEnum};
-use recording::whole::Output;
+use recording::whole::{Output, Usage};
 use serde_json::{Value, json};
 use std::path::Path;
 use std::process::ExitCode;
@@ -59,27 +59,34 @@ fn seconds(text: &str) -> Result<f64, String> {
 }
 
 /// Refuses `-`, which only `sim record` takes for standard output.
-fn is_file(out: &Path) -> anyhow::Result<()> {
+fn is_file(out: &Path) -> Result<(), Usage> {
     match out.as_os_str() == "-" {
-        true => Err(anyhow::anyhow!(
-            "--out -: this is written to a file; give it a name"
+        true => Err(Usage(
+            "--out -: this is written to a file; give it a name".into(),
         )),
         false => Ok(()),
     }
 }
 
 /// That `--out` may be written: it is none of the inputs, nor named as something else.
-fn may_write(out: &Path, ending: &str, inputs: &[&Path]) -> anyhow::Result<()> {
+fn may_write(out: &Path, ending: &str, inputs: &[&Path]) -> Result<(), Usage> {
     let output = Output {
         option: "--out",
         path: out,
         endings: &[ending],
     };
-    recording::whole::may_write(&[output], inputs.iter().copied()).map_err(anyhow::Error::msg)
+    recording::whole::may_write(&[output], inputs.iter().copied())
 }
 
 /// Runs a command; errors go to stderr, one sentence first, then the causes.
 pub fn run(command: Command) -> ExitCode {
+    // Nothing half-written stays behind when the user interrupts; `record` says how far it came, too.
+    if !matches!(command, Command::Record(_)) {
+        let _ = ctrlc::set_handler(|| {
+            recording::whole::remove_unfinished_files();
+            std::process::exit(130);
+        });
+    }
     let outcome = match command {
         Command::Record(args) => record::run(&args),
         Command::Replay(args) => match replay::run(&args) {
@@ -95,7 +102,10 @@ pub fn run(command: Command) -> ExitCode {
         Ok(()) => ExitCode::SUCCESS,
         Err(error) => {
             recording::note!("sim: {error:#}");
-            ExitCode::from(1)
+            match error.is::<Usage>() {
+                true => ExitCode::from(2),
+                false => ExitCode::FAILURE,
+            }
         }
     }
 }

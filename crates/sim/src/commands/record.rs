@@ -3,7 +3,7 @@
 use super::{real, setting};
 use anyhow::{Context, Result, anyhow, bail};
 use indicatif::{ProgressBar, ProgressStyle};
-use recording::whole::remove_unfinished_files;
+use recording::whole::{Usage, remove_unfinished_files};
 use recording::write::{RecordingWriter, WriteError, WriterOptions};
 use sim::model::Model;
 use sim::record::Recorder;
@@ -97,7 +97,8 @@ fn record(args: &Args) -> Result<()> {
             .iter()
             .any(|s| s.split('=').next().is_some_and(|k| k.trim() == *key))
         {
-            bail!("{flag} and --set {key} say the same; leave one out");
+            let said = format!("{flag} and --set {key} say the same; leave one out");
+            return Err(Usage(said).into());
         }
         settings_given.push(format!("{key}={value}"));
     }

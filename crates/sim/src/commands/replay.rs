@@ -4,6 +4,7 @@ use super::{Format, print, seconds, setting};
 use anyhow::{Context, Result, anyhow, bail};
 use recording::read::{ReadOptions, Recording};
 use recording::topics::{BEAT, FORCES, PHASES, STATE};
+use recording::whole::Usage;
 use recording::write::{ChannelId, RawChannel, RecordingWriter, WriteError, WriterOptions};
 use sim::model::Model;
 use sim::record::Recorder;
@@ -96,7 +97,8 @@ pub enum Input {
 /// Replays, records, compares.
 pub fn run(args: &Args) -> Result<Input> {
     if args.file == Path::new("-") {
-        bail!("-: a replay does not read standard input; expected the path of a recording");
+        let said = "-: a replay does not read standard input; expected the path of a recording";
+        return Err(Usage(said.into()).into());
     }
     // What is given is read first, so that a slip in it does not wait for the recording.
     if let Some(scene) = &args.scene {
@@ -208,10 +210,12 @@ pub fn run(args: &Args) -> Result<Input> {
                 both.courses.get(c.signal)?,
                 window_s,
                 mean,
+                c.turn,
             )
         })
         .collect();
     let mut recorder = both.recorder;
+    both.measured.write(i64::MAX, recorder.writer())?;
     recorder
         .writer()
         .metadata("replay", &record(&name, &replay, &found))?;
@@ -248,6 +252,8 @@ struct Compared {
     signal: &'static str,
     field: &'static str,
     factor: f64,
+    /// A whole turn, where it is an angle.
+    turn: Option<f64>,
     modelled: fn(&Sample) -> f64,
 }
 
@@ -259,30 +265,35 @@ const COMPARED: &[Compared] = &[
         signal: "height_m",
         field: "position_m.z",
         factor: 1.0,
+        turn: None,
         modelled: |s| s.pose.position_m[2],
     },
     Compared {
         signal: "roll_deg",
         field: "roll_rad",
         factor: DEG,
+        turn: Some(360.0),
         modelled: |s| s.pose.roll_pitch_yaw_rad()[0] * DEG,
     },
     Compared {
         signal: "pitch_deg",
         field: "pitch_rad",
         factor: DEG,
+        turn: Some(360.0),
         modelled: |s| s.pose.roll_pitch_yaw_rad()[1] * DEG,
     },
     Compared {
         signal: "yaw_deg",
         field: "yaw_rad",
         factor: DEG,
+        turn: Some(360.0),
         modelled: |s| s.pose.roll_pitch_yaw_rad()[2] * DEG,
     },
     Compared {
         signal: "force_n",
         field: "force_n",
         factor: 1.0,
+        turn: None,
         modelled: |s| s.normal_n.iter().sum(),
     },
 ];

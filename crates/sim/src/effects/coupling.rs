@@ -16,6 +16,7 @@ use crate::scene::parts::Carriers;
 use crate::scene::problem::{Checker, Problem, problem};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
+use std::collections::HashSet;
 
 /// `[effects.coupling]`
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
@@ -74,7 +75,8 @@ impl Coupling {
         )?;
         let (key, n) = ("effects.coupling.graph", scene.carriers.count());
         if let Graph::Edges(list) = &self.graph {
-            for (k, [a, b]) in list.iter().enumerate() {
+            let mut seen = HashSet::new();
+            for [a, b] in list {
                 if a == b {
                     return Err(problem(
                         key,
@@ -87,7 +89,7 @@ impl Coupling {
                         format!("found carrier {i}, but there are {n}, numbered from 0"),
                     ));
                 }
-                if list[..k].iter().any(|e| e == &[*a, *b] || e == &[*b, *a]) {
+                if !seen.insert([a.min(b), a.max(b)]) {
                     return Err(problem(
                         key,
                         format!("the pair [{a}, {b}] stands there twice"),

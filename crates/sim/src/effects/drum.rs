@@ -4,7 +4,7 @@
 
 use crate::model::Model;
 use crate::scene::Scene;
-use crate::scene::problem::{Checker, Problem, problem, shown};
+use crate::scene::problem::{Checker, Problem, check_clock, problem, shown};
 use crate::sensors::drum::Track;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -72,17 +72,7 @@ impl Drum {
         Checker::positive(&key("decay_s"), self.decay_s)?;
         Checker::not_negative(&key("level"), self.level)?;
         Checker::not_negative(&key("noise"), self.noise)?;
-        Checker::within(&key("clock_offset_s"), self.clock_offset_s, -1e9..=1e9)?;
-        if scene.epoch_s + self.clock_offset_s < 0.0 {
-            return Err(problem(
-                &key("clock_offset_s"),
-                format!(
-                    "found {}: its stamps would lie before 1970; give the scene an epoch_s",
-                    self.clock_offset_s
-                ),
-            ));
-        }
-        Checker::within(&key("clock_drift_ppm"), self.clock_drift_ppm, -1e5..=1e5)
+        check_clock(scene, &key, self.clock_offset_s, self.clock_drift_ppm)
     }
 
     pub(super) fn build(&self, scene: &Scene, model: &mut Model) {

@@ -65,19 +65,19 @@ impl Gait {
         Checker::per_carrier("effects.gait.amplitude_m", &self.amplitude_m, n)?;
         Checker::per_carrier("effects.gait.sway_m", &self.sway_m, n)?;
         Checker::finite("effects.gait.sway_phase_rad", self.sway_phase_rad)?;
-        for h in &self.harmonics {
-            let key = "effects.gait.harmonics";
-            Checker::all_finite(key, &h.amplitude_m)?;
-            Checker::all_finite(key, &h.phase_rad)?;
+        for (k, h) in self.harmonics.iter().enumerate() {
+            let key = |name: &str| format!("effects.gait.harmonics.{k}.{name}");
+            Checker::all_finite(&key("amplitude_m"), &h.amplitude_m)?;
+            Checker::all_finite(&key("phase_rad"), &h.phase_rad)?;
             if !(1..=HIGHEST_ORDER).contains(&h.order) {
                 return Err(problem(
-                    key,
-                    format!("found order {}, expected 1 to {HIGHEST_ORDER}", h.order),
+                    &key("order"),
+                    format!("found {}, expected 1 to {HIGHEST_ORDER}", h.order),
                 ));
             }
             if let Some(i) = h.carriers.iter().flatten().find(|&&i| i >= n) {
                 return Err(problem(
-                    key,
+                    &key("carriers"),
                     format!("found carrier {i}, but there are {n}, numbered from 0"),
                 ));
             }

@@ -4,7 +4,7 @@
 
 use crate::model::Model;
 use crate::scene::Scene;
-use crate::scene::problem::{Checker, MOST_SAMPLES, Problem, larger, problem, shown};
+use crate::scene::problem::{Checker, MOST_SAMPLES, Problem, check_clock, larger, problem, shown};
 use crate::sensors::imu::{Draws, Seat, Triad};
 use nalgebra::UnitQuaternion;
 use schemars::JsonSchema;
@@ -139,7 +139,6 @@ impl Imu {
                 self.gyro_bias_walk_rad_per_s2_per_sqrt_hz,
             ),
             ("gyro_bias_sd_rad_per_s", self.gyro_bias_sd_rad_per_s),
-            ("gyro_resolution_rad_per_s", self.gyro_resolution_rad_per_s),
             (
                 "accel_noise_m_per_s2_per_sqrt_hz",
                 self.accel_noise_m_per_s2_per_sqrt_hz,
@@ -149,14 +148,34 @@ impl Imu {
                 self.accel_bias_walk_m_per_s3_per_sqrt_hz,
             ),
             ("accel_bias_sd_m_per_s2", self.accel_bias_sd_m_per_s2),
-            ("accel_resolution_m_per_s2", self.accel_resolution_m_per_s2),
             ("scale_error_sd", self.scale_error_sd),
             ("misalignment_sd_deg", self.misalignment_sd_deg),
         ] {
             Checker::not_negative(&key(name), x)?;
         }
-        Checker::positive(&key("gyro_range_rad_per_s"), self.gyro_range_rad_per_s)?;
-        Checker::positive(&key("accel_range_m_per_s2"), self.accel_range_m_per_s2)?;
+        for (range, most, resolution, x) in [
+            (
+                "gyro_range_rad_per_s",
+                self.gyro_range_rad_per_s,
+                "gyro_resolution_rad_per_s",
+                self.gyro_resolution_rad_per_s,
+            ),
+            (
+                "accel_range_m_per_s2",
+                self.accel_range_m_per_s2,
+                "accel_resolution_m_per_s2",
+                self.accel_resolution_m_per_s2,
+            ),
+        ] {
+            Checker::positive(&key(range), most)?;
+            Checker::not_negative(&key(resolution), x)?;
+            if x > most {
+                return Err(problem(
+                    &key(resolution),
+                    format!("found {}, more than {range}, {}", shown(x), shown(most)),
+                ));
+            }
+        }
         if self.sensors.is_empty() {
             return Err(problem(
                 &key("sensors"),
@@ -172,17 +191,7 @@ impl Imu {
                 &key("mounting_roll_pitch_yaw_deg"),
                 &sensor.mounting_roll_pitch_yaw_deg,
             )?;
-            Checker::within(&key("clock_offset_s"), sensor.clock_offset_s, -1e9..=1e9)?;
-            if scene.epoch_s + sensor.clock_offset_s < 0.0 {
-                return Err(problem(
-                    &key("clock_offset_s"),
-                    format!(
-                        "found {}: its stamps would lie before 1970; give the scene an epoch_s",
-                        sensor.clock_offset_s
-                    ),
-                ));
-            }
-            Checker::within(&key("clock_drift_ppm"), sensor.clock_drift_ppm, -1e5..=1e5)?;
+            check_clock(scene, &key, sensor.clock_offset_s, sensor.clock_drift_ppm)?;
             if let Some(name) = &sensor.name {
                 let fits = |c: char| c.is_ascii_alphanumeric() || c == '_';
                 if name.is_empty() || !name.chars().all(fits) {
@@ -283,7 +292,9 @@ fn seat(sensor: &Sensor, carriers: usize) -> Result<Seat, String> {
     let number: Option<usize> = sensor
         .on
         .strip_prefix("carrier_")
-        .and_then(|n| n.parse().ok());
+        .and_then(|n| n.parse().ok())
+        // `+1` and `01` are numbers, too.
+        .filter(|i| sensor.on == format!("carrier_{i}"));
     match number {
         Some(i) if (1..=carriers).contains(&i) => {
             if sensor.place_m == [0.0; 3] {

@@ -168,7 +168,12 @@ pub const TABLE: &[Entry] = &[
     ),
     // After everything that has a say in phase rates.
     entry!(measured, "carriers move as somebody measured"),
-    entry!(flexure, "poles bend: their first mode", without_contact),
+    entry!(
+        flexure,
+        "poles bend: their first mode",
+        // A grip bends them too, as long as nothing limits it by the load.
+        |e: &Effects| without_contact(e).filter(|_| e.hold.is_none() || e.friction.is_some())
+    ),
     entry!(imu, "virtual inertial sensors on body and carriers"),
     entry!(drum, "the sound of the drum, as a microphone hears it"),
 ];

@@ -1,7 +1,7 @@
 //! What a recording says about carriers, beat and body, and the scene that is driven by it.
 
 use super::beat::follow;
-use super::misfit::Course;
+use super::misfit::{Course, unwrapped};
 use crate::effects::measured::Measured;
 use crate::model::Model;
 use crate::scene::{Scene, check};
@@ -11,14 +11,14 @@ use recording::read::{ReadError, Recording};
 use recording::signal::field_of;
 use recording::topics::{BEAT, FORCES, PHASES, STATE, TF};
 use std::collections::BTreeMap;
-use std::f64::consts::{PI, TAU};
+use std::f64::consts::TAU;
 
 /// What `analyze --annotate` adds where only sensors saw it.
 const FOUND_STATE: &str = "/findings/state";
 const FOUND_PHASES: &str = "/findings/phases";
 /// A pause between two samples longer than this, and than three usual ones, is a gap, s: half a step.
 const GAP_S: f64 = 0.25;
-/// A replay from here on, s, begins where the recording does: stamps are whole nanoseconds.
+/// A replay from here on, s of the recorded scene's time, begins where that did: stamps are whole nanoseconds.
 const AT_ONCE_S: f64 = 1e-9;
 /// Less is no replay, s.
 const SHORTEST_S: f64 = 1.0;
@@ -59,6 +59,8 @@ struct Columns {
 #[derive(Debug, Default)]
 pub struct Take {
     start_ns: i64,
+    /// When the time of the scene that was recorded is 0: a sensor whose clock is behind may have the first message.
+    zero_s: f64,
     phases: Option<Columns>,
     shoulders: Option<Columns>,
     beats_s: Vec<f64>,
@@ -103,6 +105,8 @@ const STATE_FIELDS: [&str; 12] = [
     "angular_velocity_rad_per_s.z",
 ];
 
+const ANGLES: [&str; 3] = ["roll_rad", "pitch_rad", "yaw_rad"];
+
 impl Take {
     /// Finds phases, shoulders, beats and the body's motion; what is not there stays empty.
     ///
@@ -141,7 +145,11 @@ impl Take {
         if let Some(topic) = state_topic {
             for field in STATE_FIELDS {
                 if let Some(s) = get(topic, field) {
-                    motion.insert(field, course(s));
+                    let mut c = course(s);
+                    if ANGLES.contains(&field) {
+                        c.x = unwrapped(&c.x, TAU);
+                    }
+                    motion.insert(field, c);
                 }
             }
         }
@@ -166,8 +174,14 @@ impl Take {
         };
         let shoulders = list(TF, &axis, 0).filter(|c| c.x.len().is_multiple_of(3));
         let first_of = |s: &Signal| s.times_s(info.start_ns).first().copied();
+        let zero_of = |s: &Signal| Some(first_of(s)? - s.values.first()?);
+        let zero_s = state_topic
+            .and_then(|t| get(t, "time_s"))
+            .and_then(zero_of)
+            .or_else(|| shoulders.as_ref()?.t_s.first().copied());
         Ok(Self {
             start_ns: info.start_ns,
+            zero_s: zero_s.filter(|t| t.is_finite()).unwrap_or(0.0),
             phases,
             shoulders,
             beats_s: get(BEAT, "number")
@@ -197,7 +211,7 @@ impl Take {
         self.state_topic == Some(STATE)
     }
 
-    /// A measured column of the body, with time counted from `from_s`: a field of `rath.State`, or `force_n`.
+    /// A measured column of the body, with time counted from `from_s`: a field of `rath.State`, angles without jumps of a turn, or `force_n`.
     pub fn course(&self, field: &str, from_s: f64) -> Option<Course> {
         let c = self.motion.get(field)?;
         Some(Course {
@@ -257,7 +271,8 @@ impl Take {
                 }
                 (c.t_s[0], c.t_s[c.t_s.len() - 1])
             }
-            None => (0.0, self.duration_s),
+            // Before the scene began there was no body.
+            None => (self.zero_s.max(0.0), self.duration_s),
         };
         let from_s = options.from_s.unwrap_or(first);
         let to_s = options.to_s.unwrap_or(last);
@@ -286,7 +301,7 @@ impl Take {
                 ..Measured::default()
             };
             if options.drive == Drive::Phases {
-                measured.phase_rad = c.x.iter().map(|x| unwrapped(x)).collect();
+                measured.phase_rad = c.x.iter().map(|x| counted(x)).collect();
             } else {
                 (e.gait, e.lift) = (None, None);
                 if let Some(path) = &mut e.path {
@@ -294,8 +309,9 @@ impl Take {
                 }
                 let walk = scene.carriers.walk_m_per_s;
                 let place = |x: &[Vec<f64>], k: usize| {
-                    // What the walk will add again, counted from the recording's start as the recording did.
-                    [0, 1, 2].map(|a| x[a][k] - walk[a] * (measured.t_s[k] + from_s))
+                    // What the walk will add again, counted as the recording did.
+                    let t_s = from_s - self.zero_s + measured.t_s[k];
+                    [0, 1, 2].map(|a| x[a][k] - walk[a] * t_s)
                 };
                 measured.shoulder_m =
                     c.x.chunks_exact(3)
@@ -360,7 +376,7 @@ impl Take {
         check(&scene).map_err(|p| format!("{}: {}", p.key, p.message))?;
         // What poles, bristles and nerves were doing is in no recording; the scene that made it began it as it begins now.
         let all_known = match options.made_by {
-            Some(made) if from_s <= AT_ONCE_S => {
+            Some(made) if (from_s - self.zero_s).abs() <= AT_ONCE_S => {
                 scene.effects.flexure.is_none() || rest_alike(made, given)
             }
             _ => options.drive != Drive::Beat && Model::new(&scene).layout().extra == 0,
@@ -390,25 +406,26 @@ impl Take {
         };
         let three = |fields: [&str; 3]| Some(fields.map(|f| at(f).map(|[x, _]| x))).and_then(all);
         let walk = scene.carriers.walk_m_per_s;
+        let walked_s = from_s - self.zero_s;
         let turned = (scene.effects.path.as_ref())
-            .is_some_and(|p| p.turn_deg != 0.0 && from_s > p.turn_start_s);
+            .is_some_and(|p| p.turn_deg != 0.0 && walked_s > p.turn_start_s);
         let one_frame = options.drive == Drive::Shoulders
             || !turned
                 && self.state_topic == Some(STATE)
                 && (options.made_by).is_some_and(|made| made.carriers.walk_m_per_s == walk);
         // Bent poles are so only where the body is left at rest.
         let rests = scene.effects.flexure.is_some()
-            && from_s <= AT_ONCE_S
+            && walked_s.abs() <= AT_ONCE_S
             && (options.made_by).is_some_and(|made| rest_alike(made, given));
         let start = &mut scene.start;
         let mut is_placed = false;
         if let (true, Some([x, _]), Some([y, _])) =
             (one_frame, at("position_m.x"), at("position_m.y"))
         {
-            start.position_m = [x - walk[0] * from_s, y - walk[1] * from_s];
+            start.position_m = [x - walk[0] * walked_s, y - walk[1] * walked_s];
             is_placed = true;
         }
-        let angles = [at("roll_rad"), at("pitch_rad"), at("yaw_rad")];
+        let angles = ANGLES.map(at);
         if angles[0].is_none() && angles[1].is_none() {
             return false;
         }
@@ -429,7 +446,7 @@ impl Take {
         match (velocity, height) {
             (Some(v), Some([z, _])) => {
                 if !rests {
-                    start.height_m = Some(z - walk[2] * from_s);
+                    start.height_m = Some(z - walk[2] * walked_s);
                 }
                 start.velocity_m_per_s = [0, 1, 2].map(|a| v[a] - walk[a]);
                 is_placed && spin.is_some()
@@ -520,23 +537,13 @@ fn spin_of([[roll, p], [pitch, q], [_, r]]: [[f64; 2]; 3]) -> [f64; 3] {
 
 /// Phases without the jumps of 2π of those that stay within a turn; others count their turns already, and may go more than half of one from sample
 /// to sample.
-fn unwrapped(x: &[f64]) -> Vec<f64> {
+fn counted(x: &[f64]) -> Vec<f64> {
     let least = x.iter().copied().fold(f64::INFINITY, f64::min);
     let most = x.iter().copied().fold(f64::NEG_INFINITY, f64::max);
     if most - least > TAU * (1.0 + 1e-6) {
         return x.to_vec();
     }
-    let mut turns = 0.0;
-    let mut last = x.first().copied().unwrap_or(0.0);
-    x.iter()
-        .map(|&x| {
-            if (x - last).abs() > PI {
-                turns -= ((x - last) / TAU).round();
-            }
-            last = x;
-            x + TAU * turns
-        })
-        .collect()
+    unwrapped(x, TAU)
 }
 
 #[cfg(test)]
@@ -546,11 +553,11 @@ mod tests {
     #[test]
     fn phases_that_count_their_turns_are_left_alone() {
         // 2.15 Hz seen twice a second: more than a turn a sample.
-        let counted: Vec<f64> = (0..20).map(|k| TAU * 1.075 * f64::from(k)).collect();
-        assert_eq!(unwrapped(&counted), counted);
+        let many: Vec<f64> = (0..20).map(|k| TAU * 1.075 * f64::from(k)).collect();
+        assert_eq!(counted(&many), many);
         let fine: Vec<f64> = (0..200).map(|k| 0.45 * f64::from(k) - 1.0).collect();
         let within: Vec<f64> = fine.iter().map(|x| x.sin().atan2(x.cos())).collect();
-        for (a, b) in unwrapped(&within).iter().zip(&fine) {
+        for (a, b) in counted(&within).iter().zip(&fine) {
             assert!((a - b).abs() < 1e-12, "{a} {b}");
         }
     }

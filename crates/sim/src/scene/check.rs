@@ -1,13 +1,13 @@
 //! What a scene must satisfy beyond its types.
 
 use super::Scene;
-use super::problem::{Checker, MOST_SAMPLES, Problem, larger, problem, shown};
+use super::problem::{
+    Checker, LAST_STAMP_S, MOST_SAMPLES, PAST_LAST_STAMP, Problem, larger, problem, shown,
+};
 use crate::body::Body;
 
 /// Most steps that a run of fixed steps may take: an hour or so of computing.
 const MOST_STEPS: f64 = 1e10;
-/// Stamps count seconds since 1970 in 32 bits with a sign.
-const LAST_STAMP_S: f64 = 2_147_483_647.0;
 /// A velocity that is given to three digits fits the freedoms if it differs by no more than this part.
 const ROUNDED: f64 = 1e-3;
 
@@ -48,10 +48,7 @@ pub fn check(scene: &Scene) -> Result<(), Problem> {
         } else {
             "epoch_s"
         };
-        return Err(problem(
-            key,
-            "the stamps would pass the 19th of January 2038, the last day that seconds in 32 bits can name",
-        ));
+        return Err(problem(key, PAST_LAST_STAMP));
     }
     if scene.seed >> 56 != 0 {
         return Err(problem(

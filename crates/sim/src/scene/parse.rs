@@ -2,6 +2,7 @@
 
 use super::nearest::nearest;
 use super::{BUILTIN, Scene, builtin, check};
+use crate::effects::TABLE;
 use recording::text::read_text;
 use std::path::Path;
 
@@ -70,7 +71,7 @@ pub fn parse(origin: &str, text: &str, settings: &[String]) -> Result<Scene, Sce
     let scene: Scene = from_toml(origin, text)?;
     let table: toml::Table = from_toml(origin, text)?;
     if let Some(key) = list_for_table(&table, &scene) {
-        let message = format!("{key}: found a list, expected a table");
+        let message = format!("{key}: {LIST_FOR_TABLE}");
         return Err(located(origin, text, find(text, &key), &message));
     }
     let checked = |scene: &mut Scene| scene.expand().and_then(|()| check(scene));
@@ -121,6 +122,17 @@ fn overruled<'a>(table: &toml::Table, mut keys: impl Iterator<Item = &'a str>) -
     keys.any(|key| key.starts_with(HANDLES)).then(|| {
         format!("{HANDLES}: carriers.along_poles places the carriers; take it away first with carriers.along_poles=false")
     })
+}
+
+const LIST_FOR_TABLE: &str = "found a list, expected a table";
+
+/// Whether there is a list in it.
+fn holds_list(value: &toml::Value) -> bool {
+    match value {
+        toml::Value::Array(_) => true,
+        toml::Value::Table(inner) => inner.values().any(holds_list),
+        _ => false,
+    }
 }
 
 /// The key of a list that serde took for a table's values in their order, which nobody means.
@@ -227,18 +239,23 @@ impl Template {
             message,
         };
         let mut table = self.table.clone();
-        let mut keys: Vec<&str> = Vec::new();
+        let (mut keys, mut lists): (Vec<&str>, bool) = (Vec::new(), false);
         for (key, value) in values {
-            let path: Vec<&str> = key.split('.').collect();
-            set_key(&mut table, &path, value).map_err(|m| fail(format!("{key}: {m}")))?;
+            lists |= holds_list(&value);
+            set_key(&mut table, key, value).map_err(|m| fail(format!("{key}: {m}")))?;
             keys.push(key);
         }
         if let Some(message) = overruled(&table, keys.iter().copied()) {
             return Err(fail(message));
         }
+        // A list where a table is meant is sought where it can be only: a study asks for many scenes.
+        let given = lists.then(|| table.clone());
         let mut scene: Scene = table.try_into().map_err(|e: toml::de::Error| {
             fail(format!("{}: {}", keys.join(", "), readable(e.message())))
         })?;
+        if let Some(key) = given.and_then(|given| list_for_table(&given, &scene)) {
+            return Err(fail(format!("{key}: {LIST_FOR_TABLE}")));
+        }
         scene
             .expand()
             .and_then(|()| check(&scene))
@@ -272,21 +289,13 @@ fn apply(scene: Scene, settings: &[String]) -> Result<Scene, SceneError> {
             )));
         };
         let (key, value) = (key.trim(), value.trim());
-        let path: Vec<&str> = key.split('.').collect();
-        let parsed = setting_value(value);
-        let takes_away = parsed == toml::Value::Boolean(false) && may_be_absent(&path);
-        let before = table.clone();
-        set_key(&mut table, &path, parsed).map_err(|m| fail(format!("{key}: {m}")))?;
+        set_key(&mut table, key, setting_value(value)).map_err(|m| fail(format!("{key}: {m}")))?;
         // One setting at a time, so that the message names the setting at fault.
         match toml::Table::try_into::<Scene>(table.clone()) {
             Ok(scene) => {
                 if let Some(key) = list_for_table(&table, &scene) {
-                    return Err(fail(format!("{key}: found a list, expected a table")));
+                    return Err(fail(format!("{key}: {LIST_FOR_TABLE}")));
                 }
-            }
-            // A known key that is no switch: what it names is not there already.
-            Err(e) if takes_away && e.message().starts_with("invalid type: boolean") => {
-                table = before;
             }
             Err(e) => {
                 let setting = setting.replace('\n', " ");
@@ -305,19 +314,23 @@ fn apply(scene: Scene, settings: &[String]) -> Result<Scene, SceneError> {
 
 /// Whether `KEY=false` takes a key away: what has no default but to be absent.
 fn may_be_absent(path: &[&str]) -> bool {
-    matches!(
-        path,
-        ["effects", _]
-            | ["start", "height_m"]
-            | ["carriers", "along_poles"]
-            | ["effects", "gait", "harmonics", _, "carriers"]
-            | ["effects", "imu", "sensors", _, "name"]
-    )
+    match path {
+        ["effects", name] => TABLE.iter().any(|effect| effect.name == *name),
+        _ => matches!(
+            path,
+            ["start", "height_m"]
+                | ["carriers", "along_poles"]
+                | ["effects", "gait", "harmonics", _, "carriers"]
+                | ["effects", "imu", "sensors", _, "name"]
+        ),
+    }
 }
 
-fn set_key(table: &mut toml::Table, path: &[&str], value: toml::Value) -> Result<(), String> {
-    let takes_away = value == toml::Value::Boolean(false) && may_be_absent(path);
-    put(table, path, value, takes_away)
+/// Puts a value at a dotted key, or takes away what is there, if anything is.
+fn set_key(table: &mut toml::Table, key: &str, value: toml::Value) -> Result<(), String> {
+    let path: Vec<&str> = key.split('.').collect();
+    let takes_away = value == toml::Value::Boolean(false) && may_be_absent(&path);
+    put(table, &path, value, takes_away)
 }
 
 fn put(
@@ -331,7 +344,8 @@ fn put(
         return Err("an empty name in the key".into());
     }
     if rest.is_empty() {
-        if takes_away && table.remove(first).is_some() {
+        if takes_away {
+            table.remove(first);
             return Ok(());
         }
         // Whole numbers stand for reals where a real was.

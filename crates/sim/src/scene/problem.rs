@@ -1,5 +1,6 @@
 //! What can be wrong with a scene: how it is found and said.
 
+use super::Scene;
 use super::per_carrier::PerCarrier;
 use std::ops::RangeInclusive;
 
@@ -114,3 +115,36 @@ pub(crate) fn larger(duration_s: f64, key: &str, times: f64) -> &str {
 
 /// Most samples that a run may log, and cells that its noise may have; beyond it a slip of the keyboard is likelier than a wish.
 pub(crate) const MOST_SAMPLES: f64 = 1e9;
+
+/// Stamps count seconds since 1970 in 32 bits with a sign.
+pub(crate) const LAST_STAMP_S: f64 = 2_147_483_647.0;
+pub(crate) const PAST_LAST_STAMP: &str =
+    "the stamps would pass the 19th of January 2038, the last day that seconds in 32 bits can name";
+
+/// Checks an instrument's own clock; `key` names its parameters.
+pub(crate) fn check_clock(
+    scene: &Scene,
+    key: &impl Fn(&str) -> String,
+    offset_s: f64,
+    drift_ppm: f64,
+) -> Result<(), Problem> {
+    let (offset, drift) = (key("clock_offset_s"), key("clock_drift_ppm"));
+    Checker::within(&offset, offset_s, -1e9..=1e9)?;
+    Checker::within(&drift, drift_ppm, -1e5..=1e5)?;
+    let first_s = scene.epoch_s + offset_s;
+    if first_s < 0.0 {
+        return Err(problem(
+            &offset,
+            format!(
+                "found {offset_s}: its stamps would lie before 1970; give the scene an epoch_s"
+            ),
+        ));
+    }
+    if first_s + scene.duration_s * (1.0 + drift_ppm * 1e-6) > LAST_STAMP_S {
+        return Err(problem(
+            &offset,
+            format!("found {offset_s}: {PAST_LAST_STAMP}"),
+        ));
+    }
+    Ok(())
+}
