@@ -725,6 +725,135 @@ fn limits_do_not_depend_on_threads() {
     );
 }
 
+/// 17 items in each of 64 in each of 64: more places than a decoder may remember come out of a few bytes, packed. The first of them are read.
+#[test]
+fn sequences_of_sequences_are_bounded() {
+    let said = |messages: usize| {
+        format!(
+            "sequences, maps and objects have more than 65536 fields together in {messages} messages; what has further ones is left out"
+        )
+    };
+    let check = |channel: &RawChannel<'_>, one: Vec<u8>, many: Vec<u8>, columns: usize| {
+        let messages = [one, many.clone(), many];
+        let told = vec![format!("long_sequence {}: {}", channel.topic, said(2))];
+        assert_eq!(same_for_all_threads(channel, &messages), (columns, told));
+    };
+
+    // The message, 64 and 64 · 64 arrays take places, too: 56 · (1 + 64 + 64 · 17) + (1 + 53 · (1 + 17) + 1 + 11) of 65535.
+    let grid = |a: usize, b: usize, c: usize| {
+        let line = |of: String, count| format!("[{}]", vec![of; count].join(","));
+        line(line(line("1".into(), c), b), a).into_bytes()
+    };
+    let numbers = 56 * 64 * 17 + 53 * 17;
+    check(&JSON, grid(1, 1, 1), grid(64, 64, 17), numbers + 11);
+
+    // As many, but for the message.
+    fn items(counts: &[u32], align: usize, body: &mut Vec<u8>) {
+        let Some((count, rest)) = counts.split_first() else {
+            return body.push(1);
+        };
+        body.resize(body.len().next_multiple_of(align), 0);
+        body.extend(count.to_le_bytes());
+        (0..*count).for_each(|_| items(rest, align, body));
+    }
+    for (encoding, separator, header, align) in
+        [("cdr", "msg/", &[0, 1, 0, 0][..], 4), ("ros1", "", &[], 1)]
+    {
+        let bar = "=".repeat(80);
+        let schema = format!(
+            "B[] b\n{bar}\nMSG: a/B\nC[] c\n{bar}\nMSG: a/C\nD[] d\n{bar}\nMSG: a/D\nuint8 x\n"
+        );
+        let channel = RawChannel {
+            topic: "/m",
+            message_encoding: encoding,
+            schema_name: &format!("a/{separator}A"),
+            schema_encoding: if encoding == "cdr" {
+                "ros2msg"
+            } else {
+                "ros1msg"
+            },
+            schema_data: schema.as_bytes(),
+            metadata: &BTreeMap::new(),
+        };
+        let message = |counts: &[u32]| {
+            let mut body = Vec::new();
+            items(counts, align, &mut body);
+            [header, &body].concat()
+        };
+        let many = message(&[64, 64, 17]);
+        check(&channel, message(&[1, 1, 1]), many, numbers + 12);
+    }
+
+    // Of a message that may contain itself, each takes two places, and the outermost none.
+    let (name, set) = set_of(
+        "proto3",
+        DescriptorProto {
+            name: Some("T".into()),
+            field: vec![
+                field("t", 1, Type::Message, Some(".a.T")),
+                field("v", 2, Type::Double, None),
+            ],
+            ..DescriptorProto::default()
+        },
+    );
+    let protobuf = RawChannel {
+        topic: "/t",
+        message_encoding: "protobuf",
+        schema_name: &name,
+        schema_encoding: "protobuf",
+        schema_data: &set,
+        metadata: &BTreeMap::new(),
+    };
+    fn nested(counts: &[usize]) -> Vec<u8> {
+        let Some((count, rest)) = counts.split_first() else {
+            return Vec::new();
+        };
+        let mut item = vec![10];
+        prost::encode_length_delimiter(nested(rest).len(), &mut item).expect("has room");
+        item.extend(nested(rest));
+        item.repeat(*count)
+    }
+    let many = nested(&[64, 64, 17]);
+    check(&protobuf, nested(&[1, 1, 1]), many, 1 + 65536 / 2);
+}
+
+/// What stands in an item of a sequence that is left out is left out with it, and named with it where it is broken.
+#[test]
+fn nothing_is_taken_of_items_that_are_left_out() {
+    let found = recording(&WriterOptions::default(), |writer| {
+        let schema = format!(
+            "A[] a\nuint8 x\n{0}\nMSG: p/A\nB b\n{0}\nMSG: p/B\nuint8[] c\nuint8[] d\n",
+            "=".repeat(80)
+        );
+        let channel = RawChannel {
+            topic: "/a",
+            message_encoding: "ros1",
+            schema_name: "p/M",
+            schema_encoding: "ros1msg",
+            schema_data: schema.as_bytes(),
+            metadata: &BTreeMap::new(),
+        };
+        let channel = writer.raw_channel(&channel).expect("opens");
+        let item = [[1, 0, 0, 0, 7].as_slice(), &[70, 0, 0, 0], &[7; 70]].concat();
+        let message = [&[65, 0, 0, 0][..], &item.repeat(65), &[9]].concat();
+        for (t_ns, length) in [(0, message.len()), (1, message.len() - 2)] {
+            writer
+                .message(channel, t_ns, &message[..length])
+                .expect("writes");
+        }
+    });
+    let (signals, _) = found.signals(&|_| true).expect("reads");
+    let told: Vec<_> = signals.iter().map(|s| (&*s.path, &*s.values)).collect();
+    assert_eq!(told, [("/a.x", &[9.0][..])]);
+    assert_eq!(
+        lines(&found),
+        [
+            "undecodable /a: 1 message could not be decoded; the first, at 0.000 s: ROS 1 message of 5138 bytes ends while reading \"a.b.d\"",
+            "long_sequence /a: a has more than 64 items (the limit) in 1 message; it is not among the signals there",
+        ]
+    );
+}
+
 /// The name of a message and a set of one file that defines it.
 fn set_of(syntax: &str, message: DescriptorProto) -> (String, Vec<u8>) {
     let name = format!("a.{}", message.name());

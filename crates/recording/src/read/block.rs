@@ -8,7 +8,7 @@ use super::{
     container::{Block, Definitions, Fields, chunk_header, op},
     decode::{Decoder, Place, SchemaRef},
     decoders::{self, NoDecoder},
-    rows::{Rows, Selection},
+    rows::{MAX_PLACES, Rows, Selection},
 };
 use crate::finding::Kind;
 use crate::text::counted;
@@ -140,6 +140,34 @@ enum State {
     Closed(Kind, String),
 }
 
+impl State {
+    fn open(recording: &Recording, index: usize, rows: &mut Rows) -> Self {
+        let info = &recording.info.channels[index];
+        let schema = SchemaRef {
+            name: &info.schema,
+            encoding: &info.schema_encoding,
+            data: &info.schema_data,
+        };
+        let opened = decoders::open(&info.encoding, &schema, rows);
+        // Those of the schema are not of messages.
+        rows.places = 0;
+        match opened {
+            Ok(decoder) => State::Ready(decoder),
+            Err(NoDecoder::Unknown) => State::Closed(
+                Kind::NoDecoder,
+                format!(
+                    "encoding {:?} with schema encoding {:?} has no decoder",
+                    info.encoding, info.schema_encoding
+                ),
+            ),
+            Err(NoDecoder::BadSchema(problem)) => State::Closed(
+                Kind::BadSchema,
+                format!("the schema {:?} cannot be used: {problem}", info.schema),
+            ),
+        }
+    }
+}
+
 struct ChannelState<'a> {
     index: usize,
     rows: Rows<'a>,
@@ -169,6 +197,8 @@ pub(super) struct Worker<'a> {
     unknown: BTreeMap<u16, (u64, u64)>,
     /// Message records too short for their header.
     short: u64,
+    /// Places that the decoders of all channels remember.
+    places: usize,
     spare: Spare,
 }
 
@@ -184,6 +214,7 @@ impl<'a> Worker<'a> {
             touched: Vec::new(),
             unknown: BTreeMap::new(),
             short: 0,
+            places: 0,
             spare: Spare::default(),
         }
     }
@@ -302,7 +333,13 @@ impl<'a> Worker<'a> {
         }
         for &index in &self.touched {
             if let Some(channel) = &mut self.channels[index] {
+                self.places -= channel.rows.places;
                 channel.decode(block, self.recording, self.select);
+                // Many channels may not remember together what each of them may.
+                if self.places + channel.rows.places > MAX_PLACES {
+                    channel.forget(self.recording);
+                }
+                self.places += channel.rows.places;
             }
         }
         let mut bad = |count, text, lost| {
@@ -395,25 +432,7 @@ impl<'a> ChannelState<'a> {
     fn new(recording: &Recording, index: usize, select: Selection<'a>) -> Self {
         let info = &recording.info.channels[index];
         let mut rows = Rows::new(&info.topic, select, recording.most_items(&info.schema));
-        let schema = SchemaRef {
-            name: &info.schema,
-            encoding: &info.schema_encoding,
-            data: &info.schema_data,
-        };
-        let state = match decoders::open(&info.encoding, &schema, &mut rows) {
-            Ok(decoder) => State::Ready(decoder),
-            Err(NoDecoder::Unknown) => State::Closed(
-                Kind::NoDecoder,
-                format!(
-                    "encoding {:?} with schema encoding {:?} has no decoder",
-                    info.encoding, info.schema_encoding
-                ),
-            ),
-            Err(NoDecoder::BadSchema(problem)) => State::Closed(
-                Kind::BadSchema,
-                format!("the schema {:?} cannot be used: {problem}", info.schema),
-            ),
-        };
+        let state = State::open(recording, index, &mut rows);
         ChannelState {
             index,
             rows,
@@ -426,6 +445,11 @@ impl<'a> ChannelState<'a> {
             out_of_range: 0,
             seen: 0,
         }
+    }
+
+    /// Begins the decoder anew, which then remembers nothing of its messages.
+    fn forget(&mut self, recording: &Recording) {
+        self.state = State::open(recording, self.index, &mut self.rows);
     }
 
     /// Whether the current block has given this channel anything yet.
@@ -647,4 +671,47 @@ pub(super) fn scan(data: &[u8], blocks: &[Block], options: &ReadOptions) -> (Def
         chunk::records(data, block, options, &mut unpacker, &mut look);
     }
     (definitions, tally)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::write::{RawChannel, RecordingWriter, WriterOptions};
+
+    /// Each of the channels remembers less than is allowed, all of them together would not; what they give is whole.
+    #[test]
+    fn channels_together_remember_no_more_than_one_may() {
+        let path = tempfile::NamedTempFile::new().expect("makes a file");
+        let options = WriterOptions::default();
+        let mut writer = RecordingWriter::create(path.path(), &options).expect("begins");
+        let line = format!("[{}]", vec!["1"; 64].join(","));
+        let message = format!("[{}]", vec![line; 64].join(","));
+        for topic in 0..20 {
+            let channel = RawChannel {
+                topic: &format!("/{topic}"),
+                message_encoding: "json",
+                schema_name: "",
+                schema_encoding: "",
+                schema_data: b"",
+                metadata: &BTreeMap::new(),
+            };
+            let id = writer.raw_channel(&channel).expect("opens");
+            for t_ns in 0..2 {
+                (writer.message(id, t_ns, message.as_bytes())).expect("writes");
+            }
+        }
+        writer.finish().expect("finishes");
+        let recording = Recording::open(path.path(), &ReadOptions::default()).expect("opens");
+        let mut worker = Worker::new(&recording, &|_| true);
+        let mut values = 0;
+        for block in &recording.container.blocks {
+            let result = worker.block(block);
+            let columns = result.batches.iter().flat_map(|batch| &batch.columns);
+            values += columns.map(|column| column.values.len()).sum::<usize>();
+            let places = worker.channels.iter().flatten().map(|c| c.rows.places);
+            let places: usize = places.sum();
+            assert!(places <= MAX_PLACES && places == worker.places, "{places}");
+        }
+        assert_eq!(values, 20 * 2 * 64 * 64);
+    }
 }

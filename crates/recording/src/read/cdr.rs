@@ -10,7 +10,7 @@ use super::{
     layout::{Fail, Headers, Program, Shape},
     ros1::describe,
     ros2msg::{self, Dialect},
-    rows::Rows,
+    rows::{MAX_PLACES, Rows},
     types::{Type, Types},
 };
 
@@ -182,6 +182,10 @@ impl Decoder for Cdr {
             return Err(format!(
                 "the representation identifier 0x{first:02x}{representation:02x} is not known"
             ));
+        }
+        if rows.places > MAX_PLACES {
+            rows.places = 0;
+            self.programs.clear();
         }
         let known = match self
             .readings

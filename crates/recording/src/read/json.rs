@@ -178,6 +178,7 @@ impl<'de> DeserializeSeed<'de> for Place<'_, '_> {
     type Value = ();
 
     fn deserialize<D: serde::Deserializer<'de>>(self, deserializer: D) -> Result<(), D::Error> {
+        self.rows.enter(1);
         deserializer.deserialize_any(self)
     }
 }
@@ -239,6 +240,11 @@ impl<'de> Visitor<'de> for Place<'_, '_> {
                 }
                 continue;
             }
+            if !rows.has_room(1) {
+                rows.enter(1);
+                map.next_value::<IgnoredAny>()?;
+                continue;
+            }
             let known = match node.children.get(hint) {
                 Some((known, _)) if *known == key => Some(hint),
                 _ => node.by_key.get(&*key).copied(),
@@ -288,6 +294,11 @@ impl<'de> Visitor<'de> for Place<'_, '_> {
                     rows.note_long(&node.field);
                     pending.truncate(before);
                 }
+            } else if !rows.has_room(1) {
+                if seq.next_element::<IgnoredAny>()?.is_none() {
+                    break;
+                }
+                rows.enter(1);
             } else {
                 if node.items.len() <= item {
                     rows.places += 1;

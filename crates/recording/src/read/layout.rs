@@ -55,6 +55,17 @@ pub(super) struct Fail {
     pub problem: Problem,
 }
 
+impl Fail {
+    /// Names the field from further outside.
+    fn within(self, outer: &str) -> Self {
+        let field = match self.field.as_str() {
+            "" => outer.to_owned(),
+            inner => format!("{outer}.{inner}"),
+        };
+        Fail { field, ..self }
+    }
+}
+
 #[derive(Debug, PartialEq)]
 pub(super) enum Problem {
     /// The message ends before the field does.
@@ -124,16 +135,20 @@ struct Items {
     /// Size of an item that is a number; such items are skipped without being looked at.
     prim: Option<Prim>,
     header: bool,
+    /// Whether they become signals, as those of items that are left out do not.
+    take: bool,
     /// Programs of the items seen so far.
     programs: Vec<Program>,
-    /// Walks over an item without taking anything.
-    skip: Option<Box<Program>>,
 }
 
 /// A compiled type in one shape.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Program {
     ops: Vec<Op>,
+    /// How many fields it has, without those of items, at least one.
+    places: usize,
+    /// Of a message: what walks over items of a type without taking anything.
+    skips: Vec<(Type, Program)>,
     flat: Option<Box<Flat>>,
     /// How many messages in a row did not fit the flat table.
     misses: u32,
@@ -153,11 +168,14 @@ struct Flat {
     simple: bool,
 }
 
+const TOO_MANY: &str = "its items have too many fields";
+
 /// What a message is decoded with.
 struct Context<'a> {
     types: &'a Types,
     shape: Shape,
     data: &'a [u8],
+    skips: Vec<(Type, Program)>,
     /// The flat table in the making; `None` where it is not wanted, or once something was met that it cannot hold.
     trace: Option<Box<Flat>>,
 }
@@ -294,9 +312,12 @@ impl Program {
             types,
             shape,
             data,
+            skips: std::mem::take(&mut self.skips),
             trace,
         };
-        let end = self.run(&mut context, 0, rows)?;
+        let end = self.run(&mut context, 0, rows);
+        self.skips = context.skips;
+        let end = end?;
         if let Some(mut flat) = context.trace {
             flat.end = end;
             flat.simple = flat.is_simple();
@@ -418,7 +439,13 @@ fn compile(
     };
     compiler.add(kind, field, Role::Plain)?;
     compiler.close_run();
-    Ok(compiler.program)
+    let mut program = compiler.program;
+    let fields = |op: &Op| match op {
+        Op::Run(run) => run.fields.len(),
+        _ => 1,
+    };
+    program.places = program.ops.iter().map(fields).sum::<usize>().max(1);
+    Ok(program)
 }
 
 /// What a field means beyond its type.
@@ -555,8 +582,8 @@ impl Compiler<'_, '_> {
             kind: inner.clone(),
             prim: inner.prim(),
             header: self.shape.has_header(inner),
+            take: self.take,
             programs: Vec::new(),
-            skip: None,
         })
     }
 
@@ -599,55 +626,84 @@ impl Items {
         count: usize,
         rows: &mut Rows,
     ) -> Result<usize, Fail> {
-        let wanted = count <= rows.max_items;
-        if !wanted {
-            rows.note_long(&self.field);
-            // The flat table does not count what is too long.
-            context.trace = None;
+        let fits = count <= rows.max_items;
+        let mut taken = 0;
+        while self.take && fits && taken < count {
+            let room = match self.programs.get(taken) {
+                Some(program) => rows.enter(program.places),
+                // Without any room nothing has to be compiled to be refused.
+                None if !rows.has_room(1) => rows.enter(1),
+                None => {
+                    let (types, field) = (context.types, format!("{}[{taken}]", self.field));
+                    let program = compile(types, &self.kind, &field, context.shape, rows, true)
+                        .map_err(|_| other(at, &self.field, TOO_MANY))?;
+                    let room = rows.enter(program.places);
+                    if room {
+                        rows.places += program.places;
+                        self.programs.push(program);
+                    }
+                    room
+                }
+            };
+            if !room {
+                break;
+            }
+            at = self.programs[taken].run(context, at, rows)?;
+            taken += 1;
         }
-        if let (Some(prim), false) = (self.prim, wanted) {
+        if taken == count {
+            return Ok(at);
+        }
+        if self.take && !fits {
+            rows.note_long(&self.field);
+        }
+        // The flat table does not count what is left out.
+        context.trace = None;
+        self.skip(context, at, count - taken, rows)
+    }
+
+    /// Steps over items without looking at them.
+    fn skip(
+        &self,
+        context: &mut Context<'_>,
+        mut at: usize,
+        count: usize,
+        rows: &mut Rows,
+    ) -> Result<usize, Fail> {
+        if let Some(prim) = self.prim {
             let start = align(at, prim.size(), context.shape);
             let bytes = count
                 .checked_mul(prim.size())
                 .ok_or_else(|| short(at, &self.field))?;
             return end_of(context.data, start, bytes, &self.field);
         }
-        const TOO_MANY: &str = "its items have too many fields";
-        for item in 0..count {
-            let before = at;
-            if wanted {
-                while self.programs.len() <= item {
-                    let field = format!("{}[{}]", self.field, self.programs.len());
-                    let program =
-                        compile(context.types, &self.kind, &field, context.shape, rows, true);
-                    self.programs
-                        .push(program.map_err(|_| other(at, &self.field, TOO_MANY))?);
-                }
-                at = self.programs[item].run(context, at, rows)?;
-            } else {
-                let skip = match &mut self.skip {
-                    Some(skip) => skip,
-                    none => {
-                        let program = compile(
-                            context.types,
-                            &self.kind,
-                            &self.field,
-                            context.shape,
-                            rows,
-                            false,
-                        );
-                        none.insert(Box::new(
-                            program.map_err(|_| other(at, &self.field, TOO_MANY))?,
-                        ))
-                    }
-                };
-                at = skip.run(context, at, rows)?;
-                if at == before {
-                    break; // Items without bytes: the rest is as empty.
+        // One program for all items of a type: none holds items of its own type.
+        let known = context.skips.iter().position(|(k, _)| *k == self.kind);
+        let mut program = match known {
+            Some(known) => std::mem::take(&mut context.skips[known].1),
+            None => compile(context.types, &self.kind, "", context.shape, rows, false)
+                .map_err(|_| other(at, &self.field, TOO_MANY))?,
+        };
+        let mut failed = None;
+        for _ in 0..count {
+            match program.run(context, at, rows) {
+                // Items without bytes: the rest is as empty.
+                Ok(end) if end == at => break,
+                Ok(end) => at = end,
+                Err(fail) => {
+                    failed = Some(fail);
+                    break;
                 }
             }
         }
-        Ok(at)
+        match known {
+            Some(known) => context.skips[known].1 = program,
+            None => context.skips.push((self.kind.clone(), program)),
+        }
+        match failed {
+            Some(fail) => Err(fail.within(&self.field)),
+            None => Ok(at),
+        }
     }
 }
 

@@ -213,6 +213,11 @@ impl<'a> Input<'a> {
     }
 }
 
+/// How many places a message takes: its fields, at least one.
+fn places(descriptor: &MessageDescriptor) -> usize {
+    descriptor.fields().len().max(1)
+}
+
 /// The plan of one message, at one place.
 struct Node {
     fields: Vec<(u64, Plan)>,
@@ -337,6 +342,7 @@ impl Node {
             })
             .collect();
         fields.sort_by_key(|(number, _)| *number);
+        rows.places += places(descriptor);
         let stamp = matches!(
             field,
             "timestamp" | "stamp" | "header.stamp" | "header.timestamp"
@@ -475,6 +481,10 @@ impl Plan {
                 field,
                 node,
             } => {
+                let begun = node.as_ref().is_some_and(|node| node.present);
+                if !begun && !rows.enter(places(descriptor)) {
+                    return input.skip(wire, tag, depth);
+                }
                 let node = node.get_or_insert_with(|| Box::new(Node::new(descriptor, field, rows)));
                 read_message(node, input, wire, tag, depth, rows)?;
             }
@@ -510,7 +520,7 @@ impl Plan {
                 count,
             } => {
                 *count += 1;
-                if *count > rows.max_items {
+                if *count > rows.max_items || !rows.enter(places(descriptor)) {
                     return input.skip(wire, tag, depth);
                 }
                 if items.len() < *count {
@@ -679,6 +689,9 @@ fn read_entry(
         entries.long = true;
         return Ok(());
     }
+    if !present && !rows.enter(1) {
+        return Ok(());
+    }
     let position = known.unwrap_or_else(|| {
         let mut plan = Plan::new(&value_field, format!("{field}[{key}]"), rows);
         // An entry that is not there has no value, unlike a field.
@@ -713,8 +726,8 @@ fn read_entry(
 impl Decoder for Protobuf {
     fn decode(&mut self, message: &[u8], rows: &mut Rows) -> Result<(), String> {
         if rows.places > MAX_PLACES {
-            rows.places = 0;
             self.root = Node::new(&self.descriptor, "", rows);
+            rows.places = 0;
         }
         let read = self.root.read(&mut Input { rest: message }, None, 0, rows);
         self.root.flush(rows, read.is_ok());

@@ -4,7 +4,7 @@ use super::{
     decode::{Decoder, Place, SchemaRef},
     layout::{Fail, Headers, Problem, Program, Shape},
     ros2msg::{self, Dialect},
-    rows::Rows,
+    rows::{MAX_PLACES, Rows},
     types::Types,
 };
 
@@ -41,6 +41,10 @@ impl Decoder for Ros1 {
     }
 
     fn decode(&mut self, message: &[u8], rows: &mut Rows) -> Result<(), String> {
+        if rows.places > MAX_PLACES {
+            rows.places = 0;
+            self.program = Program::message(&self.types, SHAPE, rows)?;
+        }
         let end = self
             .program
             .decode(&self.types, SHAPE, message, rows)

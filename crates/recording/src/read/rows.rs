@@ -8,8 +8,12 @@ pub(super) const UNWANTED: u32 = u32::MAX;
 /// More columns than this in one channel are refused: items of items of items would otherwise fill the memory.
 pub(super) const MAX_COLUMNS: usize = 1 << 16;
 
-/// A decoder that remembers more places than this forgets them: messages that never stop inventing keys would otherwise fill the memory.
+/// More places than this in the items, entries and keys of one message are left out, and a decoder that remembers more forgets them: messages that
+/// nest sequences in sequences, or never stop inventing keys, would otherwise fill the memory.
 pub(super) const MAX_PLACES: usize = 1 << 16;
+
+/// Stands for the name of a field where a message has more.
+pub(super) const ANY_PLACE: &str = "[*]";
 
 /// What is said where there are more columns.
 pub(super) fn too_many_columns() -> String {
@@ -39,8 +43,10 @@ pub(super) struct Rows<'a> {
     pub order: Vec<u32>,
     /// There were more columns than are taken.
     pub full: bool,
-    /// Keys and items that the decoder remembers because messages had them.
+    /// Places that the decoder remembers because messages had them: keys, items, and the fields of these.
     pub places: usize,
+    /// Those in the message in hand.
+    entered: usize,
     row: u32,
     /// Header stamp of the message that is being decoded.
     pub stamp_ns: Option<i64>,
@@ -83,6 +89,7 @@ impl<'a> Rows<'a> {
             order: Vec::new(),
             full: false,
             places: 0,
+            entered: 0,
             row: 0,
             stamp_ns: None,
             stamps: Vec::new(),
@@ -193,6 +200,23 @@ impl<'a> Rows<'a> {
         self.noted.push(Noted::Long(place));
     }
 
+    /// Whether so many further places of the message in hand may be read. It depends on the message alone, not on what is remembered.
+    pub fn has_room(&self, places: usize) -> bool {
+        self.entered.saturating_add(places) <= MAX_PLACES
+    }
+
+    /// Counts further places of the message in hand, where there is room for them; from where there is none on, nothing is.
+    pub fn enter(&mut self, places: usize) -> bool {
+        let room = self.has_room(places);
+        if room {
+            self.entered += places;
+        } else if self.has_room(0) {
+            self.entered = MAX_PLACES + 1;
+            self.note_long(ANY_PLACE);
+        }
+        room
+    }
+
     /// The number under which an array is counted that its type makes too long to become signals.
     pub fn long_type(&mut self, field: &str) -> u32 {
         numbered(&mut self.long_types, field)
@@ -224,6 +248,7 @@ impl<'a> Rows<'a> {
     /// Begins the next message.
     pub fn begin(&mut self) {
         self.stamp_ns = None;
+        self.entered = 0;
         self.noted.clear();
     }
 
@@ -254,6 +279,7 @@ impl<'a> Rows<'a> {
 
     /// Takes back what was counted of the message in hand, which is read again.
     pub fn take_back_counts(&mut self) {
+        self.entered = 0;
         for noted in self.noted.drain(..) {
             match noted {
                 Noted::Absent(field, messages) => self.absent[field as usize].1 -= messages,

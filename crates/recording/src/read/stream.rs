@@ -12,7 +12,7 @@ use super::{
     clock::{Clocks, Order, seconds},
     container::{Block, op},
     json::{ANY_KEY, MAX_KEYS},
-    rows::{MAX_COLUMNS, Selection, too_many_columns},
+    rows::{ANY_PLACE, MAX_COLUMNS, MAX_PLACES, Selection, too_many_columns},
 };
 use crate::{Finding, Kind, text::counted};
 
@@ -653,6 +653,9 @@ impl<'a> Taker<'a> {
                     field => field.to_owned(),
                 };
                 let text = match field.strip_suffix(ANY_KEY) {
+                    None if field == ANY_PLACE => format!(
+                        "sequences, maps and objects have more than {MAX_PLACES} fields together in {messages}; what has further ones is left out"
+                    ),
                     Some(field) => format!(
                         "{} has more keys than the {MAX_KEYS} that become signals, in {messages}; what has further ones is left out",
                         whole(field)
