@@ -841,6 +841,13 @@ fn sound_of_every_width_becomes_the_same_samples() {
             32,
             &bytes(&|s| (f32::from(s) / 32767.0).to_le_bytes().to_vec()),
         ),
+        wav(
+            3,
+            2,
+            4000,
+            64,
+            &bytes(&|s| (f64::from(s) / 32767.0).to_le_bytes().to_vec()),
+        ),
     ];
     for bytes in made {
         let folder = folder();
@@ -902,10 +909,55 @@ fn sound_stands_where_it_is_said_to_begin_and_its_loss_is_said() {
         error("a.m4a", b"...."),
         "a.m4a: is m4a; sound is read from WAV: make one with `ffmpeg -i a.m4a -ac 1 a.wav`"
     );
-    for bytes in [&b"RIFF...."[..], b"RF64....WAVE", b""] {
+    for bytes in [&b"RIFF...."[..], b"RF64....WAVE", b"RIFF....WAVE", b""] {
         assert!(error("a.wav", bytes).starts_with("a.wav: is no WAV file: "));
     }
-    assert!(error("b.wav", &wav(1, 0, 8000, 16, &[])).starts_with("b.wav: "));
+    assert!(error("b.wav", &wav(1, 0, 8000, 16, &[])).starts_with("b.wav: has 0 channels"));
+    assert_eq!(
+        error("b.wav", &wav(7, 1, 8000, 8, &[1; 8])),
+        "b.wav: holds 8-bit sound of format 0x0007; expected PCM (0x0001) of 8 to 32 bits or floating point (0x0003) of 32 or 64"
+    );
+    // Empty, and with a chunk behind.
+    let listed = [wav(1, 1, 8000, 16, &[]), b"LIST\x04\0\0\0INFO".to_vec()].concat();
+    for bytes in [&listed[..44], &listed] {
+        assert_eq!(
+            error("b.wav", bytes),
+            "b.wav: has a head but no sound; expected at least one sample"
+        );
+    }
+}
+
+/// Recorders write the length of the sound when they end, if they do.
+#[test]
+fn sound_whose_head_does_not_tell_its_length_is_all_that_follows() {
+    let folder = folder();
+    let samples: Vec<u8> = (0..8000i16).flat_map(i16::to_le_bytes).collect();
+    let whole = wav(1, 1, 8000, 16, &samples);
+    let read = |told: u32, behind: &[u8]| {
+        let mut bytes = whole.clone();
+        bytes[40..44].copy_from_slice(&told.to_le_bytes());
+        bytes.extend(behind);
+        let path = folder.path().join("drum.wav");
+        fs::write(&path, bytes).expect("writes");
+        let got = ingest(folder.path(), &[path], None).expect("ingests");
+        let found: Vec<i16> = sound(&got.recording).into_iter().flat_map(|m| m.3).collect();
+        assert!(found.iter().copied().eq(0..found.len() as i16), "{told:#x}");
+        let told = |of: &[String]| of.join("; ").replace(&format!("{}/", folder.path().display()), "");
+        (found.len(), told(&got.ingested.notes), told(&got.ingested.losses))
+    };
+    let none = String::new;
+    for told in [0, 0x7fff_f000, 0xffff_ff00, u32::MAX] {
+        let note = "drum.wav: its head does not tell how long the sound is: the 1.0 s behind it are taken";
+        assert_eq!(read(told, &[]), (8000, note.to_owned(), none()));
+    }
+    let list = b"LIST\x05\0\0\0INFO.\0id3 \x02\0\0\0ab";
+    for behind in [&b""[..], list, b"LIST\x01\0\0\0aid3 \x01\0\0\0b", &[0; 64]] {
+        assert_eq!(read(16_000, behind), (8000, none(), none()));
+    }
+    // Half of the sound is accounted for, with a chunk after it or without.
+    let loss = |bytes: u32| format!("drum: its head promises 0.5 s of sound; {bytes} bytes behind it belong to no chunk and are left out");
+    assert_eq!(read(8_000, &[]), (4000, none(), loss(8_000)));
+    assert_eq!(read(8_000, list), (4000, none(), loss(8_024)));
 }
 
 #[test]
