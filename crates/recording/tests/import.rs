@@ -1096,3 +1096,38 @@ fn an_x_imu3_counts_microseconds() {
     assert!((values("linear_acceleration.z") - 9.80665).abs() < 1e-12);
     assert_eq!(values("header.stamp.nanosec"), 247_500_000.0);
 }
+
+#[test]
+fn a_log_of_the_archive_stands_alone() {
+    let folder = folder();
+    let logs = ["a.npz", "b.NPZ"].map(|name| file(folder.path(), name, "PK\x03\x04"));
+    let said = |paths: &[PathBuf], options: ImportOptions<'_>| {
+        let out = folder.path().join("out.mcap");
+        let mut writer = RecordingWriter::create(&out, &WriterOptions::default()).expect("begins");
+        let error = import::ingest(paths, &options, &mut writer)
+            .expect_err("refused")
+            .to_string();
+        error.replace(&format!("{}/", folder.path().display()), "")
+    };
+    let plain = ImportOptions::default();
+    let layout = ImportOptions {
+        layout: Some("nosuch"),
+        ..plain
+    };
+    let late = ImportOptions {
+        sound_start_s: 1.0,
+        ..plain
+    };
+    let text = file(folder.path(), "c.csv", "a\n1\n");
+    for (paths, options, beside) in [
+        (&logs[..], plain, "another log"),
+        (&[text, logs[0].clone()], plain, "another log"),
+        (&logs[..1], layout, "a layout"),
+        (&logs[..1], late, "a start of the sound"),
+    ] {
+        assert_eq!(
+            said(paths, options),
+            format!("a.npz: is a log of the archive, which stands alone; found {beside} beside it")
+        );
+    }
+}

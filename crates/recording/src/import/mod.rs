@@ -118,11 +118,24 @@ pub fn ingest(
     options: &ImportOptions<'_>,
     writer: &mut RecordingWriter,
 ) -> Result<Ingested, ImportError> {
-    if let [path] = paths
-        && path
-            .extension()
-            .is_some_and(|extension| extension.eq_ignore_ascii_case("npz"))
-    {
+    let is_npz = |path: &&PathBuf| {
+        let extension = path.extension().unwrap_or_default();
+        extension.eq_ignore_ascii_case("npz")
+    };
+    if let Some(path) = paths.iter().find(is_npz) {
+        let beside = [
+            (paths.len() > 1, "another log"),
+            (options.layout.is_some(), "a layout"),
+            (options.sound_start_s != 0.0, "a start of the sound"),
+        ];
+        if let Some((_, beside)) = beside.into_iter().find(|(there, _)| *there) {
+            return Err(ImportError::Content {
+                name: path.display().to_string(),
+                problem: format!(
+                    "is a log of the archive, which stands alone; found {beside} beside it"
+                ),
+            });
+        }
         let messages = npz::ingest(path, writer)?;
         let topics = [
             crate::topics::STATE,
