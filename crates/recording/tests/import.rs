@@ -1131,3 +1131,54 @@ fn a_log_of_the_archive_stands_alone() {
         );
     }
 }
+
+#[test]
+fn rows_whose_time_is_said_to_be_none_are_left_out() {
+    let folder = folder();
+    let path = folder.path().join("walk");
+    let row = |k: u64, none: &str| match k {
+        3 => format!("{none},0.03,9.8,0,{k}\n"),
+        _ => format!(
+            "{},0.0{k},9.8,0,{k}\n",
+            1_700_000_000_000_000_000 + k * 10_000_000
+        ),
+    };
+    for none in ["null", "NaN", "NA", "n/a", ""] {
+        let rows: String = (0..6).map(|k| row(k, none)).collect();
+        file(
+            &path,
+            "TotalAcceleration.csv",
+            &format!("time,seconds_elapsed,z,y,x\n{rows}"),
+        );
+        let got = ingest(folder.path(), std::slice::from_ref(&path), None).expect("ingests");
+        assert_eq!(
+            got.values("/imu/walk.linear_acceleration.x"),
+            [0.0, 1.0, 2.0, 4.0, 5.0]
+        );
+        assert_eq!(got.times("/imu/walk")[0], 1_700_000_000_000_000_000);
+        let notes = got.ingested.notes.join("; ");
+        assert!(
+            notes.contains("1 row has no time and is left out"),
+            "{notes}"
+        );
+
+        let rows = format!("0.01,1,0,9.8\n{none},2,0,9.8\n0.03,3,0,9.8\n");
+        let rows = format!(
+            "Time (s),Acceleration x (m/s^2),Acceleration y (m/s^2),Acceleration z (m/s^2)\n{rows}"
+        );
+        let start = "event,experiment time,system time\nSTART,0.0,1700000000.5\n".to_owned();
+        let files = [("Accelerometer.csv", rows), ("meta/time.csv", start)];
+        let phone = zipped(folder.path(), "phone.zip", &files);
+        let got = ingest(folder.path(), &[phone], None).expect("ingests");
+        assert_eq!(
+            got.times("/imu/phone"),
+            [1_700_000_000_510_000_000, 1_700_000_000_530_000_000]
+        );
+        assert_eq!(got.values("/imu/phone.linear_acceleration.x"), [1.0, 3.0]);
+        let notes = got.ingested.notes.join("; ");
+        assert!(
+            notes.contains("Accelerometer.csv: 1 row has no time and is left out"),
+            "{notes}"
+        );
+    }
+}

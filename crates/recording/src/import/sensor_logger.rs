@@ -4,8 +4,6 @@
 //! `TotalAcceleration`, or else accelerometer plus gravity. iOS without the app's 'standardisation' has the opposite sign on all axes, and
 //! counts uncalibrated accelerations in g.
 
-use crate::text::counted;
-
 use super::{
     Files, ImportError,
     imu::{self, Log, STANDARD_GRAVITY, Track},
@@ -127,16 +125,20 @@ fn read_track(
     let (mut track, mut untimed) = (Track::new(), 0);
     let mut ends: Option<[(i64, f64); 2]> = None;
     for row in 0..table.len() {
-        if table.text(row, time).is_empty() {
-            untimed += 1;
-            continue;
-        }
         // Nanoseconds since 1970 have more digits than a double holds.
         let t_ns = match table.text(row, time).parse::<i64>() {
             Ok(t_ns) => t_ns,
-            Err(_) => table.number(row, time)? as i64,
+            Err(_) => {
+                let t_ns = table.number(row, time)?;
+                if t_ns.is_nan() {
+                    untimed += 1;
+                    continue;
+                }
+                t_ns as i64
+            }
         };
-        if t_ns < 0 {
+        // What is too large became the largest.
+        if !(0..i64::MAX).contains(&t_ns) {
             return Err(table.problem(format!(
                 "has the time {t_ns} in row {}; expected nanoseconds since 1970",
                 row + 1
@@ -148,14 +150,7 @@ fn read_track(
             ends = Some([ends.map_or(here, |ends| ends[0]), here]);
         }
     }
-    if untimed > 0 {
-        let rows = counted(
-            untimed,
-            "row has no time and is",
-            "rows have no time and are",
-        );
-        notes.push(format!("{name}: {rows} left out"));
-    }
+    table.note_untimed(untimed, log, notes);
     if let Some([(from_ns, from_s), (to_ns, to_s)]) = ends
         && track.is_sorted_by_key(|(t_ns, _)| *t_ns)
     {
