@@ -940,14 +940,25 @@ fn sound_whose_head_does_not_tell_its_length_is_all_that_follows() {
         let path = folder.path().join("drum.wav");
         fs::write(&path, bytes).expect("writes");
         let got = ingest(folder.path(), &[path], None).expect("ingests");
-        let found: Vec<i16> = sound(&got.recording).into_iter().flat_map(|m| m.3).collect();
+        let found: Vec<i16> = sound(&got.recording)
+            .into_iter()
+            .flat_map(|m| m.3)
+            .collect();
         assert!(found.iter().copied().eq(0..found.len() as i16), "{told:#x}");
-        let told = |of: &[String]| of.join("; ").replace(&format!("{}/", folder.path().display()), "");
-        (found.len(), told(&got.ingested.notes), told(&got.ingested.losses))
+        let told = |of: &[String]| {
+            of.join("; ")
+                .replace(&format!("{}/", folder.path().display()), "")
+        };
+        (
+            found.len(),
+            told(&got.ingested.notes),
+            told(&got.ingested.losses),
+        )
     };
     let none = String::new;
     for told in [0, 0x7fff_f000, 0xffff_ff00, u32::MAX] {
-        let note = "drum.wav: its head does not tell how long the sound is: the 1.0 s behind it are taken";
+        let note =
+            "drum.wav: its head does not tell how long the sound is: the 1.0 s behind it are taken";
         assert_eq!(read(told, &[]), (8000, note.to_owned(), none()));
     }
     let list = b"LIST\x05\0\0\0INFO.\0id3 \x02\0\0\0ab";
@@ -955,7 +966,11 @@ fn sound_whose_head_does_not_tell_its_length_is_all_that_follows() {
         assert_eq!(read(16_000, behind), (8000, none(), none()));
     }
     // Half of the sound is accounted for, with a chunk after it or without.
-    let loss = |bytes: u32| format!("drum: its head promises 0.5 s of sound; {bytes} bytes behind it belong to no chunk and are left out");
+    let loss = |bytes: u32| {
+        format!(
+            "drum: its head promises 0.5 s of sound; {bytes} bytes behind it belong to no chunk and are left out"
+        )
+    };
     assert_eq!(read(8_000, &[]), (4000, none(), loss(8_000)));
     assert_eq!(read(8_000, list), (4000, none(), loss(8_024)));
 }
@@ -1097,38 +1112,110 @@ fn an_x_imu3_counts_microseconds() {
     assert_eq!(values("header.stamp.nanosec"), 247_500_000.0);
 }
 
+/// Nothing in a folder or zip is dropped without a word: a topic each, or a sentence.
 #[test]
-fn a_log_of_the_archive_stands_alone() {
+fn a_folder_of_several_devices_gives_each_a_topic() {
     let folder = folder();
-    let logs = ["a.npz", "b.NPZ"].map(|name| file(folder.path(), name, "PK\x03\x04"));
-    let said = |paths: &[PathBuf], options: ImportOptions<'_>| {
-        let out = folder.path().join("out.mcap");
-        let mut writer = RecordingWriter::create(&out, &WriterOptions::default()).expect("begins");
-        let error = import::ingest(paths, &options, &mut writer)
-            .expect_err("refused")
-            .to_string();
-        error.replace(&format!("{}/", folder.path().display()), "")
+    let read = |paths: &[PathBuf], layout: Option<&str>| ingest(folder.path(), paths, layout);
+    let dot = |k: usize| {
+        format!(
+            "PacketCounter,SampleTimeFine,Acc_X,Acc_Y,Acc_Z,Gyr_X,Gyr_Y,Gyr_Z\n1,5,0,0,{k},180,0,0\n"
+        )
     };
-    let plain = ImportOptions::default();
-    let layout = ImportOptions {
-        layout: Some("nosuch"),
-        ..plain
-    };
-    let late = ImportOptions {
-        sound_start_s: 1.0,
-        ..plain
-    };
-    let text = file(folder.path(), "c.csv", "a\n1\n");
-    for (paths, options, beside) in [
-        (&logs[..], plain, "another log"),
-        (&[text, logs[0].clone()], plain, "another log"),
-        (&logs[..1], layout, "a layout"),
-        (&logs[..1], late, "a start of the sound"),
+    let x_io = "Time (s),Gyroscope X (deg/s),Gyroscope Y (deg/s),Gyroscope Z (deg/s),Accelerometer X (g),Accelerometer Y (g),Accelerometer Z (g)\n0.5,90,0,0,0,0,1\n";
+    let axivity = "2025-11-24 16:00:00.000,0.1,-0.2,0.97\n";
+    let shimmer =
+        "a_Timestamp_Unix_CAL,a_Accel_LN_X_CAL,a_Accel_LN_Y_CAL,a_Accel_LN_Z_CAL\n5,0,0,9.8\n";
+    let dots = zipped(
+        folder.path(),
+        "dots.zip",
+        &[
+            ("__MACOSX/._D1.csv", "\0\x05\x16\x07".to_owned()),
+            ("D1.csv", dot(1)),
+            ("drum.wav", String::new()),
+            ("notes.txt", "a windy day\n".to_owned()),
+            ("right/D2.csv", dot(2)),
+        ],
+    );
+    let got = read(&[dots], None).expect("ingests");
+    let topics = |of: &[&str]| -> Vec<_> { of.iter().map(|t| (format!("/imu/{t}"), 1)).collect() };
+    assert_eq!(got.ingested.topics, topics(&["D1", "D2"]));
+    assert_eq!(got.values("/imu/D2.linear_acceleration.z"), [2.0]);
+    let notes = got.ingested.notes.iter();
+    let notes: Vec<_> = notes
+        .map(|n| n.rsplit("dots.zip: ").next().unwrap())
+        .collect();
+    assert_eq!(
+        notes,
+        [
+            "D1.csv: angular velocities were in deg/s",
+            "of no kind that is known, and left out: notes.txt",
+            "D2.csv: angular velocities were in deg/s",
+            "drum.wav is left out: sound is given as a file of its own",
+        ]
+    );
+    // Of several kinds.
+    let mixed = folder.path().join("mixed");
+    for (name, text) in [
+        ("a.csv", x_io),
+        ("b.csv", axivity),
+        ("c.csv", shimmer),
+        ("d.csv", &dot(1)),
     ] {
-        assert_eq!(
-            said(paths, options),
-            format!("a.npz: is a log of the archive, which stands alone; found {beside} beside it")
+        file(&mixed, name, text);
+    }
+    let got = read(std::slice::from_ref(&mixed), None).expect("ingests");
+    assert_eq!(got.ingested.topics, topics(&["a", "b", "c", "d"]));
+    // A phone beside them is called as the folder.
+    let phone = "Time (s),Acceleration x (m/s^2),Acceleration y (m/s^2),Acceleration z (m/s^2)\n0.5,0,0,9.8\n";
+    file(&mixed, "Accelerometer.csv", phone);
+    let got = read(&[mixed], None).expect("ingests");
+    assert_eq!(got.ingested.topics, topics(&["mixed", "a", "b", "c", "d"]));
+
+    let laid = folder.path().join("laid");
+    file(&laid, "a.csv", x_io);
+    file(&laid, "b.csv", x_io);
+    let got = read(std::slice::from_ref(&laid), Some("x-io")).expect("ingests");
+    assert_eq!(got.ingested.topics, topics(&["a", "b"]));
+    file(&laid, "c.csv", "Time (s),gyro\n1,2\n");
+    let refused = read(std::slice::from_ref(&laid), Some("x-io"))
+        .err()
+        .expect("refused");
+    assert!(
+        refused.to_string().contains("c.csv: lacks the columns"),
+        "{refused}"
+    );
+    fs::remove_dir_all(&laid).expect("removes");
+    fs::create_dir(&laid).expect("makes");
+    for layout in [None, Some("x-io")] {
+        let refused = read(std::slice::from_ref(&laid), layout)
+            .err()
+            .expect("refused");
+        assert!(
+            refused
+                .to_string()
+                .ends_with("laid: has no CSV in it; expected a log"),
+            "{refused}"
         );
+    }
+    // Where a device has several files, nothing tells which belong together.
+    let logger = "time,seconds_elapsed,z,y,x\n1700000000000000001,0.1,9.8,0.2,0.1\n";
+    for (one, other, text, what) in [
+        (
+            "a/TotalAcceleration.csv",
+            "b/TotalAcceleration.csv",
+            logger,
+            "the name TotalAcceleration.csv",
+        ),
+        ("a.csv", "b.csv", phone, "Acceleration x (m/s^2)"),
+    ] {
+        let two = [(one, text.to_owned()), (other, text.to_owned())];
+        let two = zipped(folder.path(), "two.zip", &two);
+        let refused = read(&[two], None).err().expect("refused").to_string();
+        let wanted = format!(
+            "two.zip: has two files with {what}, {one} and {other}; expected those of one device: give each device a folder of its own"
+        );
+        assert!(refused.ends_with(&wanted), "{refused}");
     }
 }
 
@@ -1179,6 +1266,41 @@ fn rows_whose_time_is_said_to_be_none_are_left_out() {
         assert!(
             notes.contains("Accelerometer.csv: 1 row has no time and is left out"),
             "{notes}"
+        );
+    }
+}
+
+#[test]
+fn a_log_of_the_archive_stands_alone() {
+    let folder = folder();
+    let logs = ["a.npz", "b.NPZ"].map(|name| file(folder.path(), name, "PK\x03\x04"));
+    let said = |paths: &[PathBuf], options: ImportOptions<'_>| {
+        let out = folder.path().join("out.mcap");
+        let mut writer = RecordingWriter::create(&out, &WriterOptions::default()).expect("begins");
+        let error = import::ingest(paths, &options, &mut writer)
+            .expect_err("refused")
+            .to_string();
+        error.replace(&format!("{}/", folder.path().display()), "")
+    };
+    let plain = ImportOptions::default();
+    let layout = ImportOptions {
+        layout: Some("nosuch"),
+        ..plain
+    };
+    let late = ImportOptions {
+        sound_start_s: 1.0,
+        ..plain
+    };
+    let text = file(folder.path(), "c.csv", "a\n1\n");
+    for (paths, options, beside) in [
+        (&logs[..], plain, "another log"),
+        (&[text, logs[0].clone()], plain, "another log"),
+        (&logs[..1], layout, "a layout"),
+        (&logs[..1], late, "a start of the sound"),
+    ] {
+        assert_eq!(
+            said(paths, options),
+            format!("a.npz: is a log of the archive, which stands alone; found {beside} beside it")
         );
     }
 }

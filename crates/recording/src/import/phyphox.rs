@@ -30,7 +30,7 @@ pub(super) fn read(files: &Files) -> Result<Log, ImportError> {
         Some((name, text)) => starts(name, text, &mut notes)?,
         None => Vec::new(),
     };
-    let mut tracks: [Track; 3] = Default::default();
+    let mut tracks: [(&str, Track); 3] = Default::default();
     let (mut seen, mut known) = (Vec::new(), false);
     for (name, text) in files.texts() {
         if name.contains("meta/") || !text.lines().next().is_some_and(is_header) {
@@ -40,17 +40,24 @@ pub(super) fn read(files: &Files) -> Result<Log, ImportError> {
         table.drop_cut_row(&files.name, &mut notes);
         seen.extend(table.columns.iter().cloned());
         let mut untimed = 0;
-        for ((sensor, unit), track) in SENSORS.iter().zip(&mut tracks) {
+        for ((sensor, unit), (from, track)) in SENSORS.iter().zip(&mut tracks) {
             let names = ["x", "y", "z"].map(|axis| format!("{sensor} {axis} ({unit})"));
-            if track.is_empty() && table.find(&names[0]).is_some() {
-                known = true;
-                *track = read_track(&table, [&names[0], &names[1], &names[2]], &starts)?;
-                untimed = table.len() - track.len();
+            if table.find(&names[0]).is_none() {
+                continue;
+            }
+            known = true;
+            let found = read_track(&table, names.each_ref().map(String::as_str), &starts)?;
+            untimed = table.len() - found.len();
+            if !track.is_empty() && !found.is_empty() {
+                return Err(files.two(&names[0], from, name));
+            }
+            if track.is_empty() {
+                (*from, *track) = (name, found);
             }
         }
         table.note_untimed(untimed as u64, &files.name, &mut notes);
     }
-    let [with_gravity, without, rate] = tracks;
+    let [with_gravity, without, rate] = tracks.map(|(_, track)| track);
     if starts.is_empty() {
         notes.push("there is no meta/time.csv: times begin at 0, not at a date".to_owned());
     }

@@ -5,7 +5,7 @@
 //! counts uncalibrated accelerations in g.
 
 use super::{
-    Files, ImportError,
+    Files, ImportError, file_name,
     imu::{self, Log, STANDARD_GRAVITY, Track},
     table::Table,
 };
@@ -22,7 +22,7 @@ pub(super) fn read(files: &Files) -> Result<Log, ImportError> {
     let mut notes = Vec::new();
     let flipped = flipped(files, &mut notes)?;
     let mut cut = Vec::new();
-    let mut track = |sensor: &str| match files.named(sensor) {
+    let mut track = |sensor: &str| match named(files, sensor)? {
         Some((name, text)) => read_track(name, text, &files.name, &mut cut),
         None => Ok(Track::new()),
     };
@@ -53,7 +53,7 @@ pub(super) fn read(files: &Files) -> Result<Log, ImportError> {
     };
     // At rest a force of 1 is one g, a force of 9.8 is metres per second squared.
     if imu::usual_length(&force).is_some_and(|length| (0.8..1.3).contains(&length))
-        && files.named("Accelerometer.csv").is_none()
+        && named(files, "Accelerometer.csv")?.is_none()
     {
         notes.push("accelerations were in g".to_owned());
         for (_, value) in &mut force {
@@ -84,9 +84,16 @@ pub(super) fn read(files: &Files) -> Result<Log, ImportError> {
     Ok(Log::join(imu::device_name(&files.name), force, rate, notes))
 }
 
+/// The file of a name, in whatever folder of a zip.
+fn named<'a>(files: &'a Files, file: &str) -> Result<Option<(&'a str, &'a str)>, ImportError> {
+    files.only(&format!("the name {file}"), |name, _| {
+        file_name(name) == file
+    })
+}
+
 /// Whether the signs must be turned: iOS without standardisation.
 fn flipped(files: &Files, notes: &mut Vec<String>) -> Result<bool, ImportError> {
-    let Some((name, text)) = files.named("Metadata.csv") else {
+    let Some((name, text)) = named(files, "Metadata.csv")? else {
         notes.push("there is no Metadata.csv: signs are taken to be Android's".to_owned());
         return Ok(false);
     };

@@ -129,9 +129,7 @@ fn chunk_at(file: &mut BufReader<File>, at: u64) -> io::Result<Option<([u8; 4], 
         return Ok(None);
     };
     let name = [*a, *b, *c, *d];
-    let named = name
-        .iter()
-        .all(|c| c.is_ascii_alphanumeric() || *c == b' ');
+    let named = name.iter().all(|c| c.is_ascii_alphanumeric() || *c == b' ');
     let length = length.try_into().ok().filter(|_| named);
     Ok(length.map(|length| (name, u32::from_le_bytes(length))))
 }
@@ -201,12 +199,23 @@ pub(super) fn is_wav(path: &Path) -> Result<bool, ImportError> {
     Ok(head == b"RIFF")
 }
 
+/// Whether a file is named as sound is.
+pub(super) fn is_named(name: &str) -> bool {
+    let Some((_, end)) = name.rsplit_once('.') else {
+        return false;
+    };
+    OTHER_SOUNDS
+        .iter()
+        .chain(&["wav"])
+        .any(|sound| end.eq_ignore_ascii_case(sound))
+}
+
 /// Says how to make a WAV of a sound that is none.
 pub(super) fn refuse(path: &Path) -> Result<(), ImportError> {
     let extension = path.extension().unwrap_or_default().to_string_lossy();
     if !OTHER_SOUNDS
         .iter()
-        .any(|other| extension.eq_ignore_ascii_case(other))
+        .any(|o| extension.eq_ignore_ascii_case(o))
     {
         return Ok(());
     }
