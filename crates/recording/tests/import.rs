@@ -841,6 +841,13 @@ fn sound_of_every_width_becomes_the_same_samples() {
             32,
             &bytes(&|s| (f32::from(s) / 32767.0).to_le_bytes().to_vec()),
         ),
+        wav(
+            3,
+            2,
+            4000,
+            64,
+            &bytes(&|s| (f64::from(s) / 32767.0).to_le_bytes().to_vec()),
+        ),
     ];
     for bytes in made {
         let folder = folder();
@@ -902,10 +909,70 @@ fn sound_stands_where_it_is_said_to_begin_and_its_loss_is_said() {
         error("a.m4a", b"...."),
         "a.m4a: is m4a; sound is read from WAV: make one with `ffmpeg -i a.m4a -ac 1 a.wav`"
     );
-    for bytes in [&b"RIFF...."[..], b"RF64....WAVE", b""] {
+    for bytes in [&b"RIFF...."[..], b"RF64....WAVE", b"RIFF....WAVE", b""] {
         assert!(error("a.wav", bytes).starts_with("a.wav: is no WAV file: "));
     }
-    assert!(error("b.wav", &wav(1, 0, 8000, 16, &[])).starts_with("b.wav: "));
+    assert!(error("b.wav", &wav(1, 0, 8000, 16, &[])).starts_with("b.wav: has 0 channels"));
+    assert_eq!(
+        error("b.wav", &wav(7, 1, 8000, 8, &[1; 8])),
+        "b.wav: holds 8-bit sound of format 0x0007; expected PCM (0x0001) of 8 to 32 bits or floating point (0x0003) of 32 or 64"
+    );
+    // Empty, and with a chunk behind.
+    let listed = [wav(1, 1, 8000, 16, &[]), b"LIST\x04\0\0\0INFO".to_vec()].concat();
+    for bytes in [&listed[..44], &listed] {
+        assert_eq!(
+            error("b.wav", bytes),
+            "b.wav: has a head but no sound; expected at least one sample"
+        );
+    }
+}
+
+/// Recorders write the length of the sound when they end, if they do.
+#[test]
+fn sound_whose_head_does_not_tell_its_length_is_all_that_follows() {
+    let folder = folder();
+    let samples: Vec<u8> = (0..8000i16).flat_map(i16::to_le_bytes).collect();
+    let whole = wav(1, 1, 8000, 16, &samples);
+    let read = |told: u32, behind: &[u8]| {
+        let mut bytes = whole.clone();
+        bytes[40..44].copy_from_slice(&told.to_le_bytes());
+        bytes.extend(behind);
+        let path = folder.path().join("drum.wav");
+        fs::write(&path, bytes).expect("writes");
+        let got = ingest(folder.path(), &[path], None).expect("ingests");
+        let found: Vec<i16> = sound(&got.recording)
+            .into_iter()
+            .flat_map(|m| m.3)
+            .collect();
+        assert!(found.iter().copied().eq(0..found.len() as i16), "{told:#x}");
+        let told = |of: &[String]| {
+            of.join("; ")
+                .replace(&format!("{}/", folder.path().display()), "")
+        };
+        (
+            found.len(),
+            told(&got.ingested.notes),
+            told(&got.ingested.losses),
+        )
+    };
+    let none = String::new;
+    for told in [0, 0x7fff_f000, 0xffff_ff00, u32::MAX] {
+        let note =
+            "drum.wav: its head does not tell how long the sound is: the 1.0 s behind it are taken";
+        assert_eq!(read(told, &[]), (8000, note.to_owned(), none()));
+    }
+    let list = b"LIST\x05\0\0\0INFO.\0id3 \x02\0\0\0ab";
+    for behind in [&b""[..], list, b"LIST\x01\0\0\0aid3 \x01\0\0\0b", &[0; 64]] {
+        assert_eq!(read(16_000, behind), (8000, none(), none()));
+    }
+    // Half of the sound is accounted for, with a chunk after it or without.
+    let loss = |bytes: u32| {
+        format!(
+            "drum: its head promises 0.5 s of sound; {bytes} bytes behind it belong to no chunk and are left out"
+        )
+    };
+    assert_eq!(read(8_000, &[]), (4000, none(), loss(8_000)));
+    assert_eq!(read(8_000, list), (4000, none(), loss(8_024)));
 }
 
 #[test]
@@ -1043,4 +1110,197 @@ fn an_x_imu3_counts_microseconds() {
     assert!((values("angular_velocity.x") - std::f64::consts::PI).abs() < 1e-12);
     assert!((values("linear_acceleration.z") - 9.80665).abs() < 1e-12);
     assert_eq!(values("header.stamp.nanosec"), 247_500_000.0);
+}
+
+/// Nothing in a folder or zip is dropped without a word: a topic each, or a sentence.
+#[test]
+fn a_folder_of_several_devices_gives_each_a_topic() {
+    let folder = folder();
+    let read = |paths: &[PathBuf], layout: Option<&str>| ingest(folder.path(), paths, layout);
+    let dot = |k: usize| {
+        format!(
+            "PacketCounter,SampleTimeFine,Acc_X,Acc_Y,Acc_Z,Gyr_X,Gyr_Y,Gyr_Z\n1,5,0,0,{k},180,0,0\n"
+        )
+    };
+    let x_io = "Time (s),Gyroscope X (deg/s),Gyroscope Y (deg/s),Gyroscope Z (deg/s),Accelerometer X (g),Accelerometer Y (g),Accelerometer Z (g)\n0.5,90,0,0,0,0,1\n";
+    let axivity = "2025-11-24 16:00:00.000,0.1,-0.2,0.97\n";
+    let shimmer =
+        "a_Timestamp_Unix_CAL,a_Accel_LN_X_CAL,a_Accel_LN_Y_CAL,a_Accel_LN_Z_CAL\n5,0,0,9.8\n";
+    let dots = zipped(
+        folder.path(),
+        "dots.zip",
+        &[
+            ("__MACOSX/._D1.csv", "\0\x05\x16\x07".to_owned()),
+            ("D1.csv", dot(1)),
+            ("drum.wav", String::new()),
+            ("notes.txt", "a windy day\n".to_owned()),
+            ("right/D2.csv", dot(2)),
+        ],
+    );
+    let got = read(&[dots], None).expect("ingests");
+    let topics = |of: &[&str]| -> Vec<_> { of.iter().map(|t| (format!("/imu/{t}"), 1)).collect() };
+    assert_eq!(got.ingested.topics, topics(&["D1", "D2"]));
+    assert_eq!(got.values("/imu/D2.linear_acceleration.z"), [2.0]);
+    let notes = got.ingested.notes.iter();
+    let notes: Vec<_> = notes
+        .map(|n| n.rsplit("dots.zip: ").next().unwrap())
+        .collect();
+    assert_eq!(
+        notes,
+        [
+            "D1.csv: angular velocities were in deg/s",
+            "of no kind that is known, and left out: notes.txt",
+            "D2.csv: angular velocities were in deg/s",
+            "drum.wav is left out: sound is given as a file of its own",
+        ]
+    );
+    // Of several kinds.
+    let mixed = folder.path().join("mixed");
+    for (name, text) in [
+        ("a.csv", x_io),
+        ("b.csv", axivity),
+        ("c.csv", shimmer),
+        ("d.csv", &dot(1)),
+    ] {
+        file(&mixed, name, text);
+    }
+    let got = read(std::slice::from_ref(&mixed), None).expect("ingests");
+    assert_eq!(got.ingested.topics, topics(&["a", "b", "c", "d"]));
+    // A phone beside them is called as the folder.
+    let phone = "Time (s),Acceleration x (m/s^2),Acceleration y (m/s^2),Acceleration z (m/s^2)\n0.5,0,0,9.8\n";
+    file(&mixed, "Accelerometer.csv", phone);
+    let got = read(&[mixed], None).expect("ingests");
+    assert_eq!(got.ingested.topics, topics(&["mixed", "a", "b", "c", "d"]));
+
+    let laid = folder.path().join("laid");
+    file(&laid, "a.csv", x_io);
+    file(&laid, "b.csv", x_io);
+    let got = read(std::slice::from_ref(&laid), Some("x-io")).expect("ingests");
+    assert_eq!(got.ingested.topics, topics(&["a", "b"]));
+    file(&laid, "c.csv", "Time (s),gyro\n1,2\n");
+    let refused = read(std::slice::from_ref(&laid), Some("x-io"))
+        .err()
+        .expect("refused");
+    assert!(
+        refused.to_string().contains("c.csv: lacks the columns"),
+        "{refused}"
+    );
+    fs::remove_dir_all(&laid).expect("removes");
+    fs::create_dir(&laid).expect("makes");
+    for layout in [None, Some("x-io")] {
+        let refused = read(std::slice::from_ref(&laid), layout)
+            .err()
+            .expect("refused");
+        assert!(
+            refused
+                .to_string()
+                .ends_with("laid: has no CSV in it; expected a log"),
+            "{refused}"
+        );
+    }
+    // Where a device has several files, nothing tells which belong together.
+    let logger = "time,seconds_elapsed,z,y,x\n1700000000000000001,0.1,9.8,0.2,0.1\n";
+    for (one, other, text, what) in [
+        (
+            "a/TotalAcceleration.csv",
+            "b/TotalAcceleration.csv",
+            logger,
+            "the name TotalAcceleration.csv",
+        ),
+        ("a.csv", "b.csv", phone, "Acceleration x (m/s^2)"),
+    ] {
+        let two = [(one, text.to_owned()), (other, text.to_owned())];
+        let two = zipped(folder.path(), "two.zip", &two);
+        let refused = read(&[two], None).err().expect("refused").to_string();
+        let wanted = format!(
+            "two.zip: has two files with {what}, {one} and {other}; expected those of one device: give each device a folder of its own"
+        );
+        assert!(refused.ends_with(&wanted), "{refused}");
+    }
+}
+
+#[test]
+fn rows_whose_time_is_said_to_be_none_are_left_out() {
+    let folder = folder();
+    let path = folder.path().join("walk");
+    let row = |k: u64, none: &str| match k {
+        3 => format!("{none},0.03,9.8,0,{k}\n"),
+        _ => format!(
+            "{},0.0{k},9.8,0,{k}\n",
+            1_700_000_000_000_000_000 + k * 10_000_000
+        ),
+    };
+    for none in ["null", "NaN", "NA", "n/a", ""] {
+        let rows: String = (0..6).map(|k| row(k, none)).collect();
+        file(
+            &path,
+            "TotalAcceleration.csv",
+            &format!("time,seconds_elapsed,z,y,x\n{rows}"),
+        );
+        let got = ingest(folder.path(), std::slice::from_ref(&path), None).expect("ingests");
+        assert_eq!(
+            got.values("/imu/walk.linear_acceleration.x"),
+            [0.0, 1.0, 2.0, 4.0, 5.0]
+        );
+        assert_eq!(got.times("/imu/walk")[0], 1_700_000_000_000_000_000);
+        let notes = got.ingested.notes.join("; ");
+        assert!(
+            notes.contains("1 row has no time and is left out"),
+            "{notes}"
+        );
+
+        let rows = format!("0.01,1,0,9.8\n{none},2,0,9.8\n0.03,3,0,9.8\n");
+        let rows = format!(
+            "Time (s),Acceleration x (m/s^2),Acceleration y (m/s^2),Acceleration z (m/s^2)\n{rows}"
+        );
+        let start = "event,experiment time,system time\nSTART,0.0,1700000000.5\n".to_owned();
+        let files = [("Accelerometer.csv", rows), ("meta/time.csv", start)];
+        let phone = zipped(folder.path(), "phone.zip", &files);
+        let got = ingest(folder.path(), &[phone], None).expect("ingests");
+        assert_eq!(
+            got.times("/imu/phone"),
+            [1_700_000_000_510_000_000, 1_700_000_000_530_000_000]
+        );
+        assert_eq!(got.values("/imu/phone.linear_acceleration.x"), [1.0, 3.0]);
+        let notes = got.ingested.notes.join("; ");
+        assert!(
+            notes.contains("Accelerometer.csv: 1 row has no time and is left out"),
+            "{notes}"
+        );
+    }
+}
+
+#[test]
+fn a_log_of_the_archive_stands_alone() {
+    let folder = folder();
+    let logs = ["a.npz", "b.NPZ"].map(|name| file(folder.path(), name, "PK\x03\x04"));
+    let said = |paths: &[PathBuf], options: ImportOptions<'_>| {
+        let out = folder.path().join("out.mcap");
+        let mut writer = RecordingWriter::create(&out, &WriterOptions::default()).expect("begins");
+        let error = import::ingest(paths, &options, &mut writer)
+            .expect_err("refused")
+            .to_string();
+        error.replace(&format!("{}/", folder.path().display()), "")
+    };
+    let plain = ImportOptions::default();
+    let layout = ImportOptions {
+        layout: Some("nosuch"),
+        ..plain
+    };
+    let late = ImportOptions {
+        sound_start_s: 1.0,
+        ..plain
+    };
+    let text = file(folder.path(), "c.csv", "a\n1\n");
+    for (paths, options, beside) in [
+        (&logs[..], plain, "another log"),
+        (&[text, logs[0].clone()], plain, "another log"),
+        (&logs[..1], layout, "a layout"),
+        (&logs[..1], late, "a start of the sound"),
+    ] {
+        assert_eq!(
+            said(paths, options),
+            format!("a.npz: is a log of the archive, which stands alone; found {beside} beside it")
+        );
+    }
 }

@@ -2,7 +2,7 @@
 //! deg/s behind it.
 
 use super::{
-    Files, ImportError,
+    ImportError,
     date::times_ns,
     imu::{self, Log, STANDARD_GRAVITY, Track},
     table::Table,
@@ -13,24 +13,22 @@ const COLUMNS: [&str; 7] = ["time", "ax", "ay", "az", "gx", "gy", "gz"];
 /// Lengths of the specific force at rest that are one g, in g.
 const ONE_G: std::ops::Range<f64> = 0.8..1.3;
 
-/// The first text whose first row is one of an export.
-pub(super) fn export(files: &Files) -> Option<(&str, &str)> {
-    files.texts().find(|(_, text)| {
-        let first = text.trim_start_matches('\u{feff}').lines().next();
-        let cells: Vec<&str> = first.unwrap_or_default().split(',').collect();
-        let dated = |cell: &str| {
-            // 2025-11-24 16:00:00.000
-            cell.get(..11)
-                .is_some_and(|d| d.chars().filter(|c| *c == '-').count() == 2 && d.ends_with(' '))
-                && cell.matches(':').count() == 2
-        };
-        matches!(cells.len(), 4 | 7)
-            && dated(cells[0])
-            && cells[1..].iter().all(|cell| cell.parse::<f64>().is_ok())
-    })
+/// Whether a text's first row is one of an export.
+pub(super) fn is_export(text: &str) -> bool {
+    let first = text.trim_start_matches('\u{feff}').lines().next();
+    let cells: Vec<&str> = first.unwrap_or_default().split(',').collect();
+    let dated = |cell: &str| {
+        // 2025-11-24 16:00:00.000
+        cell.get(..11)
+            .is_some_and(|d| d.chars().filter(|c| *c == '-').count() == 2 && d.ends_with(' '))
+            && cell.matches(':').count() == 2
+    };
+    matches!(cells.len(), 4 | 7)
+        && dated(cells[0])
+        && cells[1..].iter().all(|cell| cell.parse::<f64>().is_ok())
 }
 
-pub(super) fn read(log: &str, (name, text): (&str, &str)) -> Result<Log, ImportError> {
+pub(super) fn read(name: &str, text: &str) -> Result<Log, ImportError> {
     let mut table = Table::headless(name, text, &COLUMNS)?;
     let turns = table.columns.len() == COLUMNS.len();
     let behind = if turns {
@@ -41,7 +39,7 @@ pub(super) fn read(log: &str, (name, text): (&str, &str)) -> Result<Log, ImportE
     let mut notes = vec![format!(
         "it has no header: taken for an export of Axivity's, a date (UTC), acceleration in g{behind}"
     )];
-    table.drop_cut_row(log, &mut notes);
+    table.drop_cut_row(name, &mut notes);
     let times_ns = times_ns(&table, 0, 1)?;
     let force = table.track(&times_ns, [1, 2, 3], STANDARD_GRAVITY)?;
     let usual_g = imu::usual_length(&force).unwrap_or(0.0) / STANDARD_GRAVITY;
@@ -54,5 +52,5 @@ pub(super) fn read(log: &str, (name, text): (&str, &str)) -> Result<Log, ImportE
         true => table.track(&times_ns, [4, 5, 6], 1f64.to_radians())?,
         false => Track::new(),
     };
-    Ok(Log::join(imu::device_name(log), force, rate, notes))
+    Ok(Log::join(imu::device_name(name), force, rate, notes))
 }

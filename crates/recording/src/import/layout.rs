@@ -5,8 +5,9 @@ use std::path::Path;
 use serde::Deserialize;
 
 use super::{
-    Files, HEADER_LINES, ImportError,
+    ImportError,
     date::times_ns,
+    has_header,
     imu::{self, Log, STANDARD_GRAVITY, Track},
     table::Table,
 };
@@ -123,12 +124,12 @@ pub(super) fn find(name: &str) -> Result<Layout, ImportError> {
         .map_err(|error| problem(format!("is no layout: {}", error.to_string().trim_end())))
 }
 
-/// The built-in layout that fits the files: its header is there, with the columns that it needs.
-pub(super) fn fitting(files: &Files) -> Option<(Layout, &str)> {
+/// The built-in layout that fits a text: its header is there, with the columns that it needs.
+pub(super) fn fitting(text: &str) -> Option<Layout> {
     let built_in = BUILT_IN
         .iter()
         .filter_map(|(_, text)| toml::from_str::<Layout>(text).ok());
-    let mut found = built_in.filter_map(|layout| {
+    let mut found = built_in.filter(|layout| {
         let fits = |line: &str| {
             let needed = [&layout.acceleration, &layout.angular_velocity];
             let mut needed = needed.into_iter().flatten().filter(|v| !v.optional);
@@ -136,10 +137,7 @@ pub(super) fn fitting(files: &Files) -> Option<(Layout, &str)> {
                 && line.contains(&layout.time.column)
                 && needed.all(|v| v.columns.iter().all(|c| line.contains(c)))
         };
-        let (_, text) = files
-            .texts()
-            .find(|(_, text)| text.lines().take(HEADER_LINES).any(fits))?;
-        Some((layout, text))
+        has_header(text, fits)
     });
     found.next()
 }

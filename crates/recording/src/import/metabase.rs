@@ -19,23 +19,14 @@ pub(super) fn is_header(line: &str) -> bool {
 pub(super) fn read(files: &Files) -> Result<Log, ImportError> {
     let mut notes = Vec::new();
     let mut track = |first: &str, unit: &str, factor: f64| {
-        let head = |text: &str| {
+        let head = |_: &str, text: &str| {
             text.lines()
                 .next()
                 .is_some_and(|line| is_header(line) && line.contains(first))
         };
-        let mut found = files.texts().filter(|(_, text)| head(text));
-        let Some((name, text)) = found.next() else {
+        let Some((name, text)) = files.only(first, head)? else {
             return Ok(Track::new());
         };
-        if let Some((other, _)) = found.next() {
-            return Err(ImportError::Content {
-                name: files.name.clone(),
-                problem: format!(
-                    "has two files with {first}, {name} and {other}; expected those of one device: give each device a folder of its own"
-                ),
-            });
-        }
         let mut table = Table::parse(name, text, is_header)?;
         table.drop_cut_row(&files.name, &mut notes);
         let epoch = if table.find("epoch (ms)").is_some() {

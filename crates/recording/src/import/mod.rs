@@ -81,6 +81,8 @@ const MAX_TEXT_BYTES: u64 = 2 << 30;
 struct Files {
     name: String,
     texts: Vec<(String, String)>,
+    /// Names of sounds beside them, which are not read here.
+    sounds: Vec<String>,
 }
 
 impl Files {
@@ -94,17 +96,39 @@ impl Files {
         self.texts().find(|(name, _)| name.ends_with(end))
     }
 
-    /// The first text with such a header.
-    fn with_header(&self, is_header: fn(&str) -> bool) -> Option<(&str, &str)> {
-        self.texts()
-            .find(|(_, text)| text.lines().take(HEADER_LINES).any(is_header))
+    /// The one text that `is` holds for; an error where there are two of `what`, for nothing tells which belongs to the others.
+    fn only(
+        &self,
+        what: &str,
+        is: impl Fn(&str, &str) -> bool,
+    ) -> Result<Option<(&str, &str)>, ImportError> {
+        let mut found = self.texts().filter(|(name, text)| is(name, text));
+        let first = found.next();
+        match (first, found.next()) {
+            (Some((one, _)), Some((other, _))) => Err(self.two(what, one, other)),
+            _ => Ok(first),
+        }
     }
 
-    /// The file of a name, in whatever folder.
-    fn named(&self, file: &str) -> Option<(&str, &str)> {
-        self.texts()
-            .find(|(name, _)| name.rsplit(['/', '\\']).next() == Some(file))
+    /// Two files of what one device has once.
+    fn two(&self, what: &str, one: &str, other: &str) -> ImportError {
+        ImportError::Content {
+            name: self.name.clone(),
+            problem: format!(
+                "has two files with {what}, {one} and {other}; expected those of one device: give each device a folder of its own"
+            ),
+        }
     }
+}
+
+/// The last part of a path in whatever system's writing.
+fn file_name(path: &str) -> &str {
+    path.rsplit(['/', '\\']).next().unwrap_or_default()
+}
+
+/// Whether a line near the text's beginning is such a header.
+fn has_header(text: &str, is_header: impl Fn(&str) -> bool) -> bool {
+    text.lines().take(HEADER_LINES).any(is_header)
 }
 
 /// Turns logs into one recording; `writer` has had no message yet, and the caller finishes it.
@@ -118,11 +142,24 @@ pub fn ingest(
     options: &ImportOptions<'_>,
     writer: &mut RecordingWriter,
 ) -> Result<Ingested, ImportError> {
-    if let [path] = paths
-        && path
-            .extension()
-            .is_some_and(|extension| extension.eq_ignore_ascii_case("npz"))
-    {
+    let is_npz = |path: &&PathBuf| {
+        let extension = path.extension().unwrap_or_default();
+        extension.eq_ignore_ascii_case("npz")
+    };
+    if let Some(path) = paths.iter().find(is_npz) {
+        let beside = [
+            (paths.len() > 1, "another log"),
+            (options.layout.is_some(), "a layout"),
+            (options.sound_start_s != 0.0, "a start of the sound"),
+        ];
+        if let Some((_, beside)) = beside.into_iter().find(|(there, _)| *there) {
+            return Err(ImportError::Content {
+                name: path.display().to_string(),
+                problem: format!(
+                    "is a log of the archive, which stands alone; found {beside} beside it"
+                ),
+            });
+        }
         let messages = npz::ingest(path, writer)?;
         let topics = [
             crate::topics::STATE,
@@ -146,7 +183,7 @@ pub fn ingest(
     }
     let layout = options.layout.map(layout::find).transpose()?;
     let (mut logs, mut sounds) = (Vec::new(), Vec::new());
-    let mut notes = Vec::new();
+    let (mut notes, mut beside) = (Vec::new(), Vec::new());
     let mut metadata: BTreeMap<String, String> = [
         ("version".to_owned(), env!("CARGO_PKG_VERSION").to_owned()),
         ("source".to_owned(), "field".to_owned()),
@@ -166,17 +203,19 @@ pub fn ingest(
             continue;
         }
         wav::refuse(path)?;
-        let log = read(&open(path)?, layout.as_ref())?;
-        if log.samples.is_empty() {
-            let problem = "has a header but no rows; expected at least one sample".to_owned();
-            return Err(ImportError::Content {
-                name: path.display().to_string(),
-                problem,
-            });
+        let files = open(path)?;
+        for log in read(&files, layout.as_ref())? {
+            note(path, &log.name, &log.notes);
+            logs.push(log);
         }
-        note(path, &log.name, &log.notes);
-        logs.push(log);
+        beside.extend(files.sounds.iter().map(|sound| {
+            format!(
+                "{}: {sound} is left out: sound is given as a file of its own",
+                path.display()
+            )
+        }));
     }
+    notes.extend(beside);
     notes.extend(undated(&logs));
     notes.extend(halves(&logs));
     let first_ns = logs
@@ -267,7 +306,16 @@ fn write(
 struct Format {
     name: &'static str,
     is_header: fn(&str) -> bool,
-    read: fn(&Files) -> Result<imu::Log, ImportError>,
+    device: Device,
+}
+
+/// What holds a device.
+#[derive(Clone, Copy)]
+enum Device {
+    /// All files of a folder or zip.
+    Folder(fn(&Files) -> Result<imu::Log, ImportError>),
+    /// Each file, by name and text.
+    File(fn(&str, &str) -> Result<imu::Log, ImportError>),
 }
 
 /// The kinds of log that are known without a layout; a file that fits two is of the first.
@@ -275,61 +323,133 @@ const FORMATS: &[Format] = &[
     Format {
         name: "Sensor Logger",
         is_header: sensor_logger::is_header,
-        read: sensor_logger::read,
+        device: Device::Folder(sensor_logger::read),
     },
     Format {
         name: "phyphox",
         is_header: phyphox::is_header,
-        read: phyphox::read,
+        device: Device::Folder(phyphox::read),
     },
     Format {
         name: "Movella DOT / Xsens",
         is_header: xsens::is_header,
-        read: xsens::read,
+        device: Device::File(xsens::read),
     },
     Format {
         name: "Shimmer",
         is_header: shimmer::is_header,
-        read: shimmer::read,
+        device: Device::File(shimmer::read),
     },
     Format {
         name: "MetaBase",
         is_header: metabase::is_header,
-        read: metabase::read,
+        device: Device::Folder(metabase::read),
     },
 ];
 
 /// A header stands among so many first lines.
 const HEADER_LINES: usize = 50;
 
-fn read(files: &Files, layout: Option<&layout::Layout>) -> Result<imu::Log, ImportError> {
-    if let Some(layout) = layout {
-        let (_, text) = files.texts().next().unwrap_or(("", ""));
-        return layout::read(layout, &files.name, text);
-    }
-    if let Some(format) = FORMATS
+/// The devices of a file, folder or zip, none of them empty.
+fn read(files: &Files, layout: Option<&layout::Layout>) -> Result<Vec<imu::Log>, ImportError> {
+    let folders: Vec<_> = FORMATS
         .iter()
-        .find(|f| files.with_header(f.is_header).is_some())
-    {
-        return (format.read)(files);
+        .filter_map(|format| match format.device {
+            Device::Folder(read) if layout.is_none() => Some((format.is_header, read)),
+            _ => None,
+        })
+        .filter(|(is_header, _)| files.texts().any(|(_, text)| has_header(text, *is_header)))
+        .collect();
+    let (mut devices, mut others) = (Vec::new(), Vec::new());
+    for &(_, read) in &folders {
+        let read: Reader = Box::new(move |_, _| read(files));
+        devices.push((files.name.as_str(), "", read));
     }
-    if let Some((layout, text)) = layout::fitting(files) {
-        return layout::read(&layout, &files.name, text);
+    for (name, text) in files.texts() {
+        if folders
+            .iter()
+            .any(|(is_header, _)| has_header(text, *is_header))
+        {
+            continue;
+        }
+        match layout {
+            Some(layout) => {
+                let read: Reader = Box::new(|name, text| layout::read(layout, name, text));
+                devices.push((name, text, read));
+            }
+            None => match reader(text) {
+                Some(read) => devices.push((name, text, read)),
+                None => others.push(file_name(name)),
+            },
+        }
+    }
+    if devices.is_empty() {
+        return Err(unknown(files));
+    }
+    let is_alone = devices.len() == 1;
+    let mut logs = Vec::new();
+    for (name, text, read) in devices {
+        // What is alone is called as the folder or zip that it is in.
+        let name = if is_alone { &files.name } else { name };
+        let mut log = read(name, text)?;
+        if log.samples.is_empty() {
+            return Err(ImportError::Content {
+                name: name.to_owned(),
+                problem: "has a header but no rows; expected at least one sample".to_owned(),
+            });
+        }
+        if !is_alone {
+            for note in &mut log.notes {
+                *note = format!("{}: {note}", file_name(name));
+            }
+        }
+        logs.push(log);
+    }
+    // Apps put other tables beside theirs.
+    if folders.is_empty() && !others.is_empty() {
+        logs[0].notes.push(format!(
+            "of no kind that is known, and left out: {}",
+            others.join(", ")
+        ));
+    }
+    Ok(logs)
+}
+
+/// Reads a device's file, by name and text.
+type Reader<'a> = Box<dyn Fn(&str, &str) -> Result<imu::Log, ImportError> + 'a>;
+
+/// Who reads a file that is a device of its own.
+fn reader(text: &str) -> Option<Reader<'static>> {
+    let of_format = |format: &Format| match format.device {
+        Device::File(read) if has_header(text, format.is_header) => Some(Box::new(read) as Reader),
+        _ => None,
+    };
+    if let Some(read) = FORMATS.iter().find_map(of_format) {
+        return Some(read);
+    }
+    if let Some(layout) = layout::fitting(text) {
+        return Some(Box::new(move |name, text| {
+            layout::read(&layout, name, text)
+        }));
     }
     // Without a header to know it by, it comes last.
-    if let Some(export) = axivity::export(files) {
-        return axivity::read(&files.name, export);
+    axivity::is_export(text).then(|| Box::new(axivity::read) as Reader)
+}
+
+/// Says that no file is of a kind that is known.
+fn unknown(files: &Files) -> ImportError {
+    let content = |problem| ImportError::Content {
+        name: files.name.clone(),
+        problem,
+    };
+    if files.texts.is_empty() {
+        return content("has no CSV in it; expected a log".to_owned());
     }
     let head = |(_, text): (&str, &str)| {
         let line = text.lines().next().unwrap_or_default();
         format!("{:?}", line.chars().take(120).collect::<String>())
     };
     let heads: Vec<String> = files.texts().take(8).map(head).collect();
-    let found = if heads.is_empty() {
-        "no CSV".to_owned()
-    } else {
-        heads.join(", ")
-    };
     let layouts = layout::BUILT_IN.iter().map(|(name, _)| *name);
     let known: Vec<&str> = FORMATS
         .iter()
@@ -337,14 +457,11 @@ fn read(files: &Files, layout: Option<&layout::Layout>) -> Result<imu::Log, Impo
         .chain(layouts)
         .chain([axivity::NAME])
         .collect();
-    let problem = format!(
-        "is no log of {}, and no layout is given; found {found}",
-        known.join(", ")
-    );
-    Err(ImportError::Content {
-        name: files.name.clone(),
-        problem,
-    })
+    content(format!(
+        "is no log of {}, and no layout is given; found {}",
+        known.join(", "),
+        heads.join(", ")
+    ))
 }
 
 /// Reads the texts of a file, folder or zip.
@@ -371,7 +488,15 @@ fn open(path: &Path) -> Result<Files, ImportError> {
         })?;
         Ok(decoded(bytes))
     };
-    let mut texts = Vec::new();
+    let (mut texts, mut sounds) = (Vec::new(), Vec::new());
+    let mut is_log = |name: &str| {
+        // Hidden files are a system's own: macOS puts one beside each file of a zip.
+        let is_hidden = file_name(name).starts_with('.');
+        if !is_hidden && wav::is_named(name) {
+            sounds.push(file_name(name).to_owned());
+        }
+        !is_hidden && is_text(name)
+    };
     if path.is_dir() {
         // Apps put at most one level of folders (`meta`) beside their tables.
         for folder in [path.to_owned(), path.join("meta")] {
@@ -383,16 +508,21 @@ fn open(path: &Path) -> Result<Files, ImportError> {
                 .collect::<Result<Vec<_>, _>>()
                 .map_err(io)?;
             entries.sort_by_key(fs::DirEntry::file_name);
-            for entry in entries
-                .iter()
-                .filter(|entry| is_text(&entry.file_name().to_string_lossy()))
-            {
+            for entry in entries {
+                let entry_name = entry.file_name().to_string_lossy().into_owned();
+                if !is_log(&entry_name) {
+                    continue;
+                }
                 let what = entry.path().display().to_string();
                 let mut file = fs::File::open(entry.path()).map_err(io)?;
                 texts.push((what.clone(), text(&mut file, &what)?));
             }
         }
-        return Ok(Files { name, texts });
+        return Ok(Files {
+            name,
+            texts,
+            sounds,
+        });
     }
     let mut file = fs::File::open(path).map_err(io)?;
     let mut head = Vec::new();
@@ -412,20 +542,28 @@ fn open(path: &Path) -> Result<Files, ImportError> {
             if entry_name == "xl/workbook.xml" {
                 return Err(content(format!("is {}", foreign::EXCEL)));
             }
-            if !is_text(&entry_name) {
+            if !is_log(&entry_name) {
                 continue;
             }
             let read = text(&mut entry, &entry_name)?;
             texts.push((entry_name, read));
         }
-        return Ok(Files { name, texts });
+        return Ok(Files {
+            name,
+            texts,
+            sounds,
+        });
     }
     let read = text(&mut file, "it")?;
     if read.trim().is_empty() {
         return Err(content("is empty; expected a log".to_owned()));
     }
     texts.push((name.clone(), read));
-    Ok(Files { name, texts })
+    Ok(Files {
+        name,
+        texts,
+        sounds,
+    })
 }
 
 /// UTF-8; UTF-16 by its byte order mark, as spreadsheets write it; or else Latin-1.

@@ -30,7 +30,7 @@ pub(super) fn read(files: &Files) -> Result<Log, ImportError> {
         Some((name, text)) => starts(name, text, &mut notes)?,
         None => Vec::new(),
     };
-    let mut tracks: [Track; 3] = Default::default();
+    let mut tracks: [(&str, Track); 3] = Default::default();
     let (mut seen, mut known) = (Vec::new(), false);
     for (name, text) in files.texts() {
         if name.contains("meta/") || !text.lines().next().is_some_and(is_header) {
@@ -39,15 +39,25 @@ pub(super) fn read(files: &Files) -> Result<Log, ImportError> {
         let mut table = Table::parse(name, text, is_header)?;
         table.drop_cut_row(&files.name, &mut notes);
         seen.extend(table.columns.iter().cloned());
-        for ((sensor, unit), track) in SENSORS.iter().zip(&mut tracks) {
+        let mut untimed = 0;
+        for ((sensor, unit), (from, track)) in SENSORS.iter().zip(&mut tracks) {
             let names = ["x", "y", "z"].map(|axis| format!("{sensor} {axis} ({unit})"));
-            if track.is_empty() && table.find(&names[0]).is_some() {
-                known = true;
-                *track = read_track(&table, [&names[0], &names[1], &names[2]], &starts)?;
+            if table.find(&names[0]).is_none() {
+                continue;
+            }
+            known = true;
+            let found = read_track(&table, names.each_ref().map(String::as_str), &starts)?;
+            untimed = table.len() - found.len();
+            if !track.is_empty() && !found.is_empty() {
+                return Err(files.two(&names[0], from, name));
+            }
+            if track.is_empty() {
+                (*from, *track) = (name, found);
             }
         }
+        table.note_untimed(untimed as u64, &files.name, &mut notes);
     }
-    let [with_gravity, without, rate] = tracks;
+    let [with_gravity, without, rate] = tracks.map(|(_, track)| track);
     if starts.is_empty() {
         notes.push("there is no meta/time.csv: times begin at 0, not at a date".to_owned());
     }
@@ -84,12 +94,20 @@ fn starts(name: &str, text: &str, notes: &mut Vec<String>) -> Result<Vec<(f64, f
     let mut starts = Vec::new();
     for row in 0..table.len() {
         if table.text(row, event).eq_ignore_ascii_case("START") {
-            starts.push((table.number(row, experiment)?, table.number(row, system)?));
+            let start = (table.number(row, experiment)?, table.number(row, system)?);
+            if !start.0.is_finite() {
+                return Err(table.problem(format!(
+                    "has a START without an experiment time in row {}; expected seconds",
+                    row + 1
+                )));
+            }
+            starts.push(start);
         }
     }
     Ok(starts)
 }
 
+/// The rows that have a time.
 fn read_track(
     table: &Table,
     names: [&str; 3],
@@ -100,6 +118,9 @@ fn read_track(
     let mut track = Track::new();
     for row in 0..table.len() {
         let t_s = table.number(row, time)?;
+        if t_s.is_nan() {
+            continue;
+        }
         // The last START before the sample; a sample a hair before the first belongs to it.
         let start = starts
             .iter()
@@ -109,7 +130,7 @@ fn read_track(
         let t_ns = match start {
             // The parts are rounded one by one: a UNIX time in seconds has no digits left for nanoseconds.
             Some((experiment, system)) => imu::nanoseconds(*system)
-                .map(|base| base + ((t_s - experiment) * 1e9).round() as i64),
+                .and_then(|base| base.checked_add(((t_s - experiment) * 1e9).round() as i64)),
             None => imu::nanoseconds(t_s),
         };
         let Some(t_ns) = t_ns else {

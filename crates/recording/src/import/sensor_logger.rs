@@ -4,10 +4,8 @@
 //! `TotalAcceleration`, or else accelerometer plus gravity. iOS without the app's 'standardisation' has the opposite sign on all axes, and
 //! counts uncalibrated accelerations in g.
 
-use crate::text::counted;
-
 use super::{
-    Files, ImportError,
+    Files, ImportError, file_name,
     imu::{self, Log, STANDARD_GRAVITY, Track},
     table::Table,
 };
@@ -24,7 +22,7 @@ pub(super) fn read(files: &Files) -> Result<Log, ImportError> {
     let mut notes = Vec::new();
     let flipped = flipped(files, &mut notes)?;
     let mut cut = Vec::new();
-    let mut track = |sensor: &str| match files.named(sensor) {
+    let mut track = |sensor: &str| match named(files, sensor)? {
         Some((name, text)) => read_track(name, text, &files.name, &mut cut),
         None => Ok(Track::new()),
     };
@@ -55,7 +53,7 @@ pub(super) fn read(files: &Files) -> Result<Log, ImportError> {
     };
     // At rest a force of 1 is one g, a force of 9.8 is metres per second squared.
     if imu::usual_length(&force).is_some_and(|length| (0.8..1.3).contains(&length))
-        && files.named("Accelerometer.csv").is_none()
+        && named(files, "Accelerometer.csv")?.is_none()
     {
         notes.push("accelerations were in g".to_owned());
         for (_, value) in &mut force {
@@ -86,9 +84,16 @@ pub(super) fn read(files: &Files) -> Result<Log, ImportError> {
     Ok(Log::join(imu::device_name(&files.name), force, rate, notes))
 }
 
+/// The file of a name, in whatever folder of a zip.
+fn named<'a>(files: &'a Files, file: &str) -> Result<Option<(&'a str, &'a str)>, ImportError> {
+    files.only(&format!("the name {file}"), |name, _| {
+        file_name(name) == file
+    })
+}
+
 /// Whether the signs must be turned: iOS without standardisation.
 fn flipped(files: &Files, notes: &mut Vec<String>) -> Result<bool, ImportError> {
-    let Some((name, text)) = files.named("Metadata.csv") else {
+    let Some((name, text)) = named(files, "Metadata.csv")? else {
         notes.push("there is no Metadata.csv: signs are taken to be Android's".to_owned());
         return Ok(false);
     };
@@ -127,16 +132,20 @@ fn read_track(
     let (mut track, mut untimed) = (Track::new(), 0);
     let mut ends: Option<[(i64, f64); 2]> = None;
     for row in 0..table.len() {
-        if table.text(row, time).is_empty() {
-            untimed += 1;
-            continue;
-        }
         // Nanoseconds since 1970 have more digits than a double holds.
         let t_ns = match table.text(row, time).parse::<i64>() {
             Ok(t_ns) => t_ns,
-            Err(_) => table.number(row, time)? as i64,
+            Err(_) => {
+                let t_ns = table.number(row, time)?;
+                if t_ns.is_nan() {
+                    untimed += 1;
+                    continue;
+                }
+                t_ns as i64
+            }
         };
-        if t_ns < 0 {
+        // What is too large became the largest.
+        if !(0..i64::MAX).contains(&t_ns) {
             return Err(table.problem(format!(
                 "has the time {t_ns} in row {}; expected nanoseconds since 1970",
                 row + 1
@@ -148,14 +157,7 @@ fn read_track(
             ends = Some([ends.map_or(here, |ends| ends[0]), here]);
         }
     }
-    if untimed > 0 {
-        let rows = counted(
-            untimed,
-            "row has no time and is",
-            "rows have no time and are",
-        );
-        notes.push(format!("{name}: {rows} left out"));
-    }
+    table.note_untimed(untimed, log, notes);
     if let Some([(from_ns, from_s), (to_ns, to_s)]) = ends
         && track.is_sorted_by_key(|(t_ns, _)| *t_ns)
     {

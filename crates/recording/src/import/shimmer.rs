@@ -5,7 +5,7 @@
 //! force in m/s²: the low-noise one (`LN`) ends at 2 g, which a step can pass, the wide-range one (`WR`) does not.
 
 use super::{
-    Files, ImportError,
+    ImportError,
     date::times_ns,
     imu::{self, Log, STANDARD_GRAVITY, Track},
     table::Table,
@@ -27,12 +27,11 @@ pub(super) fn is_header(line: &str) -> bool {
     line.contains("_CAL") && TIMES.iter().any(|end| line.contains(end))
 }
 
-pub(super) fn read(files: &Files) -> Result<Log, ImportError> {
-    let (_, text) = files.with_header(is_header).unwrap_or_default();
-    let mut table = Table::parse(&files.name, text, is_header)?;
+pub(super) fn read(name: &str, text: &str) -> Result<Log, ImportError> {
+    let mut table = Table::parse(name, text, is_header)?;
     let mut notes = Vec::new();
     let units = table.take_units();
-    table.drop_cut_row(&files.name, &mut notes);
+    table.drop_cut_row(name, &mut notes);
     let ends = |end: &str| table.columns.iter().position(|name| name.ends_with(end));
     // The header has one of them.
     let time = TIMES.iter().find_map(|end| ends(end)).unwrap_or_default();
@@ -99,5 +98,5 @@ pub(super) fn read(files: &Files) -> Result<Log, ImportError> {
             table.listed()
         )));
     }
-    Ok(Log::join(imu::device_name(&files.name), force, rate, notes))
+    Ok(Log::join(imu::device_name(name), force, rate, notes))
 }

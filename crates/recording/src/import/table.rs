@@ -3,6 +3,7 @@
 use std::borrow::Cow;
 
 use super::{ImportError, imu::Track};
+use crate::text::counted;
 
 /// How programs write a value that is missing.
 const NOTHING: [&str; 7] = ["null", "none", "na", "n/a", "∞", "+∞", "-∞"];
@@ -116,16 +117,29 @@ impl Table {
         if found >= expected {
             return;
         }
-        let file = if self.name == log {
-            String::new()
-        } else {
-            format!("{}: ", self.name)
-        };
+        let file = self.told_in(log);
         let line = self.line(self.rows.len() - 1);
         notes.push(format!(
             "{file}line {line}, the last, has {found} of {expected} cells: it was cut off and is left out"
         ));
         self.rows.pop();
+    }
+
+    /// Notes how many rows were left out for want of a time.
+    pub fn note_untimed(&self, rows: u64, log: &str, notes: &mut Vec<String>) {
+        if rows > 0 {
+            let one = "row has no time and is";
+            let rows = counted(rows, one, "rows have no time and are");
+            notes.push(format!("{}{rows} left out", self.told_in(log)));
+        }
+    }
+
+    /// How a note of `log` about this table begins.
+    fn told_in(&self, log: &str) -> String {
+        match self.name == log {
+            true => String::new(),
+            false => format!("{}: ", self.name),
+        }
     }
 
     /// Takes out the row under the header where that tells units: it has no number in it.

@@ -9,7 +9,7 @@
 //! with `//`.
 
 use super::{
-    Files, ImportError,
+    ImportError,
     imu::{self, Log, STANDARD_GRAVITY, Sample},
     table::Table,
 };
@@ -19,9 +19,7 @@ pub(super) fn is_header(line: &str) -> bool {
     line.contains("SampleTimeFine")
 }
 
-pub(super) fn read(files: &Files) -> Result<Log, ImportError> {
-    let name = files.name.as_str();
-    let (_, text) = files.with_header(is_header).unwrap_or_default();
+pub(super) fn read(name: &str, text: &str) -> Result<Log, ImportError> {
     let mut table = Table::parse(name, text, is_header)?;
     let mut notes = Vec::new();
     table.drop_cut_row(name, &mut notes);
