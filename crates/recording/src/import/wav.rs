@@ -1,4 +1,4 @@
-//! Sound from WAV files, as any recorder writes them: PCM of 8 to 32 bits or floating point of 32 or 64, any rate, any number of channels.
+//! Sound from WAV files, as any recorder writes them: PCM of 8 to 32 bits or 32-bit float, any rate, any number of channels.
 //!
 //! Sound becomes `foxglove.RawAudio` (16-bit PCM) in blocks of a tenth of a second. A WAV file does not know when it began.
 //!
@@ -7,9 +7,11 @@
 
 use std::{
     fs::File,
-    io::{self, BufReader, Read as _, Seek as _, SeekFrom},
+    io::{self, BufReader, Chain, Cursor, Read as _, Seek as _, SeekFrom},
     path::Path,
 };
+
+use hound::{SampleFormat, WavIntoSamples, WavReader, WavSpec};
 
 use super::{ImportError, imu::device_name};
 use crate::schema::foxglove::RawAudio;
@@ -32,7 +34,7 @@ pub(super) struct Sound {
     pub start_ns: i64,
     /// What was decided on the way.
     pub notes: Vec<String>,
-    spec: Spec,
+    spec: WavSpec,
     /// Frames that the head promises, and as many of them as the file can hold.
     promised: u32,
     frames: u32,
@@ -41,83 +43,15 @@ pub(super) struct Sound {
     found: u32,
     /// Bytes behind the sound that belong to no chunk.
     behind: u64,
-    /// Stands at the next block.
-    file: BufReader<File>,
+    samples: Samples,
 }
 
-/// How sound is written down.
-#[derive(Clone, Copy, Debug)]
-struct Spec {
-    float: bool,
-    channels: u16,
-    rate: u32,
-    bits: u16,
-    /// Bytes of a sample: more than its bits need where it is padded.
-    bytes: u16,
-}
+/// A head that tells the length that was found, and the sound behind it.
+type Source = Chain<Cursor<Vec<u8>>, BufReader<File>>;
 
-impl Spec {
-    /// Reads the chunk `fmt `; says what is wrong with it.
-    fn read(chunk: &[u8]) -> Result<Self, String> {
-        let field = |at: usize| Some(u16::from_le_bytes(*chunk.get(at..)?.first_chunk()?));
-        let (Some(mut format), Some(channels), Some(align), Some(bits)) =
-            (field(0), field(2), field(12), field(14))
-        else {
-            return Err(format!(
-                "is no WAV file: its chunk `fmt ` has {} bytes; expected 16 or more",
-                chunk.len()
-            ));
-        };
-        // WAVE_FORMAT_EXTENSIBLE tells the format later, in the first bytes of a GUID.
-        if let (0xfffe, Some(told)) = (format, field(24)) {
-            format = told;
-        }
-        let rate = u32::from_le_bytes([chunk[4], chunk[5], chunk[6], chunk[7]]);
-        if channels == 0 || rate == 0 {
-            return Err(format!(
-                "has {channels} channels at {rate} Hz; expected one or more at 4000 Hz or more"
-            ));
-        }
-        let bytes = (align / channels).max(bits.div_ceil(8));
-        let float = match (format, bytes) {
-            (1, 1..=4) => false,
-            (3, 4 | 8) => true,
-            _ => {
-                return Err(format!(
-                    "holds {bits}-bit sound of format {format:#06x}; expected PCM (0x0001) of 8 to 32 bits or floating point (0x0003) of 32 or 64"
-                ));
-            }
-        };
-        Ok(Spec {
-            float,
-            channels,
-            rate,
-            bits,
-            bytes,
-        })
-    }
-
-    /// Bytes of a frame, a sample of each channel.
-    fn frame_bytes(self) -> u64 {
-        u64::from(self.channels) * u64::from(self.bytes)
-    }
-
-    /// A sample in 16 bits.
-    fn sample(self, bytes: &[u8]) -> i16 {
-        let scaled = |x: f64| match x.is_finite() {
-            true => (x * 32767.0).round().clamp(-32768.0, 32767.0) as i16,
-            false => 0,
-        };
-        match *bytes {
-            [a, b, c, d] if self.float => scaled(f32::from_le_bytes([a, b, c, d]).into()),
-            [a, b, c, d, e, f, g, h] => scaled(f64::from_le_bytes([a, b, c, d, e, f, g, h])),
-            // Eight bits have no sign: silence is 128.
-            [x] => (i16::from(x) - 128) << 8,
-            // What is padded is padded below.
-            [.., low, high] => i16::from_le_bytes([low, high]),
-            [] => 0,
-        }
-    }
+enum Samples {
+    Whole(WavIntoSamples<Source, i32>),
+    Float(WavIntoSamples<Source, f32>),
 }
 
 /// The name and length of the chunk that begins at a place; `None` where none does.
@@ -243,7 +177,14 @@ impl Sound {
         };
         let mut file = BufReader::new(File::open(path).map_err(io)?);
         let (fmt, at, told) = chunks(&mut file).map_err(io)?.map_err(content)?;
-        let spec = Spec::read(&fmt).map_err(content)?;
+        let Some([low, high, _, _]) = fmt.get(12..16) else {
+            return Err(content(format!(
+                "is no WAV file: its chunk `fmt ` has {} bytes; expected 16 or more",
+                fmt.len()
+            )));
+        };
+        // Bytes of a frame, a sample of each channel.
+        let frame_bytes = u64::from(u16::from_le_bytes([*low, *high])).max(1);
         let begin = at + 8;
         let file_bytes = file.seek(SeekFrom::End(0)).map_err(io)?;
         let there = file_bytes.saturating_sub(begin);
@@ -253,30 +194,55 @@ impl Sound {
             _ => told >= UNKNOWN_LENGTH && u64::from(told) > there,
         };
         let promised = if is_unknown { there } else { told.into() };
-        let frames = |bytes: u64| u32::try_from(bytes / spec.frame_bytes()).unwrap_or(u32::MAX);
+        let frames = |bytes: u64| u32::try_from(bytes / frame_bytes).unwrap_or(u32::MAX);
         let held = frames(promised.min(there));
         if held == 0 {
             return Err(content(
                 "has a head but no sound; expected at least one sample".to_owned(),
             ));
         }
-        let mut notes = Vec::new();
-        if is_unknown {
-            notes.push(format!(
-                "its head does not tell how long the sound is: the {:.1} s behind it are taken",
-                f64::from(held) / f64::from(spec.rate)
-            ));
-        }
-        if spec.float {
-            notes.push("sound in floating point became 16-bit, full scale at ±1".to_owned());
-        } else if spec.bits != 16 {
-            notes.push(format!("{}-bit sound became 16-bit", spec.bits));
-        }
         let behind = match promised < there {
             true => bytes_behind(&mut file, at, told, file_bytes).map_err(io)?,
             false => 0,
         };
         file.seek(SeekFrom::Start(begin)).map_err(io)?;
+        // OK because what is longer than 4 GB is read as far as a head can say.
+        let length = (u64::from(held) * frame_bytes)
+            .min(u64::from(u32::MAX) / frame_bytes * frame_bytes) as u32;
+        let reader = WavReader::new(Cursor::new(head(&fmt, length)).chain(file)).map_err(|error| {
+            let number = |at: usize| u16::from_le_bytes([fmt[at], fmt[at + 1]]);
+            content(format!(
+                "holds {}-bit sound of format {:#06x}: {error}; expected PCM (0x0001) of 8 to 32 bits or floating point (0x0003) of 32",
+                number(14),
+                number(0)
+            ))
+        })?;
+        let spec = reader.spec();
+        if spec.channels == 0 || spec.sample_rate == 0 {
+            return Err(content(format!(
+                "has {} channels at {} Hz; expected one or more at 4000 Hz or more",
+                spec.channels, spec.sample_rate
+            )));
+        }
+        let mut notes = Vec::new();
+        if is_unknown {
+            notes.push(format!(
+                "its head does not tell how long the sound is: the {:.1} s behind it are taken",
+                f64::from(held) / f64::from(spec.sample_rate)
+            ));
+        }
+        let samples = match spec.sample_format {
+            SampleFormat::Int => {
+                if spec.bits_per_sample != 16 {
+                    notes.push(format!("{}-bit sound became 16-bit", spec.bits_per_sample));
+                }
+                Samples::Whole(reader.into_samples())
+            }
+            SampleFormat::Float => {
+                notes.push("sound in floating point became 16-bit, full scale at ±1".to_owned());
+                Samples::Float(reader.into_samples())
+            }
+        };
         Ok(Self {
             name: device_name(&name),
             start_ns: 0,
@@ -287,13 +253,13 @@ impl Sound {
             asked: 0,
             found: 0,
             behind,
-            file,
+            samples,
         })
     }
 
     /// When each block begins, ns since 1970.
     pub fn block_times(&self) -> impl Iterator<Item = i64> + use<> {
-        let (start_ns, rate) = (self.start_ns, u64::from(self.spec.rate));
+        let (start_ns, rate) = (self.start_ns, u64::from(self.spec.sample_rate));
         let at = move |frame: u32| {
             start_ns.saturating_add((u64::from(frame) * 1_000_000_000 / rate) as i64)
         };
@@ -302,12 +268,12 @@ impl Sound {
 
     /// Frames in a block.
     fn length(&self) -> u32 {
-        (self.spec.rate / BLOCKS_PER_S).max(1)
+        (self.spec.sample_rate / BLOCKS_PER_S).max(1)
     }
 
     /// What the file lacks, or has and does not account for, once every block was asked for.
     pub fn loss(&self) -> Option<String> {
-        let seconds = |frames: u32| f64::from(frames) / f64::from(self.spec.rate);
+        let seconds = |frames: u32| f64::from(frames) / f64::from(self.spec.sample_rate);
         if self.found < self.promised {
             return Some(format!(
                 "its head promises {:.1} s of sound, {:.1} s are there",
@@ -328,22 +294,54 @@ impl Sound {
     pub fn block(&mut self, t_ns: i64) -> Option<RawAudio> {
         let frames = self.length().min(self.frames - self.asked);
         self.asked += frames;
-        let frame_bytes = self.spec.frame_bytes();
-        let mut bytes = Vec::new();
-        // What cannot be read is missing, and told as that.
-        let wanted = u64::from(frames) * frame_bytes;
-        let _ = self.file.by_ref().take(wanted).read_to_end(&mut bytes);
+        let mut data = Vec::with_capacity(2 * frames as usize * usize::from(self.spec.channels));
+        let shift = i32::from(self.spec.bits_per_sample) - 16;
+        for _ in 0..frames * u32::from(self.spec.channels) {
+            let sample = match &mut self.samples {
+                Samples::Whole(samples) => match samples.next() {
+                    Some(Ok(x)) if shift >= 0 => (x >> shift) as i16,
+                    // OK because fewer than 16 bits shifted up are 16.
+                    Some(Ok(x)) => (x << -shift) as i16,
+                    _ => break,
+                },
+                Samples::Float(samples) => match samples.next() {
+                    Some(Ok(x)) if x.is_finite() => {
+                        (x * 32767.0).round().clamp(-32768.0, 32767.0) as i16
+                    }
+                    Some(Ok(_)) => 0,
+                    _ => break,
+                },
+            };
+            data.extend(sample.to_le_bytes());
+        }
         // A frame that lacks a channel is none.
-        bytes.truncate(bytes.len() - bytes.len() % frame_bytes as usize);
+        let frame_bytes = 2 * usize::from(self.spec.channels);
+        data.truncate(data.len() - data.len() % frame_bytes);
         // OK because a block is a tenth of a second.
-        self.found += (bytes.len() as u64 / frame_bytes) as u32;
-        let samples = bytes.chunks_exact(self.spec.bytes.into());
-        let data: Vec<u8> = samples
-            .flat_map(|sample| self.spec.sample(sample).to_le_bytes())
-            .collect();
-        (!data.is_empty())
-            .then(|| RawAudio::pcm_s16(t_ns, data, self.spec.rate, self.spec.channels.into()))
+        self.found += (data.len() / frame_bytes) as u32;
+        (!data.is_empty()).then(|| {
+            RawAudio::pcm_s16(t_ns, data, self.spec.sample_rate, self.spec.channels.into())
+        })
     }
+}
+
+/// A head for `length` bytes of sound as `fmt` says it is written. What extends the first 16 bytes by less than an extensible format says nothing more.
+fn head(fmt: &[u8], length: u32) -> Vec<u8> {
+    let fmt = if fmt.len() < 40 { &fmt[..16] } else { fmt };
+    // No reader looks at the first size.
+    let sizes = [0, fmt.len() as u32, length].map(u32::to_le_bytes);
+    let [riff, of_fmt, of_data] = &sizes;
+    [
+        b"RIFF",
+        &riff[..],
+        b"WAVE",
+        b"fmt ",
+        of_fmt,
+        fmt,
+        b"data",
+        of_data,
+    ]
+    .concat()
 }
 
 /// Bytes behind the sound and its chunks that are neither a chunk nor padding.
