@@ -723,7 +723,7 @@ fn each_handle_keeps_its_own_compression() {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("twelve.mcap");
     log_of(
-        &scene_of("eight-carriers carriers.count=12 duration_s=30"),
+        &scene_of("eight-carriers carriers.along_poles.count=12 duration_s=30"),
         &path,
         &|_| true,
     );

@@ -632,7 +632,7 @@ fn energies<'a>(
             continue;
         };
         if let Some(line) = Line::new(
-            name.split(" about")
+            name.split(" since")
                 .next()
                 .unwrap_or(name)
                 .replace(' ', "_"),
