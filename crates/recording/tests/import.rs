@@ -1195,12 +1195,24 @@ fn a_folder_of_several_devices_gives_each_a_topic() {
     file(&laid, "b.csv", x_io);
     let got = read(std::slice::from_ref(&laid), Some("x-io")).expect("ingests");
     assert_eq!(got.ingested.topics, topics(&["a", "b"]));
+    // What the layout does not fit is left out beside what it fits, and else says what it lacks.
     file(&laid, "c.csv", "Time (s),gyro\n1,2\n");
+    let got = read(std::slice::from_ref(&laid), Some("x-io")).expect("ingests");
+    assert_eq!(got.ingested.topics, topics(&["a", "b"]));
+    let told = got
+        .ingested
+        .notes
+        .iter()
+        .any(|n| n.ends_with("left out: c.csv"));
+    assert!(told, "{:?}", got.ingested.notes);
+    for fits in ["a.csv", "b.csv"] {
+        fs::remove_file(laid.join(fits)).expect("removes");
+    }
     let refused = read(std::slice::from_ref(&laid), Some("x-io"))
         .err()
         .expect("refused");
     assert!(
-        refused.to_string().contains("c.csv: lacks the columns"),
+        refused.to_string().contains("lacks the columns"),
         "{refused}"
     );
     fs::remove_dir_all(&laid).expect("removes");

@@ -129,17 +129,19 @@ pub(super) fn fitting(text: &str) -> Option<Layout> {
     let built_in = BUILT_IN
         .iter()
         .filter_map(|(_, text)| toml::from_str::<Layout>(text).ok());
-    let mut found = built_in.filter(|layout| {
-        let fits = |line: &str| {
-            let needed = [&layout.acceleration, &layout.angular_velocity];
-            let mut needed = needed.into_iter().flatten().filter(|v| !v.optional);
-            layout.is_header(line)
-                && line.contains(&layout.time.column)
-                && needed.all(|v| v.columns.iter().all(|c| line.contains(c)))
-        };
-        has_header(text, fits)
-    });
+    let mut found = built_in.filter(|layout| fits(layout, text));
     found.next()
+}
+
+/// Whether a text has the header, with the columns that a layout needs.
+pub(super) fn fits(layout: &Layout, text: &str) -> bool {
+    has_header(text, |line| {
+        let needed = [&layout.acceleration, &layout.angular_velocity];
+        let mut needed = needed.into_iter().flatten().filter(|v| !v.optional);
+        layout.is_header(line)
+            && line.contains(&layout.time.column)
+            && needed.all(|v| v.columns.iter().all(|c| line.contains(c)))
+    })
 }
 
 fn factor(vector: &Vector, units: &[(&str, f64)], name: &str) -> Result<f64, ImportError> {

@@ -365,6 +365,8 @@ fn read(files: &Files, layout: Option<&layout::Layout>) -> Result<Vec<imu::Log>,
         let read: Reader = Box::new(move |_, _| read(files));
         devices.push((files.name.as_str(), "", read));
     }
+    let fits = |text: &str| layout.is_some_and(|layout| layout::fits(layout, text));
+    let any_fits = files.texts().any(|(_, text)| fits(text));
     for (name, text) in files.texts() {
         if folders
             .iter()
@@ -373,6 +375,8 @@ fn read(files: &Files, layout: Option<&layout::Layout>) -> Result<Vec<imu::Log>,
             continue;
         }
         match layout {
+            Some(_) if any_fits && !fits(text) => others.push(file_name(name)),
+            // Where none fits, the first says what it lacks.
             Some(layout) => {
                 let read: Reader = Box::new(|name, text| layout::read(layout, name, text));
                 devices.push((name, text, read));
