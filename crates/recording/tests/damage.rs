@@ -530,7 +530,8 @@ fn what_is_wrong_is_named() {
                 message(1, 5, b"abc"),
                 message(1, 6, b"abc"),
             ],
-            0,
+            // Without values, but with their times.
+            2,
             vec![
                 "no_decoder /a: skipped 2 messages: encoding \"h264\" with schema encoding \"\" has no decoder",
             ],
