@@ -223,7 +223,7 @@ fn json(
         "runs": summary.runs,
         "failed": summary.failures,
         "reasons": summary.reasons,
-        "other_reasons": summary.other_reasons,
+        "other_reasons": summary.other_reasons(),
         "metrics": metrics,
         "sensitivity": indices.map(|all| study::sweep::sensitivity::to_json(all)),
     })

@@ -134,8 +134,6 @@ pub struct Found {
     pub failures: u64,
     /// Reasons and how often each was given, of the first that differ.
     pub reasons: Vec<(String, u64)>,
-    /// Failed runs whose reason is none of these.
-    pub other_reasons: u64,
 }
 
 impl<W: Write> Summary<W> {
@@ -198,7 +196,7 @@ impl<W: Write> Summary<W> {
                 Some(k) => found.reasons[k].1 += 1,
                 // Enough to see what is wrong; a reason that names a time differs in every run.
                 None if found.reasons.len() < 20 => found.reasons.push((reason.clone(), 1)),
-                None => found.other_reasons += 1,
+                None => {}
             }
         }
         for (values, place) in self.values.iter_mut().zip(&self.places) {
@@ -263,6 +261,11 @@ impl<W: Write> Summary<W> {
 }
 
 impl Found {
+    /// Failed runs whose reason is none of [`Self::reasons`].
+    pub fn other_reasons(&self) -> u64 {
+        self.failures - self.reasons.iter().map(|(_, n)| n).sum::<u64>()
+    }
+
     /// For people: over all points, what each metric's mean at a point ranges over, and where it is lowest and highest.
     pub fn table(&self) -> String {
         let mut out = format!(
@@ -300,8 +303,9 @@ impl Found {
             let times = recording::text::counted(*count, "time", "times");
             out += &format!("failed {times}: {reason}\n");
         }
-        if self.other_reasons > 0 {
-            let times = recording::text::counted(self.other_reasons, "time", "times");
+        let others = self.other_reasons();
+        if others > 0 {
+            let times = recording::text::counted(others, "time", "times");
             out += &format!("failed {times} for other reasons: `failed` in the table of runs\n");
         }
         out
@@ -375,7 +379,6 @@ mod tests {
             runs: 16,
             failures: 3,
             reasons: vec![("too steep".into(), 1)],
-            other_reasons: 2,
             ..Found::default()
         };
         let place = |x: f64| {
