@@ -267,11 +267,8 @@ fn answering(uri: re_uri::ProxyUri, url: &str) -> anyhow::Result<re_uri::ProxyUr
     let place = format!("{}:{}", uri.origin.host, uri.origin.port);
     let mut last = None;
     for address in place.to_socket_addrs().map_err(|e| nobody(&e))? {
-        match TcpStream::connect_timeout(&address, ANSWERS) {
-            Ok(peer) => match greeted(peer) {
-                Ok(()) => return Ok(uri),
-                Err(error) => last = Some(error),
-            },
+        match TcpStream::connect_timeout(&address, ANSWERS).and_then(greeted) {
+            Ok(()) => return Ok(uri),
             Err(error) => last = Some(error),
         }
     }

@@ -215,8 +215,14 @@ impl Take {
             let angles = [&mut i.roll_rad, &mut i.pitch_rad, &mut i.yaw_rad];
             let all = shared.into_iter().chain(angles).chain(&mut i.heave_m);
             all.for_each(|column| column.truncate(n));
-            let times = [&mut self.state_ns, &mut self.height_ns, &mut self.force_ns];
-            times.into_iter().for_each(|t| t.truncate(settled(t)));
+            self.state_ns.truncate(n);
+            // What was measured beside it is on a clock of its own.
+            if i.height_alone.is_none() {
+                self.height_ns.truncate(n);
+            }
+            if i.normal_n.is_empty() {
+                self.force_ns.truncate(n);
+            }
         }
         if i.phases_are_measured {
             let n = settled(&self.phase_ns);

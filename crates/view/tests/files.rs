@@ -237,6 +237,24 @@ fn estimates_of_what_grows_are_sent_when_they_are_settled() {
     }
 }
 
+#[test]
+fn what_was_measured_beside_an_estimate_is_sent_at_once() {
+    let mut take = view::take::Take {
+        state_ns: vec![0, 1, 2],
+        height_ns: vec![0, 1, 2],
+        force_ns: vec![0, 1, 2, 3],
+        ..Default::default()
+    };
+    take.inputs.sources.attitude = "imu".into();
+    take.inputs.roll_rad = vec![0.1; 3];
+    take.inputs.normal_n = vec![vec![1.0; 4]];
+    take.keep_settled(1);
+    assert_eq!(take.state_ns, [0]);
+    assert_eq!(take.height_ns, [0]);
+    assert_eq!(take.inputs.roll_rad.len(), 1);
+    assert_eq!(take.force_ns.len(), take.inputs.normal_n[0].len());
+}
+
 /// A scene with other settings is another recording.
 #[test]
 fn what_differs_has_another_id() {
