@@ -162,8 +162,19 @@ impl<'a> Input<'a> {
         Ok(*taken)
     }
 
-    #[inline]
+    #[inline(always)]
     fn varint(&mut self) -> Result<u64, &'static str> {
+        // Tags and lengths mostly take one byte.
+        match self.rest {
+            [byte @ ..0x80, rest @ ..] => {
+                self.rest = rest;
+                Ok(u64::from(*byte))
+            }
+            _ => self.long_varint(),
+        }
+    }
+
+    fn long_varint(&mut self) -> Result<u64, &'static str> {
         let mut value = 0u64;
         for (position, &byte) in self.rest.iter().take(10).enumerate() {
             value |= u64::from(byte & 0x7f) << (7 * position);
@@ -220,13 +231,19 @@ fn places(descriptor: &MessageDescriptor) -> usize {
 
 /// The plan of one message, at one place.
 struct Node {
-    fields: Vec<(u64, Plan)>,
-    /// Which oneof each of the fields is a member of.
-    oneof: Vec<Option<usize>>,
+    /// In the order of their numbers.
+    fields: Vec<Field>,
     /// By oneof: the place of the member that came last.
     chosen: Vec<usize>,
     present: bool,
     stamp: bool,
+}
+
+struct Field {
+    number: u64,
+    /// Which oneof it is a member of.
+    oneof: Option<usize>,
+    plan: Plan,
 }
 
 enum Plan {
@@ -330,7 +347,11 @@ impl Plan {
 
 impl Node {
     fn new(descriptor: &MessageDescriptor, field: &str, rows: &mut Rows) -> Self {
-        let mut fields: Vec<(u64, Plan)> = descriptor
+        let mut oneofs = HashMap::new();
+        for (k, oneof) in descriptor.oneofs().enumerate() {
+            oneofs.extend(oneof.fields().map(|field| (field.number(), k)));
+        }
+        let mut fields: Vec<Field> = descriptor
             .fields()
             .map(|inner| {
                 let path = if field.is_empty() {
@@ -338,24 +359,21 @@ impl Node {
                 } else {
                     format!("{field}.{}", inner.name())
                 };
-                (u64::from(inner.number()), Plan::new(&inner, path, rows))
+                Field {
+                    number: u64::from(inner.number()),
+                    oneof: oneofs.get(&inner.number()).copied(),
+                    plan: Plan::new(&inner, path, rows),
+                }
             })
             .collect();
-        fields.sort_by_key(|(number, _)| *number);
+        fields.sort_by_key(|field| field.number);
         rows.places += places(descriptor);
         let stamp = matches!(
             field,
             "timestamp" | "stamp" | "header.stamp" | "header.timestamp"
         ) && descriptor.full_name() == "google.protobuf.Timestamp";
-        let mut oneofs = HashMap::new();
-        for (k, oneof) in descriptor.oneofs().enumerate() {
-            oneofs.extend(oneof.fields().map(|field| (u64::from(field.number()), k)));
-        }
         Node {
             chosen: vec![0; descriptor.oneofs().len()],
-            oneof: (fields.iter())
-                .map(|(number, _)| oneofs.get(number).copied())
-                .collect(),
             fields,
             present: false,
             stamp,
@@ -387,31 +405,33 @@ impl Node {
             }
             // Fields mostly come in order.
             let position = match self.fields.get(hint) {
-                Some((known, _)) if *known == number => Ok(hint),
+                Some(known) if known.number == number => Ok(hint),
                 _ => self
                     .fields
-                    .binary_search_by_key(&number, |(known, _)| *known),
+                    .binary_search_by_key(&number, |known| known.number),
             };
             let Ok(position) = position else {
                 input.skip(wire, number, depth)?;
                 continue;
             };
-            hint = position + 1;
             // Of a oneof the last member counts, and the others are as if they had not come.
-            if let Some(oneof) = self.oneof[position] {
+            if let Some(oneof) = self.fields[position].oneof {
                 let before = std::mem::replace(&mut self.chosen[oneof], position);
-                if before != position && self.oneof[before] == Some(oneof) {
-                    self.fields[before].1.flush(rows, false);
+                if before != position && self.fields[before].oneof == Some(oneof) {
+                    self.fields[before].plan.flush(rows, false);
                 }
             }
-            self.fields[position]
-                .1
-                .read(input, wire, number, depth, rows)?;
-            if matches!(
-                self.fields[position].1,
-                Plan::Messages { .. } | Plan::Map { .. }
-            ) {
-                hint = position;
+            hint = position + 1;
+            match &mut self.fields[position].plan {
+                Plan::Number { number, value, .. } if wire == number.wire() => {
+                    *value = Some(number.read(input)?);
+                }
+                plan => {
+                    if matches!(plan, Plan::Messages { .. } | Plan::Map { .. }) {
+                        hint = position;
+                    }
+                    plan.read(input, wire, number, depth, rows)?;
+                }
             }
         }
         if group.is_some() {
@@ -429,8 +449,8 @@ impl Node {
         }
         if self.stamp && keep {
             let part = |number: u64| {
-                self.fields.iter().find_map(|(known, plan)| match plan {
-                    Plan::Number { value, .. } if *known == number => *value,
+                self.fields.iter().find_map(|field| match field.plan {
+                    Plan::Number { value, .. } if field.number == number => value,
                     _ => None,
                 })
             };
@@ -443,8 +463,8 @@ impl Node {
                     .saturating_add(nanoseconds),
             );
         }
-        for (_, plan) in &mut self.fields {
-            plan.flush(rows, keep);
+        for field in &mut self.fields {
+            field.plan.flush(rows, keep);
         }
     }
 }

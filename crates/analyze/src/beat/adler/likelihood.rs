@@ -18,6 +18,13 @@ pub struct Score {
     pub information: Information,
 }
 
+/// What one carrier adds to them. Whole rows, though they are symmetric: sums of even length are quicker than half as many.
+struct Sums {
+    value: f64,
+    gradient: [f64; N],
+    information: [[f64; N]; N],
+}
+
 /// The distribution of a carrier's phase, rad and rad².
 #[derive(Clone, Copy)]
 struct State {
@@ -26,6 +33,7 @@ struct State {
 }
 
 impl State {
+    #[inline(always)]
     fn after(self, rate: State, h: f64) -> State {
         State {
             mean: self.mean + rate.mean * h,
@@ -155,13 +163,16 @@ impl Walk {
         };
         // K m at the beginning, middle and end of every step: the same for all carriers. That at the beginning makes Simpson's rule, by which a step
         // weighs them, the mean over the step: a pull that is soon all there grows within one.
-        let grown = |t: &[f64]| {
-            let left = |t: f64| to_come * (per_s * -t.max(0.0)).exp();
-            let mean = left(t[0]) * (per_s * (t[1] - t[0])).mean_of_decay();
-            let (middle, end) = (left(0.5 * (t[0] + t[1])), left(t[1]));
-            [mean * 6.0 - middle * 4.0 - end, middle, end].map(|left| pull - left)
-        };
-        let grown: Vec<[Dual; 3]> = self.t_s.windows(2).map(grown).collect();
+        let left = |t_s: f64| to_come * (per_s * -t_s.max(0.0)).exp();
+        let mut at_end = left(self.t_s[0]);
+        let mut grown: Vec<[Dual; 3]> = Vec::with_capacity(self.t_s.len());
+        for t in self.t_s.windows(2) {
+            let mean = at_end * (per_s * (t[1] - t[0])).mean_of_decay();
+            let middle = left(0.5 * (t[0] + t[1]));
+            at_end = left(t[1]);
+            let at = [mean * 6.0 - middle * 4.0 - at_end, middle, at_end];
+            grown.push(at.map(|left| pull - left));
+        }
         for (c, phase) in self.phase.iter().enumerate() {
             let own = |k: usize| Dual::unknown(x[place(k, c)], k);
             let drive = Drive {
@@ -178,6 +189,11 @@ impl Walk {
                 variance: error + noise * behind_s,
             };
             let mut window = Window::from(state);
+            let mut sums = Sums {
+                value: 0.0,
+                gradient: [0.0; N],
+                information: [[0.0; N]; N],
+            };
             for k in first..phase.len() - 1 {
                 let h = self.t_s[k + 1] - self.t_s[k];
                 let psi = [self.beat[k], self.beat[k + 1]];
@@ -215,9 +231,14 @@ impl Walk {
                     );
                 }
                 if seen.is_finite() {
-                    state = out.observe(state, expected, seen, error, c);
+                    state = sums.observe(state, expected, seen, error);
                 }
                 window = Window::from(state);
+            }
+            out.value += sums.value;
+            for (i, row) in sums.information.iter().enumerate() {
+                out.gradient[place(i, c)] += sums.gradient[i];
+                out.information.add(c, i, |j| row[j]);
             }
         }
         self.add_priors(x, &mut out);
@@ -325,16 +346,18 @@ impl Score {
         (top.value - self.value).abs() < BESIDE_HIGH
             && of_motion.fold(0.0, |far: f64, k| far.max((x[k] - summit[k]).abs())) < BESIDE
     }
+}
 
-    /// Takes an observation of carrier `c` (rad) of what is `expected`: its mean, its variance but for the error, and its covariance with
-    /// the state. Gives the state after it.
+impl Sums {
+    /// Takes an observation (rad) of what is `expected`: its mean, its variance but for the error, and its covariance with the state. Gives the
+    /// state after it.
+    #[inline(always)]
     fn observe(
         &mut self,
         state: State,
         (mean, variance, with_phase): (Dual, Dual, Dual),
         seen: f64,
         error: Dual,
-        c: usize,
     ) -> State {
         let miss = wrap(seen - mean.value);
         let spread = variance + error;
@@ -347,9 +370,10 @@ impl Score {
                 mean.slope[i] * weight,
                 0.5 * spread.slope[i] * weight * weight,
             );
-            self.gradient[place(i, c)] += a * miss + spread.slope[i] * surprise;
-            self.information
-                .add(c, i, |j| a * mean.slope[j] + b * spread.slope[j]);
+            self.gradient[i] += a * miss + spread.slope[i] * surprise;
+            for j in 0..N {
+                self.information[i][j] += a * mean.slope[j] + b * spread.slope[j];
+            }
         }
         let gain = with_phase * inverse;
         let mut missed = mean * -1.0;
