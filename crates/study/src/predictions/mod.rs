@@ -127,7 +127,7 @@ pub const EXPERIMENTS: &[Experiment] = &[
 pub struct Lab<'a> {
     /// Threads; 0 is one per core. No result depends on it.
     pub jobs: usize,
-    /// Seeds of every ensemble.
+    /// Seeds of an ensemble where nothing else is said.
     pub seeds: u64,
     /// Set to stop.
     pub stop: &'a AtomicBool,
