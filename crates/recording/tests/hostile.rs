@@ -142,7 +142,7 @@ fn schemas_and_messages_changed_at_random() {
         let mut writer =
             RecordingWriter::to_stream(shared.clone(), &WriterOptions::default()).expect("begins");
         for (info, messages) in recording.info().channels.iter().zip(&messages) {
-            let mut schema_data = info.schema_data.clone();
+            let mut schema_data = info.schema_data.to_vec();
             if random.below(2) == 0 {
                 random.change(&mut schema_data);
             }

@@ -478,6 +478,97 @@ fn enums_of_second_representations() {
         of("sequence<Color> s;", &[3, 2, 1, 0]),
         (expected, String::new())
     );
+    // An array of several dimensions is of what its innermost one is of (Fast CDR's `is_multi_array_primitive`).
+    let rows = "long m[2][3]; sequence<In> s;";
+    let expected =
+        "m[0][0] 1, m[0][1] 2, m[0][2] 3, m[1][0] 4, m[1][1] 5, m[1][2] 6, s[0].i 7, s[1].i 8";
+    for words in [
+        &[1, 2, 3, 4, 5, 6, 12, 2, 7, 8][..],
+        &[1, 2, 3, 4, 5, 6, 2, 7, 8],
+    ] {
+        assert_eq!(of(rows, words), (expected.to_owned(), String::new()));
+    }
+}
+
+/// Structs that inherit from one another multiply their fields.
+#[test]
+fn what_is_inherited_is_bounded() {
+    let chain = |structs: usize| {
+        let one = |k: usize| format!("struct T{k} : T{} {{ long f{k}; }};\n", k - 1);
+        let others: String = (1..structs).map(one).collect();
+        let fields: String = (0..structs).map(|k| format!("T{k} t{k}; ")).collect();
+        let text = format!("struct M {{ {fields}}};\nstruct T0 {{ long f0; }};\n{others}");
+        let found = recording(&WriterOptions::default(), |writer| {
+            let channel = RawChannel {
+                topic: "/t",
+                message_encoding: "cdr",
+                schema_name: "M",
+                schema_encoding: "ros2idl",
+                schema_data: text.as_bytes(),
+                metadata: &BTreeMap::new(),
+            };
+            let channel = writer.raw_channel(&channel).expect("opens");
+            let message = [vec![0, 1, 0, 0], vec![0; 2 * structs * (structs + 1)]].concat();
+            (writer.message(channel, 0, message.as_slice())).expect("writes");
+        });
+        let signals = found.signals(&|_| true).expect("reads").0.len();
+        (signals, lines(&found).concat())
+    };
+    assert_eq!(chain(30), (465, String::new()));
+    let (signals, said) = chain(500);
+    assert_eq!(signals, 0);
+    assert!(
+        said.contains("its structs inherit more than 100000 fields together"),
+        "{said}"
+    );
+}
+
+/// Which of two readings an ambiguous message is given does not depend on the chunks that a thread had before: alone it is read by the first
+/// that fits, with two bytes a character.
+#[test]
+fn readings_do_not_depend_on_threads() {
+    let channel = RawChannel {
+        topic: "/w",
+        message_encoding: "cdr",
+        schema_name: "p/msg/W",
+        schema_encoding: "ros2msg",
+        schema_data: b"wstring s\nuint8[] d\n",
+        metadata: &BTreeMap::new(),
+    };
+    let message = |words: &[u32], bytes: &[u8]| {
+        let words = words.iter().flat_map(|word| word.to_le_bytes());
+        [&[0, 1, 0, 0], &words.collect::<Vec<_>>()[..], bytes].concat()
+    };
+    let wide = message(&[3, 97, 98, 99, 5], &[1, 2, 3, 4, 5]);
+    let either = message(&[2, 97, 10, 6], &[9, 8, 7, 6, 5, 4]);
+    let messages: Vec<_> = (0..600)
+        .map(|m| if m / 60 % 2 == 0 { &wide } else { &either }.clone())
+        .collect();
+    same_for_all_threads(&channel, &messages);
+}
+
+/// Names fill the memory as well as places do; and a name is a name, whatever it looks like.
+#[test]
+fn long_names_take_places_and_odd_ones_are_told_as_they_are() {
+    let grid = format!(
+        "[{}]",
+        vec![format!("[{}]", ["1"; 64].join(",")); 64].join(",")
+    );
+    for (length, signals) in [(100, 4096), (100_000, 163)] {
+        let message = format!("{{\"{}\":{grid}}}", "k".repeat(length));
+        let (found, told) = same_for_all_threads(&JSON, &[message.into_bytes()]);
+        assert_eq!(found, signals);
+        assert_eq!(told.is_empty(), signals == 4096, "{told:?}");
+    }
+    let long = vec!["1"; 70].join(",");
+    let message = format!("{{\"[*]\":[{long}],\"a\":{{\"*\":[{long}]}},\"x\":1}}");
+    let (found, told) = same_for_all_threads(&JSON, &[message.into_bytes()]);
+    let said = |field: &str| {
+        format!(
+            "long_sequence /j: {field} has more than 64 items (the limit) in 1 message; it is not among the signals there"
+        )
+    };
+    assert_eq!((found, told), (1, vec![said("[*]"), said("a.*")]));
 }
 
 /// Words that Python and others write though JSON does not have them are numbers that are not finite; in texts they are text.
@@ -730,7 +821,7 @@ fn limits_do_not_depend_on_threads() {
 fn sequences_of_sequences_are_bounded() {
     let said = |messages: usize| {
         format!(
-            "sequences, maps and objects have more than 65536 fields together in {messages} messages; what has further ones is left out"
+            "sequences, maps and objects have more than 65536 fields together, or names that take as much room, in {messages} messages; what has further ones is left out"
         )
     };
     let check = |channel: &RawChannel<'_>, one: Vec<u8>, many: Vec<u8>, columns: usize| {

@@ -170,6 +170,8 @@ fn wrong_types_and_signs_are_pointed_at() {
     ] {
         expect(&format!("{late}{instrument}"), place, &["2038"]);
     }
+    let drifts = "name = \"a\"\nepoch_s = 2147483600.0\nduration_s = 46.0\n[effects.music]\n[effects.drum]\nclock_drift_ppm = 1e5";
+    expect(drifts, "6:19", &["clock_drift_ppm", "2038"]);
     expect(
         "name = \"a\"\n[carriers]\nhandles_m = [[1.0, 2.0, 3.0]]\n[carriers.along_poles]\ncount = 2",
         "3:13",

@@ -280,6 +280,9 @@ fn greeted(mut peer: TcpStream) -> std::io::Result<()> {
     peer.set_read_timeout(Some(ANSWERS))?;
     peer.write_all(b"PRI * HTTP/2.0\r\n\r\nSM\r\n\r\n\0\0\0\x04\0\0\0\0\0")?;
     match peer.read(&mut [0]) {
+        Ok(0) => Err(std::io::Error::other(
+            "what listens takes the connection and closes it",
+        )),
         Ok(_) => Ok(()),
         Err(error) if error.kind() == ErrorKind::WouldBlock => Err(std::io::Error::other(
             "what listens takes the connection and says nothing",

@@ -76,6 +76,10 @@ fn nothing_is_left_where_it_cannot_be_done() {
     // Takes connections, and says nothing.
     let silent = std::net::TcpListener::bind("127.0.0.1:0").unwrap();
     let silent = format!("rerun+http://{}/proxy", silent.local_addr().unwrap());
+    // Closes each connection at once, unread.
+    let closing = std::net::TcpListener::bind("127.0.0.1:0").unwrap();
+    let closed = format!("rerun+http://{}/proxy", closing.local_addr().unwrap());
+    std::thread::spawn(move || closing.incoming().for_each(drop));
     for (arguments, words) in [
         (
             vec![path("none.mcap"), "--save".into(), path("out.rrd")],
@@ -113,6 +117,11 @@ fn nothing_is_left_where_it_cannot_be_done() {
         (
             vec![path("run.mcap"), "--connect".into(), silent],
             "says nothing",
+        ),
+        // Which of the two ends of it is seen first is the system's choice.
+        (
+            vec![path("run.mcap"), "--connect".into(), closed],
+            "nobody answers there",
         ),
     ] {
         let output = view(&arguments.iter().map(String::as_str).collect::<Vec<_>>());

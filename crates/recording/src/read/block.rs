@@ -8,7 +8,7 @@ use super::{
     container::{Block, Definitions, Fields, chunk_header, op},
     decode::{Decoder, Place, SchemaRef},
     decoders::{self, NoDecoder},
-    rows::{MAX_PLACES, Rows, Selection},
+    rows::{Long, MAX_PLACES, Rows, Selection},
 };
 use crate::finding::Kind;
 use crate::text::counted;
@@ -23,7 +23,7 @@ pub(super) struct ChannelBatch {
     pub stamps: Vec<i64>,
     pub columns: Vec<BatchColumn>,
     pub absent: Vec<(String, u64)>,
-    pub long: Vec<(String, u64)>,
+    pub long: Vec<(Long, u64)>,
     pub trailing: u64,
     pub remark: Option<String>,
 }
@@ -147,6 +147,7 @@ impl State {
             name: &info.schema,
             encoding: &info.schema_encoding,
             data: &info.schema_data,
+            pools: &recording.pools,
         };
         let opened = decoders::open(&info.encoding, &schema, rows);
         // Those of the schema are not of messages.
@@ -197,10 +198,14 @@ pub(super) struct Worker<'a> {
     unknown: BTreeMap<u16, (u64, u64)>,
     /// Message records too short for their header.
     short: u64,
-    /// Places that the decoders of all channels remember.
+    /// Places that the decoders of all channels remember, and their columns.
     places: usize,
+    columns: usize,
     spare: Spare,
 }
+
+/// No thread remembers more columns: those of a channel that it has not decoded lately are found again.
+const MOST_COLUMNS: usize = 1 << 20;
 
 impl<'a> Worker<'a> {
     pub fn new(recording: &'a Recording, select: Selection<'a>) -> Self {
@@ -215,6 +220,7 @@ impl<'a> Worker<'a> {
             unknown: BTreeMap::new(),
             short: 0,
             places: 0,
+            columns: 0,
             spare: Spare::default(),
         }
     }
@@ -263,7 +269,6 @@ impl<'a> Worker<'a> {
                 self.unpacker = unpacker;
             }
         }
-        self.harvest(&mut result);
         result
     }
 
@@ -274,7 +279,6 @@ impl<'a> Worker<'a> {
         let mut read = |records: &[u8]| {
             let mut result = BlockResult::default();
             self.records(records, &mut result);
-            self.harvest(&mut result);
             give(result);
         };
         let (too_long, indexed) = match block {
@@ -331,15 +335,23 @@ impl<'a> Worker<'a> {
                 _ => *misplaced.entry(opcode).or_default() += 1,
             }
         }
-        for &index in &self.touched {
-            if let Some(channel) = &mut self.channels[index] {
-                self.places -= channel.rows.places;
-                channel.decode(block, self.recording, self.select);
-                // Many channels may not remember together what each of them may.
-                if self.places + channel.rows.places > MAX_PLACES {
-                    channel.forget(self.recording);
-                }
-                self.places += channel.rows.places;
+        // In the order of the channels, so that it does not depend on which came first.
+        self.touched.sort_unstable();
+        for index in std::mem::take(&mut self.touched) {
+            let Some(channel) = &mut self.channels[index] else {
+                continue;
+            };
+            self.places -= channel.rows.places;
+            self.columns -= channel.rows.columns.len();
+            channel.decode(block, self.recording, self.select);
+            channel.harvest(result, &mut self.spare);
+            let places = self.places + channel.rows.places;
+            let columns = self.columns + channel.rows.columns.len();
+            // Many channels may not remember together what each of them may.
+            if places > MAX_PLACES || columns > MOST_COLUMNS {
+                self.channels[index] = None;
+            } else {
+                (self.places, self.columns) = (places, columns);
             }
         }
         let mut bad = |count, text, lost| {
@@ -414,18 +426,6 @@ impl<'a> Worker<'a> {
         let bytes = end - data.len()..end;
         channel.waiting.push(Place { bytes, time });
     }
-
-    /// Moves what the channels hold into the result.
-    fn harvest(&mut self, result: &mut BlockResult) {
-        // In the order of the channels, so that it does not depend on which came first.
-        self.touched.sort_unstable();
-        for index in self.touched.drain(..) {
-            let Some(channel) = &mut self.channels[index] else {
-                continue;
-            };
-            channel.harvest(result, &mut self.spare);
-        }
-    }
 }
 
 impl<'a> ChannelState<'a> {
@@ -447,11 +447,6 @@ impl<'a> ChannelState<'a> {
         }
     }
 
-    /// Begins the decoder anew, which then remembers nothing of its messages.
-    fn forget(&mut self, recording: &Recording) {
-        self.state = State::open(recording, self.index, &mut self.rows);
-    }
-
     /// Whether the current block has given this channel anything yet.
     fn begun(&self) -> bool {
         self.seen > 0
@@ -464,6 +459,9 @@ impl<'a> ChannelState<'a> {
             self.begin_anew(recording, select);
         }
         let fresh = std::mem::replace(&mut self.fresh, false);
+        if let State::Ready(decoder) = &mut self.state {
+            decoder.begin_block();
+        }
         self.read(block);
         if self.rows.full && !fresh {
             self.begin_anew(recording, select);
@@ -566,12 +564,6 @@ impl<'a> ChannelState<'a> {
                     }
                 })
                 .collect();
-            let counted = |counts: &[(String, u64)]| -> Vec<_> {
-                let some = counts.iter().filter(|(_, count)| *count > 0);
-                some.cloned().collect()
-            };
-            let mut long = std::mem::take(&mut self.rows.long);
-            long.extend(counted(&self.rows.long_types));
             result.batches.push(ChannelBatch {
                 channel: self.index,
                 times: std::mem::replace(&mut self.times, empty(&mut spare.times, rows)),
@@ -579,8 +571,10 @@ impl<'a> ChannelState<'a> {
                     .rows
                     .take_stamps(|length| empty(&mut spare.times, length)),
                 columns,
-                absent: counted(&self.rows.absent),
-                long,
+                absent: self.rows.absent.some().collect(),
+                long: (self.rows.long.some())
+                    .chain(self.rows.long_types.some())
+                    .collect(),
                 trailing: self.rows.trailing,
                 remark: self.rows.remark.take(),
             });

@@ -58,8 +58,9 @@ fn begin(types: Types) -> Result<Box<dyn Decoder>, String> {
     {
         let mut kind = kind;
         while let Type::Array(inner, _) | Type::Sequence(inner) = kind {
-            enums |= **inner == Type::Enum;
-            collections |= inner.prim().is_none();
+            let item = kind.item();
+            enums |= *item == Type::Enum;
+            collections |= item.prim().is_none();
             kind = inner;
         }
         wide |= *kind == Type::WideText;
@@ -146,6 +147,10 @@ impl Cdr {
 }
 
 impl Decoder for Cdr {
+    fn begin_block(&mut self) {
+        self.readings.clear();
+    }
+
     fn decode_alike(&mut self, block: &[u8], places: &[Place], rows: &mut Rows) -> usize {
         let Some(first) = places.first().map(|place| &block[place.bytes.clone()]) else {
             return 0;

@@ -21,7 +21,8 @@ const DRIFT_PPM: f64 = 20.0;
 #[derive(Debug, Default)]
 pub(super) struct Order {
     last: Option<i64>,
-    /// The latest so far.
+    /// The earliest and the latest so far.
+    earliest: i64,
     latest: i64,
     duplicates: Count,
     backward: Count,
@@ -56,7 +57,7 @@ impl Order {
         };
         match self.last {
             Some(last) => self.interval(last, first),
-            None => self.latest = first,
+            None => (self.earliest, self.latest) = (first, first),
         }
         self.last = times.last().copied();
         let in_order = first >= self.latest;
@@ -93,6 +94,9 @@ impl Order {
         if to > self.latest {
             let from = std::mem::replace(&mut self.latest, to);
             self.stretch(from, to);
+        } else if to < self.earliest {
+            let end = std::mem::replace(&mut self.earliest, to);
+            self.stretch(to, end);
         } else if let Some((&from, &end)) = self.open.range(..to).next_back()
             && to < end
         {
@@ -436,14 +440,19 @@ mod tests {
     #[test]
     fn what_comes_late_fills_its_gap() {
         let at = |k: i64| k * 10_000_000;
-        for block in [7, 40, 300] {
+        let orders = [
+            [0, 1, 3, 2, 5, 4, 8, 9, 7, 6, 11, 10],
+            [11, 10, 8, 9, 0, 1, 3, 2, 7, 6, 5, 4],
+        ];
+        for (block, blocks) in [7, 40, 300]
+            .into_iter()
+            .flat_map(|b| orders.map(|o| (b, o)))
+        {
             for lost in [None, Some(5)] {
                 let mut order = Order::default();
-                for pair in [[0, 1], [3, 2], [5, 4], [8, 9], [7, 6], [11, 10]] {
-                    for b in pair.into_iter().filter(|b| Some(*b) != lost) {
-                        let times: Vec<i64> = (b * block..(b + 1) * block).map(at).collect();
-                        order.observe(&times);
-                    }
+                for b in blocks.into_iter().filter(|b| Some(*b) != lost) {
+                    let times: Vec<i64> = (b * block..(b + 1) * block).map(at).collect();
+                    order.observe(&times);
                 }
                 let gaps: Vec<_> = words(&mut order)
                     .into_iter()
@@ -453,7 +462,7 @@ mod tests {
                 assert_eq!(
                     gaps,
                     Vec::from_iter(expected),
-                    "blocks of {block}, without {lost:?}"
+                    "blocks of {block}, {blocks:?} without {lost:?}"
                 );
             }
         }

@@ -10,6 +10,7 @@ use std::{
     io::{Read, Seek, SeekFrom},
     ops::Range,
     path::Path,
+    sync::Arc,
 };
 
 use crate::{finding::Kind, text::counted};
@@ -100,7 +101,7 @@ impl<'a> Fields<'a> {
 pub(super) struct Schema {
     pub name: String,
     pub encoding: String,
-    pub data: Vec<u8>,
+    pub data: Arc<[u8]>,
 }
 
 /// A channel, wherever in the file it stands.
@@ -145,7 +146,7 @@ impl<'a> SchemaRecord<'a> {
     }
 
     fn is(&self, known: &Schema) -> bool {
-        known.name == self.name && known.encoding == self.encoding && known.data == self.data
+        known.name == self.name && known.encoding == self.encoding && *known.data == *self.data
     }
 }
 
@@ -217,7 +218,7 @@ impl Definitions {
                 let schema = Schema {
                     name: found.name.into_owned(),
                     encoding: found.encoding.into_owned(),
-                    data: found.data.to_vec(),
+                    data: found.data.into(),
                 };
                 self.schemas.insert(found.id, schema);
             }

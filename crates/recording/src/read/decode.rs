@@ -1,8 +1,8 @@
 //! What a decoder is: it turns the messages of one channel into rows of numbers.
 
-use std::ops::Range;
+use std::{ops::Range, sync::Arc};
 
-use super::rows::Rows;
+use super::{protobuf::Pools, rows::Rows};
 
 /// Where a message lies in the bytes of its block.
 #[derive(Clone, Debug)]
@@ -14,6 +14,9 @@ pub(super) struct Place {
 
 /// Turns the messages of one channel into rows of numbers.
 pub(super) trait Decoder: Send {
+    /// Forgets whatever would make the messages of the next block read otherwise than by a decoder that saw no block before.
+    fn begin_block(&mut self) {}
+
     /// Decodes and keeps as many of the first messages at `places` in `block` as it can take column by column, which is several
     /// times quicker; returns how many. The caller decodes the next one alone.
     fn decode_alike(&mut self, _block: &[u8], _places: &[Place], _rows: &mut Rows) -> usize {
@@ -25,9 +28,11 @@ pub(super) trait Decoder: Send {
 }
 
 /// A schema as the file gives it.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Copy)]
 pub(super) struct SchemaRef<'a> {
     pub name: &'a str,
     pub encoding: &'a str,
-    pub data: &'a [u8],
+    pub data: &'a Arc<[u8]>,
+    /// Those of the recording.
+    pub pools: &'a Pools,
 }

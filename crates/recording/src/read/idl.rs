@@ -4,7 +4,7 @@
 
 use std::collections::HashMap;
 
-use super::types::{Prim, Struct, Type, Types};
+use super::types::{MAX_FIELDS, Prim, Struct, Type, Types};
 
 /// A type as written, its names not yet resolved.
 #[derive(Clone, Debug)]
@@ -143,6 +143,12 @@ fn resolve(
                         if let Type::Struct(base) = kind {
                             all.extend(types.structs[base].fields.clone());
                         }
+                        types.inherited += all.len();
+                        if types.inherited > MAX_FIELDS {
+                            return Err(format!(
+                                "its structs inherit more than {MAX_FIELDS} fields together"
+                            ));
+                        }
                     }
                     for (name, field) in fields {
                         all.push((
@@ -186,11 +192,11 @@ fn tokens(text: &str) -> Result<Vec<&str>, String> {
     let mut line_start = true;
     while at < bytes.len() {
         let rest = &text[at..];
-        let line_end = rest.find('\n').map_or(bytes.len(), |end| at + end);
+        let line_end = || rest.find('\n').map_or(bytes.len(), |end| at + end);
         if line_start
             && (rest.starts_with("===") || rest.starts_with("IDL:") || rest.starts_with('#'))
         {
-            at = line_end;
+            at = line_end();
             continue;
         }
         let byte = bytes[at];
@@ -200,7 +206,7 @@ fn tokens(text: &str) -> Result<Vec<&str>, String> {
         } else if byte.is_ascii_whitespace() {
             at += 1;
         } else if rest.starts_with("//") {
-            at = line_end;
+            at = line_end();
         } else if rest.starts_with("/*") {
             at += rest.find("*/").ok_or("a comment has no end")? + 2;
         } else if byte == b'"' || byte == b'\'' {

@@ -6,7 +6,7 @@ use serde::de::{DeserializeSeed, IgnoredAny, MapAccess, SeqAccess, Visitor};
 
 use super::{
     decode::{Decoder, SchemaRef},
-    rows::{MAX_PLACES, Rows, UNWANTED},
+    rows::{Long, MAX_PLACES, Rows, UNWANTED, places_of},
 };
 
 struct Json {
@@ -178,7 +178,7 @@ impl<'de> DeserializeSeed<'de> for Place<'_, '_> {
     type Value = ();
 
     fn deserialize<D: serde::Deserializer<'de>>(self, deserializer: D) -> Result<(), D::Error> {
-        self.rows.enter(1);
+        self.rows.enter(places_of(self.node.field.len()));
         deserializer.deserialize_any(self)
     }
 }
@@ -236,12 +236,13 @@ impl<'de> Visitor<'de> for Place<'_, '_> {
             if keys > MAX_KEYS {
                 map.next_value::<IgnoredAny>()?;
                 if keys == MAX_KEYS + 1 {
-                    rows.note_long(&format!("{}{ANY_KEY}", node.field));
+                    rows.note_long(Long::Keys(node.field.clone()));
                 }
                 continue;
             }
-            if !rows.has_room(1) {
-                rows.enter(1);
+            let takes = places_of(node.field.len() + 1 + key.len());
+            if !rows.has_room(takes) {
+                rows.enter(takes);
                 map.next_value::<IgnoredAny>()?;
                 continue;
             }
@@ -259,7 +260,7 @@ impl<'de> Visitor<'de> for Place<'_, '_> {
                     field,
                     ..Node::default()
                 };
-                rows.places += 1;
+                rows.places += takes;
                 node.by_key.insert(key.to_string(), node.children.len());
                 node.children.push((key.into_owned(), child));
                 node.children.len() - 1
@@ -284,6 +285,7 @@ impl<'de> Visitor<'de> for Place<'_, '_> {
             stamp,
         } = self;
         let before = pending.len();
+        let takes = places_of(node.field.len());
         let mut item = 0;
         loop {
             if item >= rows.max_items {
@@ -291,17 +293,17 @@ impl<'de> Visitor<'de> for Place<'_, '_> {
                     break;
                 }
                 if item == rows.max_items {
-                    rows.note_long(&node.field);
+                    rows.note_long(Long::Items(node.field.clone()));
                     pending.truncate(before);
                 }
-            } else if !rows.has_room(1) {
+            } else if !rows.has_room(takes) {
                 if seq.next_element::<IgnoredAny>()?.is_none() {
                     break;
                 }
-                rows.enter(1);
+                rows.enter(takes);
             } else {
                 if node.items.len() <= item {
-                    rows.places += 1;
+                    rows.places += takes;
                     node.items.push(Node {
                         field: format!("{}[{item}]", node.field),
                         ..Node::default()
@@ -325,5 +327,3 @@ impl<'de> Visitor<'de> for Place<'_, '_> {
 
 /// Keys of one object that become signals.
 pub(super) const MAX_KEYS: usize = 4096;
-/// Stands behind the name of a field that has more.
-pub(super) const ANY_KEY: &str = ".*";

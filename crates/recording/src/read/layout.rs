@@ -6,8 +6,8 @@
 
 use super::{
     decode::Place,
-    rows::{Rows, UNWANTED},
-    types::{Prim, Type, Types},
+    rows::{Long, Rows, UNWANTED, places_of},
+    types::{MAX_FIELDS, Prim, Type, Types},
 };
 
 /// How the bytes are laid out.
@@ -34,9 +34,9 @@ pub(super) enum Headers {
 }
 
 impl Shape {
-    /// Whether an array or sequence of such items begins with its size.
-    fn has_header(self, item: &Type) -> bool {
-        match item {
+    /// Whether an array or sequence begins with its size.
+    fn has_header(self, collection: &Type) -> bool {
+        match collection.item() {
             Type::Prim(_) => false,
             Type::Enum => self.headers == Headers::All,
             _ => self.headers != Headers::None,
@@ -260,9 +260,6 @@ impl Flat {
     }
 }
 
-/// More fields than this in one message type are refused: a schema could otherwise multiply arrays of arrays without end.
-const MAX_FIELDS: usize = 100_000;
-
 struct Compiler<'a, 'r> {
     types: &'a Types,
     shape: Shape,
@@ -441,8 +438,9 @@ fn compile(
     compiler.close_run();
     let mut program = compiler.program;
     let fields = |op: &Op| match op {
-        Op::Run(run) => run.fields.len(),
-        _ => 1,
+        Op::Run(run) => run.fields.iter().map(|f| places_of(f.name.len())).sum(),
+        Op::Text(name) | Op::WideText(name) => places_of(name.len()),
+        Op::Sequence(items) | Op::Array(items, _) => places_of(items.field.len()),
     };
     program.places = program.ops.iter().map(fields).sum::<usize>().max(1);
     Ok(program)
@@ -462,10 +460,10 @@ enum Role {
 
 impl Compiler<'_, '_> {
     fn add(&mut self, kind: &Type, field: &str, role: Role) -> Result<(), String> {
-        self.fields += 1;
+        self.fields += places_of(field.len());
         if self.fields > MAX_FIELDS {
             return Err(format!(
-                "the message type has more than {MAX_FIELDS} fields"
+                "the message type has more than {MAX_FIELDS} fields, or names that take as much room"
             ));
         }
         match kind {
@@ -504,9 +502,12 @@ impl Compiler<'_, '_> {
                     self.add(kind, &path, role)?;
                 }
             }
-            Type::Array(inner, count) => self.array(inner, *count, field)?,
+            Type::Array(inner, count) => {
+                let headed = self.shape.has_header(kind);
+                self.array(inner, *count, headed, field)?;
+            }
             Type::Sequence(inner) => {
-                let items = self.items(inner, field);
+                let items = self.items(inner, self.shape.has_header(kind), field);
                 self.push(Op::Sequence(items));
             }
         }
@@ -534,9 +535,14 @@ impl Compiler<'_, '_> {
         });
     }
 
-    fn array(&mut self, inner: &Type, count: usize, field: &str) -> Result<(), String> {
+    fn array(
+        &mut self,
+        inner: &Type,
+        count: usize,
+        headed: bool,
+        field: &str,
+    ) -> Result<(), String> {
         let items_wanted = self.take && count <= self.rows.max_items;
-        let headed = self.shape.has_header(inner);
         if let Some(prim) = inner.prim().filter(|_| !headed) {
             if !items_wanted {
                 if count > 0 {
@@ -551,7 +557,7 @@ impl Compiler<'_, '_> {
                 return Ok(());
             }
             for item in 0..count {
-                self.fields += 1;
+                self.fields += places_of(field.len());
                 self.number(prim, 1, &format!("{field}[{item}]"), Role::Plain);
             }
             // ROS says with −1 in a covariance's first element that its field is not given.
@@ -571,17 +577,17 @@ impl Compiler<'_, '_> {
             }
             return Ok(());
         }
-        let items = self.items(inner, field);
+        let items = self.items(inner, headed, field);
         self.push(Op::Array(items, count));
         Ok(())
     }
 
-    fn items(&self, inner: &Type, field: &str) -> Box<Items> {
+    fn items(&self, inner: &Type, header: bool, field: &str) -> Box<Items> {
         Box::new(Items {
             field: field.to_owned(),
             kind: inner.clone(),
             prim: inner.prim(),
-            header: self.shape.has_header(inner),
+            header,
             take: self.take,
             programs: Vec::new(),
         })
@@ -655,7 +661,7 @@ impl Items {
             return Ok(at);
         }
         if self.take && !fits {
-            rows.note_long(&self.field);
+            rows.note_long(Long::Items(self.field.clone()));
         }
         // The flat table does not count what is left out.
         context.trace = None;

@@ -30,7 +30,7 @@ use std::{
     ops::Range,
     path::Path,
     sync::{
-        Mutex, MutexGuard, PoisonError,
+        Arc, Mutex, MutexGuard, PoisonError,
         atomic::{AtomicU64, Ordering},
     },
 };
@@ -38,6 +38,7 @@ use std::{
 use crate::foreign;
 use container::{Container, Damage, Definitions, Statistics};
 use early::Early;
+use protobuf::Pools;
 
 pub use container::ends_whole;
 pub use decoders::supported;
@@ -163,8 +164,8 @@ pub struct ChannelInfo {
     pub encoding: String,
     /// Encoding of the schema, empty without one.
     pub schema_encoding: String,
-    /// The schema itself.
-    pub schema_data: Vec<u8>,
+    /// The schema itself, which channels share.
+    pub schema_data: Arc<[u8]>,
     /// Further properties.
     pub metadata: BTreeMap<String, String>,
     /// How many messages it has.
@@ -250,6 +251,7 @@ pub struct Recording {
     /// What the summary counts.
     promised: Option<Statistics>,
     skipped: AtomicU64,
+    pools: Pools,
     /// How the last reading contradicted the summary.
     contradictions: Mutex<Vec<Finding>>,
     /// How the summary was contradicted that is no longer trusted.
@@ -380,6 +382,7 @@ impl Recording {
             by_id,
             promised,
             skipped: AtomicU64::new(0),
+            pools: Pools::default(),
             contradictions: Mutex::default(),
             distrusted: Vec::new(),
         }

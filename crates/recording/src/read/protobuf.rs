@@ -4,13 +4,14 @@
 //! come in any order and more than once (the last one counts), and fields that are not there have the value zero where proto3 says so.
 
 use std::collections::{HashMap, HashSet};
+use std::sync::{Mutex, PoisonError};
 
 use prost::Message as _;
 use prost_reflect::{DescriptorPool, FieldDescriptor, Kind as FieldKind, MessageDescriptor};
 
 use super::{
     decode::{Decoder, SchemaRef},
-    rows::{MAX_PLACES, Rows, UNWANTED},
+    rows::{Long, MAX_PLACES, Rows, UNWANTED, places_of},
 };
 
 /// Messages nested deeper than this are refused.
@@ -27,9 +28,30 @@ pub(super) fn open(schema: &SchemaRef<'_>, rows: &mut Rows) -> Result<Box<dyn De
     Ok(Box::new(Protobuf { descriptor, root }))
 }
 
+/// The schemas of a recording that were parsed, by where they lie: hundreds of channels may share one that is large.
+#[derive(Default)]
+pub(super) struct Pools(Mutex<HashMap<usize, Result<DescriptorPool, String>>>);
+
 /// The message's descriptor out of the set in the file.
 fn descriptor(schema: &SchemaRef<'_>) -> Result<MessageDescriptor, String> {
-    let mut set = prost_types::FileDescriptorSet::decode(schema.data)
+    let mut pools = schema
+        .pools
+        .0
+        .lock()
+        .unwrap_or_else(PoisonError::into_inner);
+    let known = pools.entry(schema.data.as_ptr().addr());
+    let pool = known.or_insert_with(|| pool(schema.data)).clone()?;
+    pool.get_message_by_name(schema.name).ok_or_else(|| {
+        format!(
+            "the FileDescriptorSet does not define the message {}",
+            schema.name
+        )
+    })
+}
+
+/// The descriptors of the set in the file.
+fn pool(schema: &[u8]) -> Result<DescriptorPool, String> {
+    let mut set = prost_types::FileDescriptorSet::decode(schema)
         .map_err(|problem| format!("the schema is no FileDescriptorSet: {problem}"))?;
     // Writers repeat files, and some leave out what Google defines.
     let mut present = HashSet::new();
@@ -62,7 +84,7 @@ fn descriptor(schema: &SchemaRef<'_>) -> Result<MessageDescriptor, String> {
     // The library indexes past its files while it words some of its errors: a schema that makes it panic is one that does not parse.
     let parsed = std::panic::catch_unwind(|| DescriptorPool::from_file_descriptor_set(set))
         .map_err(|_| "the FileDescriptorSet is not consistent".to_owned())?;
-    let pool = parsed.map_err(|problem| {
+    parsed.map_err(|problem| {
         if missing.is_empty() {
             format!("the FileDescriptorSet is not consistent: {problem}")
         } else {
@@ -71,12 +93,6 @@ fn descriptor(schema: &SchemaRef<'_>) -> Result<MessageDescriptor, String> {
                 missing.join(", ")
             )
         }
-    })?;
-    pool.get_message_by_name(schema.name).ok_or_else(|| {
-        format!(
-            "the FileDescriptorSet does not define the message {}",
-            schema.name
-        )
     })
 }
 
@@ -224,9 +240,10 @@ impl<'a> Input<'a> {
     }
 }
 
-/// How many places a message takes: its fields, at least one.
-fn places(descriptor: &MessageDescriptor) -> usize {
-    descriptor.fields().len().max(1)
+/// How many places a message takes that is called so: its fields, at least one.
+fn places(descriptor: &MessageDescriptor, field: &str) -> usize {
+    let each = |inner: FieldDescriptor| places_of(field.len() + 1 + inner.name().len());
+    descriptor.fields().map(each).sum::<usize>().max(1)
 }
 
 /// The plan of one message, at one place.
@@ -258,6 +275,7 @@ enum Plan {
     Message {
         descriptor: MessageDescriptor,
         field: String,
+        places: usize,
         node: Option<Box<Node>>,
     },
     Numbers {
@@ -270,6 +288,8 @@ enum Plan {
     Messages {
         descriptor: MessageDescriptor,
         field: String,
+        /// Of each.
+        places: usize,
         items: Vec<Node>,
         count: usize,
     },
@@ -315,12 +335,14 @@ impl Plan {
         }
         match (kind, descriptor.is_list()) {
             (FieldKind::Message(descriptor), true) => Plan::Messages {
+                places: places(&descriptor, &field),
                 descriptor,
                 field,
                 items: Vec::new(),
                 count: 0,
             },
             (FieldKind::Message(descriptor), false) => Plan::Message {
+                places: places(&descriptor, &field),
                 descriptor,
                 field,
                 node: None,
@@ -367,7 +389,7 @@ impl Node {
             })
             .collect();
         fields.sort_by_key(|field| field.number);
-        rows.places += places(descriptor);
+        rows.places += places(descriptor, field);
         let stamp = matches!(
             field,
             "timestamp" | "stamp" | "header.stamp" | "header.timestamp"
@@ -499,10 +521,11 @@ impl Plan {
             Plan::Message {
                 descriptor,
                 field,
+                places,
                 node,
             } => {
                 let begun = node.as_ref().is_some_and(|node| node.present);
-                if !begun && !rows.enter(places(descriptor)) {
+                if !begun && !rows.enter(*places) {
                     return input.skip(wire, tag, depth);
                 }
                 let node = node.get_or_insert_with(|| Box::new(Node::new(descriptor, field, rows)));
@@ -536,11 +559,12 @@ impl Plan {
             Plan::Messages {
                 descriptor,
                 field,
+                places,
                 items,
                 count,
             } => {
                 *count += 1;
-                if *count > rows.max_items || !rows.enter(places(descriptor)) {
+                if *count > rows.max_items || !rows.enter(*places) {
                     return input.skip(wire, tag, depth);
                 }
                 if items.len() < *count {
@@ -597,7 +621,7 @@ impl Plan {
             } => {
                 let fits = *count <= rows.max_items;
                 if !fits && keep {
-                    rows.note_long(field);
+                    rows.note_long(Long::Items(field.clone()));
                 }
                 while columns.len() < values.len() && fits {
                     columns.push(rows.column(&format!("{field}[{}]", columns.len())));
@@ -618,7 +642,7 @@ impl Plan {
             } => {
                 let fits = *count <= rows.max_items;
                 if !fits && keep {
-                    rows.note_long(field);
+                    rows.note_long(Long::Items(field.clone()));
                 }
                 for item in items.iter_mut() {
                     item.flush(rows, keep && fits);
@@ -628,7 +652,7 @@ impl Plan {
             Plan::Map { field, entries, .. } => {
                 let fits = !std::mem::take(&mut entries.long);
                 if !fits && keep {
-                    rows.note_long(field);
+                    rows.note_long(Long::Items(field.clone()));
                 }
                 for position in entries.present.drain(..) {
                     entries.plans[position].flush(rows, keep && fits);
@@ -709,7 +733,8 @@ fn read_entry(
         entries.long = true;
         return Ok(());
     }
-    if !present && !rows.enter(1) {
+    let takes = places_of(field.len() + key.len());
+    if !present && !rows.enter(takes) {
         return Ok(());
     }
     let position = known.unwrap_or_else(|| {
@@ -718,7 +743,7 @@ fn read_entry(
         if let Plan::Number { implied, .. } = &mut plan {
             *implied = false;
         }
-        rows.places += 1;
+        rows.places += takes;
         entries.by_key.insert(key, entries.plans.len());
         entries.plans.push(plan);
         entries.plans.len() - 1

@@ -1,6 +1,6 @@
 //! Columns under construction: where decoders put the numbers of a batch of messages, one row per message.
 
-use std::{collections::HashMap, sync::Arc};
+use std::{collections::HashMap, hash::Hash, sync::Arc};
 
 /// No column: a field that nobody wants.
 pub(super) const UNWANTED: u32 = u32::MAX;
@@ -12,8 +12,57 @@ pub(super) const MAX_COLUMNS: usize = 1 << 16;
 /// nest sequences in sequences, or never stop inventing keys, would otherwise fill the memory.
 pub(super) const MAX_PLACES: usize = 1 << 16;
 
-/// Stands for the name of a field where a message has more.
-pub(super) const ANY_PLACE: &str = "[*]";
+/// How many places one takes whose name is so long: names fill the memory too.
+pub(super) fn places_of(name_bytes: usize) -> usize {
+    1 + name_bytes / 256
+}
+
+/// What a message has more of than become signals.
+#[derive(Clone, Debug, PartialEq, Eq, Hash)]
+pub(super) enum Long {
+    /// Items of the sequence, array or map of this name.
+    Items(String),
+    /// Keys of the object of this name.
+    Keys(String),
+    /// Places altogether.
+    Places,
+}
+
+/// How often things were seen, in the order of the first sight.
+#[derive(Debug)]
+pub(super) struct Counts<K> {
+    pub list: Vec<(K, u64)>,
+    places: HashMap<K, usize>,
+}
+
+impl<K> Default for Counts<K> {
+    fn default() -> Self {
+        Counts {
+            list: Vec::new(),
+            places: HashMap::new(),
+        }
+    }
+}
+
+impl<K: Clone + Eq + Hash> Counts<K> {
+    /// The place of one in the list, where it begins with nought.
+    pub fn place(&mut self, of: K) -> usize {
+        *self.places.entry(of).or_insert_with_key(|of| {
+            self.list.push((of.clone(), 0));
+            self.list.len() - 1
+        })
+    }
+
+    /// Those that were seen at all.
+    pub fn some(&self) -> impl Iterator<Item = (K, u64)> {
+        self.list.iter().filter(|(_, count)| *count > 0).cloned()
+    }
+
+    fn clear(&mut self) {
+        self.list.clear();
+        self.places.clear();
+    }
+}
 
 /// What is said where there are more columns.
 pub(super) fn too_many_columns() -> String {
@@ -53,15 +102,17 @@ pub(super) struct Rows<'a> {
     /// Header stamps of the rows; short of some where not every message has one.
     stamps: Vec<i64>,
     /// Fields that messages declare as not given, with how many do.
-    pub absent: Vec<(String, u64)>,
-    /// Sequences that were too long to become signals: field and count.
-    pub long: Vec<(String, u64)>,
+    pub absent: Counts<String>,
+    /// What was too long to become signals, and in how many messages.
+    pub long: Counts<Long>,
     /// The same for arrays that their type makes too long.
-    pub long_types: Vec<(String, u64)>,
+    pub long_types: Counts<Long>,
     /// What the decoder has to say about the schema.
     pub remark: Option<String>,
     /// What the message in hand added to these counts, to be taken back with it.
     noted: Vec<Noted>,
+    /// The message in hand gave a number.
+    given: bool,
     /// Messages with bytes left over.
     pub trailing: u64,
     /// Up to how many items of a sequence become signals.
@@ -93,11 +144,12 @@ impl<'a> Rows<'a> {
             row: 0,
             stamp_ns: None,
             stamps: Vec::new(),
-            absent: Vec::new(),
-            long: Vec::new(),
-            long_types: Vec::new(),
+            absent: Counts::default(),
+            long: Counts::default(),
+            long_types: Counts::default(),
             remark: None,
             noted: Vec::new(),
+            given: false,
             trailing: 0,
             max_items,
         }
@@ -146,6 +198,7 @@ impl<'a> Rows<'a> {
         let Some(known) = self.columns.get_mut(column as usize) else {
             return;
         };
+        self.given = true;
         if !known.sparse && row > 0 && known.values.len() == row as usize {
             known.values.push(value);
         } else {
@@ -194,9 +247,10 @@ impl<'a> Rows<'a> {
         }
     }
 
-    /// Counts a sequence that is too long to become signals.
-    pub fn note_long(&mut self, field: &str) {
-        let place = count(&mut self.long, field);
+    /// Counts what is too long to become signals.
+    pub fn note_long(&mut self, what: Long) {
+        let place = self.long.place(what);
+        self.long.list[place].1 += 1;
         self.noted.push(Noted::Long(place));
     }
 
@@ -212,20 +266,21 @@ impl<'a> Rows<'a> {
             self.entered += places;
         } else if self.has_room(0) {
             self.entered = MAX_PLACES + 1;
-            self.note_long(ANY_PLACE);
+            self.note_long(Long::Places);
         }
         room
     }
 
     /// The number under which an array is counted that its type makes too long to become signals.
     pub fn long_type(&mut self, field: &str) -> u32 {
-        numbered(&mut self.long_types, field)
+        // OK because there are at most as many as columns.
+        self.long_types.place(Long::Items(field.to_owned())) as u32
     }
 
     /// Counts messages with such an array.
     #[inline]
     pub fn note_long_type(&mut self, field: u32, messages: u64) {
-        if let Some((_, count)) = self.long_types.get_mut(field as usize) {
+        if let Some((_, count)) = self.long_types.list.get_mut(field as usize) {
             *count += messages;
             self.noted.push(Noted::LongType(field, messages));
         }
@@ -233,13 +288,14 @@ impl<'a> Rows<'a> {
 
     /// The number under which a field is counted that messages may declare as not given.
     pub fn absent_field(&mut self, field: &str) -> u32 {
-        numbered(&mut self.absent, field)
+        // OK because there are at most as many as columns.
+        self.absent.place(field.to_owned()) as u32
     }
 
     /// Counts messages that declare a field as not given.
     #[inline]
     pub fn note_absent(&mut self, field: u32, messages: u64) {
-        if let Some((_, count)) = self.absent.get_mut(field as usize) {
+        if let Some((_, count)) = self.absent.list.get_mut(field as usize) {
             *count += messages;
             self.noted.push(Noted::Absent(field, messages));
         }
@@ -250,6 +306,7 @@ impl<'a> Rows<'a> {
         self.stamp_ns = None;
         self.entered = 0;
         self.noted.clear();
+        self.given = false;
     }
 
     /// Keeps the message that was decoded.
@@ -260,6 +317,11 @@ impl<'a> Rows<'a> {
 
     /// Takes back what a message gave before it turned out to be broken.
     pub fn abort(&mut self) {
+        self.take_back_counts();
+        // Mostly it broke before: with thousands of columns a look at each would take longer than the message.
+        if !std::mem::take(&mut self.given) {
+            return;
+        }
         let row = self.row;
         for column in &mut self.columns {
             if column.sparse {
@@ -271,7 +333,6 @@ impl<'a> Rows<'a> {
                 column.values.truncate(row as usize);
             }
         }
-        self.take_back_counts();
         let columns = &self.columns;
         self.order
             .retain(|column| !columns[*column as usize].values.is_empty());
@@ -282,12 +343,13 @@ impl<'a> Rows<'a> {
         self.entered = 0;
         for noted in self.noted.drain(..) {
             match noted {
-                Noted::Absent(field, messages) => self.absent[field as usize].1 -= messages,
-                Noted::Long(place) => self.long[place].1 -= 1,
-                Noted::LongType(field, messages) => self.long_types[field as usize].1 -= messages,
+                Noted::Absent(field, messages) => self.absent.list[field as usize].1 -= messages,
+                Noted::Long(place) => self.long.list[place].1 -= 1,
+                Noted::LongType(field, messages) => {
+                    self.long_types.list[field as usize].1 -= messages;
+                }
             }
         }
-        self.long.retain(|(_, count)| *count > 0);
     }
 
     /// Ends the batch: the number of rows; columns with fewer values than rows know which rows they have.
@@ -304,9 +366,14 @@ impl<'a> Rows<'a> {
     /// Empties everything for the next batch but keeps the columns and their memory.
     pub fn clear(&mut self) {
         self.row = 0;
-        for (_, count) in self.absent.iter_mut().chain(&mut self.long_types) {
-            *count = 0;
-        }
+        self.absent
+            .list
+            .iter_mut()
+            .for_each(|(_, count)| *count = 0);
+        self.long_types
+            .list
+            .iter_mut()
+            .for_each(|(_, count)| *count = 0);
         self.order.clear();
         self.stamps.clear();
         self.long.clear();
@@ -348,30 +415,6 @@ impl RowColumn {
         } else {
             self.rows.push(row);
             self.values.push(value);
-        }
-    }
-}
-
-/// The number of a field among those that are counted.
-fn numbered(counts: &mut Vec<(String, u64)>, field: &str) -> u32 {
-    let known = counts.iter().position(|(known, _)| known == field);
-    // OK because there are at most as many as columns.
-    known.unwrap_or_else(|| {
-        counts.push((field.to_owned(), 0));
-        counts.len() - 1
-    }) as u32
-}
-
-/// Counts a field and returns its place.
-fn count(counts: &mut Vec<(String, u64)>, field: &str) -> usize {
-    match counts.iter().position(|(known, _)| known == field) {
-        Some(place) => {
-            counts[place].1 += 1;
-            place
-        }
-        None => {
-            counts.push((field.to_owned(), 1));
-            counts.len() - 1
         }
     }
 }

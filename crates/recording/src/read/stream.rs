@@ -2,6 +2,7 @@
 
 use std::{
     collections::{BTreeMap, HashMap, hash_map::Entry},
+    hash::Hash,
     sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError, atomic::Ordering},
 };
 
@@ -11,8 +12,8 @@ use super::{
     chunk::{self, Unpacker},
     clock::{Clocks, Order, seconds},
     container::{Block, op},
-    json::{ANY_KEY, MAX_KEYS},
-    rows::{ANY_PLACE, MAX_COLUMNS, MAX_PLACES, Selection, too_many_columns},
+    json::MAX_KEYS,
+    rows::{Counts, Long, MAX_COLUMNS, MAX_PLACES, Selection, too_many_columns},
 };
 use crate::{Finding, Kind, text::counted};
 
@@ -258,8 +259,8 @@ struct Watch {
     log: Order,
     stamps: Order,
     clocks: Clocks,
-    absent: Vec<(String, u64)>,
-    long: Vec<(String, u64)>,
+    absent: Counts<String>,
+    long: Counts<Long>,
     trailing: u64,
     odd: Vec<(Arc<str>, u64, i64)>,
     /// Path, name and number of the columns in the order of the last batch, which mostly is that of the next; no number where there are too many.
@@ -425,7 +426,15 @@ impl<'a> Taker<'a> {
             watch.log.observe(times);
             if !stamps.is_empty() {
                 watch.clocks.observe(times, stamps);
-                watch.stamps.observe(stamps);
+                // One that was never set is told as such, and is no leap of half a century.
+                let set = |(t, s): (&i64, &i64)| (*s != 0 || *t == 0).then_some(*s);
+                match stamps.contains(&0) {
+                    true => {
+                        let stamps: Vec<i64> = times.iter().zip(stamps).filter_map(set).collect();
+                        watch.stamps.observe(&stamps);
+                    }
+                    false => watch.stamps.observe(stamps),
+                }
             }
         }
         add(&mut watch.absent, std::mem::take(&mut batch.absent));
@@ -635,7 +644,7 @@ impl<'a> Taker<'a> {
                     ),
                 );
             }
-            for (field, count) in &watch.absent {
+            for (field, count) in &watch.absent.list {
                 let text = if *count == watch.messages {
                     format!("{field} is declared as not given (covariance -1)")
                 } else {
@@ -646,21 +655,21 @@ impl<'a> Taker<'a> {
                 };
                 say(Kind::AbsentField, *count, None, text);
             }
-            for (field, count) in &watch.long {
+            for (what, count) in watch.long.list.iter().take(MAX_TROUBLES) {
                 let messages = counted(*count, "message", "messages");
                 let whole = |field: &str| match field {
                     "" => "the message itself".to_owned(),
                     field => field.to_owned(),
                 };
-                let text = match field.strip_suffix(ANY_KEY) {
-                    None if field == ANY_PLACE => format!(
-                        "sequences, maps and objects have more than {MAX_PLACES} fields together in {messages}; what has further ones is left out"
+                let text = match what {
+                    Long::Places => format!(
+                        "sequences, maps and objects have more than {MAX_PLACES} fields together, or names that take as much room, in {messages}; what has further ones is left out"
                     ),
-                    Some(field) => format!(
+                    Long::Keys(field) => format!(
                         "{} has more keys than the {MAX_KEYS} that become signals, in {messages}; what has further ones is left out",
                         whole(field)
                     ),
-                    None => format!(
+                    Long::Items(field) => format!(
                         "{} has more than {} items ({}) in {messages}; it is not among the signals there",
                         whole(field),
                         self.recording.most_items(&info.schema),
@@ -668,6 +677,11 @@ impl<'a> Taker<'a> {
                     ),
                 };
                 say(Kind::LongSequence, *count, None, text);
+            }
+            if watch.long.list.len() > MAX_TROUBLES {
+                let further = (watch.long.list.len() - MAX_TROUBLES) as u64;
+                let text = format!("{further} further fields are too long in some messages");
+                say(Kind::LongSequence, further, None, text);
             }
             if watch.trailing > 0 {
                 let text = format!(
@@ -714,12 +728,10 @@ impl<'a> Taker<'a> {
 /// More troubles than this are counted, not listed.
 const MAX_TROUBLES: usize = 1000;
 
-fn add(counts: &mut Vec<(String, u64)>, more: Vec<(String, u64)>) {
-    for (field, count) in more {
-        match counts.iter_mut().find(|(known, _)| *known == field) {
-            Some((_, sum)) => *sum += count,
-            None => counts.push((field, count)),
-        }
+fn add<K: Clone + Eq + Hash>(counts: &mut Counts<K>, more: Vec<(K, u64)>) {
+    for (what, count) in more {
+        let place = counts.place(what);
+        counts.list[place].1 += count;
     }
 }
 

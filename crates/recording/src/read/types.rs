@@ -44,6 +44,15 @@ pub(super) enum Type {
 }
 
 impl Type {
+    /// What a collection is of: of an array of arrays, which is one of several dimensions, what those are of.
+    pub fn item(&self) -> &Type {
+        match self {
+            Type::Array(inner, _) if matches!(**inner, Type::Array(..)) => inner.item(),
+            Type::Array(inner, _) | Type::Sequence(inner) => inner,
+            _ => self,
+        }
+    }
+
     /// The number that it is on the wire, if it is one.
     pub fn prim(&self) -> Option<Prim> {
         match self {
@@ -67,7 +76,12 @@ pub(super) struct Types {
     pub structs: Vec<Struct>,
     /// A struct within the message that XCDR2 puts a size before, if there is one.
     pub appendable: Option<String>,
+    /// Fields that structs have from those that they inherit from, copies of copies included.
+    pub inherited: usize,
 }
+
+/// More fields than this in one message type are refused: a schema could otherwise multiply arrays of arrays, or what is inherited, without end.
+pub(super) const MAX_FIELDS: usize = 100_000;
 
 impl Types {
     /// Refuses types that contain themselves: no message of such a type is finite.

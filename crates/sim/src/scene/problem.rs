@@ -141,10 +141,11 @@ pub(crate) fn check_clock(
         ));
     }
     if first_s + scene.duration_s * (1.0 + drift_ppm * 1e-6) > LAST_STAMP_S {
-        return Err(problem(
-            &offset,
-            format!("found {offset_s}: {PAST_LAST_STAMP}"),
-        ));
+        let (key, found) = match first_s + scene.duration_s > LAST_STAMP_S {
+            true => (&offset, offset_s),
+            false => (&drift, drift_ppm),
+        };
+        return Err(problem(key, format!("found {found}: {PAST_LAST_STAMP}")));
     }
     Ok(())
 }

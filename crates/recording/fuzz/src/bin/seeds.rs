@@ -15,7 +15,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
             let mut seed = vec![u8::try_from(channel.schema.len()).unwrap_or(255)];
             seed.extend(channel.schema.bytes().take(255));
             seed.extend((channel.schema_data.len() as u16).to_le_bytes());
-            seed.extend(&channel.schema_data);
+            seed.extend(&channel.schema_data[..]);
             seed
         })
         .collect();
