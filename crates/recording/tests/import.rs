@@ -851,7 +851,15 @@ fn sound_of_every_width_becomes_the_same_samples() {
         &made[1][36..],
     ]
     .concat();
-    for bytes in made.into_iter().chain([extended]) {
+    // Two heads, of which the second counts, with the 40 bytes of an extensible format.
+    let extensible = [
+        &b"fmt \x28\0\0\0\xfe\xff"[..],
+        &made[0][22..36],
+        b"\x16\0\x10\0\0\0\0\0\x01\0\0\0\0\0\x10\0\x80\0\0\xaa\0\x38\x9b\x71",
+    ]
+    .concat();
+    let twice = [&made[0][..12], &extensible, &extensible, &made[0][36..]].concat();
+    for bytes in made.into_iter().chain([extended, twice]) {
         let folder = folder();
         let path = folder.path().join("drum 1.wav");
         fs::write(&path, &bytes).expect("writes");
@@ -914,11 +922,28 @@ fn sound_stands_where_it_is_said_to_begin_and_its_loss_is_said() {
     for bytes in [&b"RIFF...."[..], b"RF64....WAVE", b"RIFF....WAVE", b""] {
         assert!(error("a.wav", bytes).starts_with("a.wav: is no WAV file: "));
     }
+    // A head that is at odds with itself.
+    let mut odd = wav(1, 1, 8000, 16, &[1; 8]);
+    odd[32] = 4;
     for (bytes, found) in [
         (
             wav(1, 0, 8000, 16, &[1; 8]),
-            "16-bit sound of format 0x0001",
+            "0 channels, frames of 0 bytes, 8000 Hz, 0 bytes a second",
         ),
+        (
+            odd,
+            "1 channels, frames of 4 bytes, 8000 Hz, 16000 bytes a second",
+        ),
+    ] {
+        let said = error("b.wav", &bytes);
+        assert!(
+            said.starts_with("b.wav: holds 16-bit sound of format 0x0001: Ill-formed WAVE file: "),
+            "{said}"
+        );
+        let found = format!("; found {found}, which do not agree");
+        assert!(said.ends_with(&found), "{said}");
+    }
+    for (bytes, found) in [
         (wav(7, 1, 8000, 8, &[1; 8]), "8-bit sound of format 0x0007"),
         (
             wav(3, 1, 8000, 64, &[1; 8]),
