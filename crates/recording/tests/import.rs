@@ -1255,20 +1255,27 @@ fn a_folder_of_several_devices_gives_each_a_topic() {
     }
     // Where a device has several files, nothing tells which belong together.
     let logger = "time,seconds_elapsed,z,y,x\n1700000000000000001,0.1,9.8,0.2,0.1\n";
-    for (one, other, text, what) in [
+    for (one, other, text, what, advice) in [
         (
             "a/TotalAcceleration.csv",
             "b/TotalAcceleration.csv",
             logger,
             "the name TotalAcceleration.csv",
+            "give each folder by itself",
         ),
-        ("a.csv", "b.csv", phone, "Acceleration x (m/s^2)"),
+        (
+            "a.csv",
+            "b.csv",
+            phone,
+            "Acceleration x (m/s^2)",
+            "give each device a folder of its own",
+        ),
     ] {
         let two = [(one, text.to_owned()), (other, text.to_owned())];
         let two = zipped(folder.path(), "two.zip", &two);
         let refused = read(&[two], None).err().expect("refused").to_string();
         let wanted = format!(
-            "two.zip: has two files with {what}, {one} and {other}; expected those of one device: give each device a folder of its own"
+            "two.zip: has two files with {what}, {one} and {other}; expected those of one device: {advice}"
         );
         assert!(refused.ends_with(&wanted), "{refused}");
     }

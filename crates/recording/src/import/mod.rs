@@ -112,10 +112,15 @@ impl Files {
 
     /// Two files of what one device has once.
     fn two(&self, what: &str, one: &str, other: &str) -> ImportError {
+        let folder = |path: &str| path.len() - file_name(path).len();
+        let advice = match one[..folder(one)] == other[..folder(other)] {
+            true => "give each device a folder of its own",
+            false => "give each folder by itself",
+        };
         ImportError::Content {
             name: self.name.clone(),
             problem: format!(
-                "has two files with {what}, {one} and {other}; expected those of one device: give each device a folder of its own"
+                "has two files with {what}, {one} and {other}; expected those of one device: {advice}"
             ),
         }
     }
