@@ -1193,7 +1193,7 @@ fn a_folder_of_several_devices_gives_each_a_topic() {
         [
             "D1.csv: angular velocities were in deg/s",
             "of no kind that is known, and left out: notes.txt",
-            "D2.csv: angular velocities were in deg/s",
+            "right/D2.csv: angular velocities were in deg/s",
             "drum.wav is left out: sound is given as a file of its own",
         ]
     );
@@ -1278,6 +1278,35 @@ fn a_folder_of_several_devices_gives_each_a_topic() {
             "two.zip: has two files with {what}, {one} and {other}; expected those of one device: {advice}"
         );
         assert!(refused.ends_with(&wanted), "{refused}");
+    }
+}
+
+/// Each note stands under the topic that it is of, and tells the file.
+#[test]
+fn notes_of_devices_with_one_name_stand_apart() {
+    let folder = folder();
+    let head = "PacketCounter,SampleTimeFine,Acc_X,Acc_Y,Acc_Z\n1,5,0,0,9.8\n";
+    let files = [
+        ("a/imu.csv", format!("{head}2,")),
+        ("b/imu.csv", format!("{head}2,6,0,0,9.8\n3,")),
+        ("c/imu_2.csv", format!("{head}2,6,0")),
+    ];
+    let imu = zipped(folder.path(), "imu.zip", &files);
+    let sound = folder.path().join("imu.wav");
+    fs::write(&sound, wav(1, 1, 4000, 8, &[128; 4000])).expect("writes");
+    let got = ingest(folder.path(), &[imu, sound], None).expect("ingests");
+    let metadata = &got.recording.info().metadata["rath"];
+    let cut = |file: &str, line: u32, cells: u32| {
+        format!(
+            "{file}: line {line}, the last, has {cells} of 5 cells: it was cut off and is left out"
+        )
+    };
+    assert_eq!(metadata["notes./imu/imu"], cut("a/imu.csv", 3, 2));
+    assert_eq!(metadata["notes./imu/imu_2"], cut("b/imu.csv", 4, 2));
+    assert_eq!(metadata["notes./imu/imu_2_2"], cut("c/imu_2.csv", 3, 3));
+    assert_eq!(metadata["notes./audio/imu"], "8-bit sound became 16-bit");
+}
+
     }
 }
 

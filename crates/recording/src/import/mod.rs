@@ -17,7 +17,7 @@ mod wav;
 mod xsens;
 
 use std::{
-    collections::BTreeMap,
+    collections::{BTreeMap, HashMap},
     fs, io,
     io::Read,
     path::{Path, PathBuf},
@@ -52,6 +52,19 @@ pub enum ImportError {
     /// The recording cannot be written.
     #[error(transparent)]
     Write(#[from] WriteError),
+}
+
+impl ImportError {
+    /// The same of a file in a folder or zip, named too.
+    fn within(self, files: &str) -> Self {
+        match self {
+            Self::Content { name, problem } if name != files => Self::Content {
+                name: format!("{files}: {name}"),
+                problem,
+            },
+            other => other,
+        }
+    }
 }
 
 /// What came of an ingestion.
@@ -194,23 +207,27 @@ pub fn ingest(
         ("source".to_owned(), "field".to_owned()),
     ]
     .into();
-    let mut note = |path: &Path, name: &str, said: &[String]| {
+    let mut note = |path: &Path, topic: &str, said: &[String]| {
         notes.extend(said.iter().map(|n| format!("{}: {n}", path.display())));
         if !said.is_empty() {
-            metadata.insert(format!("notes.{name}"), said.join("; "));
+            metadata.insert(format!("notes.{topic}"), said.join("; "));
         }
     };
+    let (mut devices, mut recorders) = (HashMap::new(), HashMap::new());
     for path in paths {
         if wav::is_wav(path)? {
-            let sound = wav::Sound::open(path)?;
-            note(path, &sound.name, &sound.notes);
+            let mut sound = wav::Sound::open(path)?;
+            sound.name = unique(&mut recorders, sound.name);
+            note(path, &sound.topic(), &sound.notes);
             sounds.push(sound);
             continue;
         }
         wav::refuse(path)?;
         let files = open(path)?;
-        for log in read(&files, layout.as_ref())? {
-            note(path, &log.name, &log.notes);
+        let read = read(&files, layout.as_ref()).map_err(|error| error.within(&files.name))?;
+        for mut log in read {
+            log.name = unique(&mut devices, log.name);
+            note(path, &log.topic(), &log.notes);
             logs.push(log);
         }
         beside.extend(files.sounds.iter().map(|sound| {
@@ -252,6 +269,18 @@ pub fn ingest(
     })
 }
 
+/// Two devices of one name stay two: the name, or the first of `name_2`, `name_3`, … that is not taken. `taken` holds names with the next number.
+fn unique(taken: &mut HashMap<String, u64>, name: String) -> String {
+    let mut found = name.clone();
+    while taken.contains_key(&found) {
+        let number = taken.entry(name.clone()).or_insert(2);
+        found = format!("{name}_{number}");
+        *number += 1;
+    }
+    taken.insert(found.clone(), 2);
+    found
+}
+
 /// Writes logs and sounds as one recording, in the order of time. Returns topics and how many messages each got.
 fn write(
     logs: &[imu::Log],
@@ -260,22 +289,9 @@ fn write(
 ) -> Result<Vec<(String, u64)>, ImportError> {
     let mut topics: Vec<(String, u64)> = Vec::new();
     let mut channels = Vec::new();
-    let names = logs
-        .iter()
-        .map(|log| (format!("/imu/{}", log.name), MessageKind::Imu));
-    let names = names.chain(
-        sounds
-            .iter()
-            .map(|sound| (format!("/audio/{}", sound.name), MessageKind::RawAudio)),
-    );
-    for (name, kind) in names {
-        // Two devices of one name stay two.
-        let mut topic = name.clone();
-        let mut number = 2;
-        while topics.iter().any(|(known, _)| *known == topic) {
-            topic = format!("{name}_{number}");
-            number += 1;
-        }
+    let of_logs = logs.iter().map(|log| (log.topic(), MessageKind::Imu));
+    let of_sounds = sounds.iter().map(|s| (s.topic(), MessageKind::RawAudio));
+    for (topic, kind) in of_logs.chain(of_sounds) {
         channels.push(writer.channel(&topic, kind)?);
         topics.push((topic, 0));
     }
@@ -291,18 +307,16 @@ fn write(
     }
     order.sort_unstable();
     for (t_ns, device, row) in order {
-        let (topic, count) = &mut topics[device];
         match logs.get(device) {
             Some(log) => {
-                let frame = topic.strip_prefix("/imu/").unwrap_or_default();
-                writer.message(channels[device], t_ns, &log.samples[row].message(frame))?;
+                writer.message(channels[device], t_ns, &log.samples[row].message(&log.name))?;
             }
             None => match sounds[device - logs.len()].block(t_ns) {
                 Some(block) => writer.message(channels[device], t_ns, &block)?,
                 None => continue,
             },
         }
-        *count += 1;
+        topics[device].1 += 1;
     }
     Ok(topics)
 }
@@ -407,9 +421,9 @@ fn read(files: &Files, layout: Option<&layout::Layout>) -> Result<Vec<imu::Log>,
                 problem: "has a header but no rows; expected at least one sample".to_owned(),
             });
         }
-        if !is_alone {
+        if name != files.name {
             for note in &mut log.notes {
-                *note = format!("{}: {note}", file_name(name));
+                *note = format!("{name}: {note}");
             }
         }
         logs.push(log);
@@ -508,7 +522,8 @@ fn open(path: &Path) -> Result<Files, ImportError> {
     };
     if path.is_dir() {
         // Apps put at most one level of folders (`meta`) beside their tables.
-        for folder in [path.to_owned(), path.join("meta")] {
+        for inside in ["", "meta/"] {
+            let folder = path.join(inside);
             if !folder.is_dir() {
                 continue;
             }
@@ -522,9 +537,10 @@ fn open(path: &Path) -> Result<Files, ImportError> {
                 if !is_log(&entry_name) {
                     continue;
                 }
-                let what = entry.path().display().to_string();
+                let what = format!("{inside}{entry_name}");
                 let mut file = fs::File::open(entry.path()).map_err(io)?;
-                texts.push((what.clone(), text(&mut file, &what)?));
+                let read = text(&mut file, &what)?;
+                texts.push((what, read));
             }
         }
         return Ok(Files {

@@ -270,6 +270,10 @@ impl Sound {
         })
     }
 
+    pub fn topic(&self) -> String {
+        format!("/audio/{}", self.name)
+    }
+
     /// When each block begins, ns since 1970.
     pub fn block_times(&self) -> impl Iterator<Item = i64> + use<> {
         let (start_ns, rate) = (self.start_ns, u64::from(self.spec.sample_rate));
