@@ -1307,6 +1307,28 @@ fn notes_of_devices_with_one_name_stand_apart() {
     assert_eq!(metadata["notes./audio/imu"], "8-bit sound became 16-bit");
 }
 
+/// Whatever the folder is called that the log is in.
+#[test]
+fn phyphox_in_a_folder_called_meta() {
+    let folder = folder();
+    let head = "Time (s),Acceleration x (m/s^2),Acceleration y (m/s^2),Acceleration z (m/s^2)";
+    let start = "event,experiment time,system time\nSTART,0.0,1700000000.5\n";
+    let log = |time: &str| {
+        let run = folder.path().join("meta/run");
+        let rows = format!("{head}\n0.5,1,0,9.8\n{time},2,0,9.8\n");
+        file(&run, "Accelerometer.csv", &rows);
+        file(&run, "meta/time.csv", start);
+        ingest(folder.path(), &[run], None)
+    };
+    let got = log("0.6").expect("ingests");
+    assert_eq!(got.times("/imu/run")[0], 1_700_000_001_000_000_000);
+    // Times that no clock tells.
+    for time in ["-inf", "inf", "-1e12", "1e12"] {
+        let said = log(time).err().expect("refused").to_string();
+        assert!(
+            said.contains("run: Accelerometer.csv: has the time ") && said.contains(" in row 2; "),
+            "{said}"
+        );
     }
 }
 
