@@ -1214,14 +1214,48 @@ fn a_folder_of_several_devices_gives_each_a_topic() {
     file(&mixed, "Accelerometer.csv", phone);
     let got = read(&[mixed], None).expect("ingests");
     assert_eq!(got.ingested.topics, topics(&["mixed", "a", "b", "c", "d"]));
+    // What the phone's app writes beside its tables is its own, what others write is not.
+    let beside = [
+        ("Accelerometer.csv", phone.to_owned()),
+        ("meta/device.csv", "property,value\n".to_owned()),
+        ("d.csv", dot(1)),
+        ("other/e.csv", "t,ax,ay,az\n1,2,3,4\n".to_owned()),
+    ];
+    let got = read(&[zipped(folder.path(), "mix.zip", &beside)], None).expect("ingests");
+    assert_eq!(got.ingested.topics, topics(&["mix", "d"]));
+    let told = |got: &Imported, what: &str| got.ingested.notes.iter().any(|n| n.ends_with(what));
+    assert!(
+        told(&got, "known, and left out: other/e.csv"),
+        "{:?}",
+        got.ingested.notes
+    );
+    // One that has no rows is no reason to refuse the others.
+    let empty = dot(1).lines().take(1).collect();
+    let head = shimmer.lines().take(1).collect();
+    let files = [("a.csv", empty), ("b.csv", dot(1)), ("c.csv", head)];
+    let got = read(&[zipped(folder.path(), "one.zip", &files)], None).expect("ingests");
+    assert_eq!(got.ingested.topics, topics(&["b"]));
+    for empty in ["a.csv", "c.csv"] {
+        let note = format!("{empty}: has a header but no rows, and is left out");
+        assert!(told(&got, &note), "{:?}", got.ingested.notes);
+    }
+    // A file that cannot be read is named with the zip that it is in.
+    let files = [("a/d.csv", dot(1).replace(",5,", ",x,")), ("b.csv", dot(1))];
+    let refused = read(&[zipped(folder.path(), "bad.zip", &files)], None);
+    let refused = refused.err().expect("refused").to_string();
+    assert!(
+        refused.contains("bad.zip: a/d.csv: line 2, column"),
+        "{refused}"
+    );
 
     let laid = folder.path().join("laid");
     file(&laid, "a.csv", x_io);
     file(&laid, "b.csv", x_io);
     let got = read(std::slice::from_ref(&laid), Some("x-io")).expect("ingests");
     assert_eq!(got.ingested.topics, topics(&["a", "b"]));
-    // What the layout does not fit is left out beside what it fits, and else says what it lacks.
-    file(&laid, "c.csv", "Time (s),gyro\n1,2\n");
+    // What the layout does not fit, by whole names, is left out beside what it fits, and else says what it lacks.
+    let means = x_io.replace("(g)", "(g) mean");
+    file(&laid, "c.csv", &means);
     let got = read(std::slice::from_ref(&laid), Some("x-io")).expect("ingests");
     assert_eq!(got.ingested.topics, topics(&["a", "b"]));
     let told = got

@@ -325,6 +325,8 @@ fn write(
 struct Format {
     name: &'static str,
     is_header: fn(&str) -> bool,
+    /// How the names of its own files end that have another header.
+    beside: &'static [&'static str],
     device: Device,
 }
 
@@ -342,26 +344,31 @@ const FORMATS: &[Format] = &[
     Format {
         name: "Sensor Logger",
         is_header: sensor_logger::is_header,
+        beside: &["Metadata.csv"],
         device: Device::Folder(sensor_logger::read),
     },
     Format {
         name: "phyphox",
         is_header: phyphox::is_header,
+        beside: &["meta/time.csv", "meta/device.csv"],
         device: Device::Folder(phyphox::read),
     },
     Format {
         name: "Movella DOT / Xsens",
         is_header: xsens::is_header,
+        beside: &[],
         device: Device::File(xsens::read),
     },
     Format {
         name: "Shimmer",
         is_header: shimmer::is_header,
+        beside: &[],
         device: Device::File(shimmer::read),
     },
     Format {
         name: "MetaBase",
         is_header: metabase::is_header,
+        beside: &[],
         device: Device::Folder(metabase::read),
     },
 ];
@@ -374,10 +381,14 @@ fn read(files: &Files, layout: Option<&layout::Layout>) -> Result<Vec<imu::Log>,
     let folders: Vec<_> = FORMATS
         .iter()
         .filter_map(|format| match format.device {
-            Device::Folder(read) if layout.is_none() => Some((format.is_header, read)),
+            Device::Folder(read) if layout.is_none() => Some((format, read)),
             _ => None,
         })
-        .filter(|(is_header, _)| files.texts().any(|(_, text)| has_header(text, *is_header)))
+        .filter(|(format, _)| {
+            files
+                .texts()
+                .any(|(_, text)| has_header(text, format.is_header))
+        })
         .collect();
     let (mut devices, mut others) = (Vec::new(), Vec::new());
     for &(_, read) in &folders {
@@ -389,12 +400,16 @@ fn read(files: &Files, layout: Option<&layout::Layout>) -> Result<Vec<imu::Log>,
     for (name, text) in files.texts() {
         if folders
             .iter()
-            .any(|(is_header, _)| has_header(text, *is_header))
+            .any(|(format, _)| has_header(text, format.is_header))
         {
             continue;
         }
+        let of_app = || {
+            let mut beside = folders.iter().flat_map(|(format, _)| format.beside);
+            beside.any(|end| name.ends_with(end))
+        };
         match layout {
-            Some(_) if any_fits && !fits(text) => others.push(file_name(name)),
+            Some(_) if any_fits && !fits(text) => others.push(name),
             // Where none fits, the first says what it lacks.
             Some(layout) => {
                 let read: Reader = Box::new(|name, text| layout::read(layout, name, text));
@@ -402,7 +417,8 @@ fn read(files: &Files, layout: Option<&layout::Layout>) -> Result<Vec<imu::Log>,
             }
             None => match reader(text) {
                 Some(read) => devices.push((name, text, read)),
-                None => others.push(file_name(name)),
+                None if of_app() => {}
+                None => others.push(name),
             },
         }
     }
@@ -410,16 +426,14 @@ fn read(files: &Files, layout: Option<&layout::Layout>) -> Result<Vec<imu::Log>,
         return Err(unknown(files));
     }
     let is_alone = devices.len() == 1;
-    let mut logs = Vec::new();
+    let (mut logs, mut empty) = (Vec::new(), Vec::new());
     for (name, text, read) in devices {
         // What is alone is called as the folder or zip that it is in.
         let name = if is_alone { &files.name } else { name };
         let mut log = read(name, text)?;
         if log.samples.is_empty() {
-            return Err(ImportError::Content {
-                name: name.to_owned(),
-                problem: "has a header but no rows; expected at least one sample".to_owned(),
-            });
+            empty.push(name);
+            continue;
         }
         if name != files.name {
             for note in &mut log.notes {
@@ -428,9 +442,16 @@ fn read(files: &Files, layout: Option<&layout::Layout>) -> Result<Vec<imu::Log>,
         }
         logs.push(log);
     }
-    // Apps put other tables beside theirs.
-    if folders.is_empty() && !others.is_empty() {
-        logs[0].notes.push(format!(
+    let Some(first) = logs.first_mut() else {
+        return Err(ImportError::Content {
+            name: empty[0].to_owned(),
+            problem: "has a header but no rows; expected at least one sample".to_owned(),
+        });
+    };
+    let left_out = |name: &&str| format!("{name}: has a header but no rows, and is left out");
+    first.notes.extend(empty.iter().map(left_out));
+    if !others.is_empty() {
+        first.notes.push(format!(
             "of no kind that is known, and left out: {}",
             others.join(", ")
         ));
