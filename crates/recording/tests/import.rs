@@ -851,7 +851,15 @@ fn sound_of_every_width_becomes_the_same_samples() {
         &made[1][36..],
     ]
     .concat();
-    for bytes in made.into_iter().chain([extended]) {
+    // Two heads, of which the second counts, with the 40 bytes of an extensible format.
+    let extensible = [
+        &b"fmt \x28\0\0\0\xfe\xff"[..],
+        &made[0][22..36],
+        b"\x16\0\x10\0\0\0\0\0\x01\0\0\0\0\0\x10\0\x80\0\0\xaa\0\x38\x9b\x71",
+    ]
+    .concat();
+    let twice = [&made[0][..12], &extensible, &extensible, &made[0][36..]].concat();
+    for bytes in made.into_iter().chain([extended, twice]) {
         let folder = folder();
         let path = folder.path().join("drum 1.wav");
         fs::write(&path, &bytes).expect("writes");
@@ -914,11 +922,28 @@ fn sound_stands_where_it_is_said_to_begin_and_its_loss_is_said() {
     for bytes in [&b"RIFF...."[..], b"RF64....WAVE", b"RIFF....WAVE", b""] {
         assert!(error("a.wav", bytes).starts_with("a.wav: is no WAV file: "));
     }
+    // A head that is at odds with itself.
+    let mut odd = wav(1, 1, 8000, 16, &[1; 8]);
+    odd[32] = 4;
     for (bytes, found) in [
         (
             wav(1, 0, 8000, 16, &[1; 8]),
-            "16-bit sound of format 0x0001",
+            "0 channels, frames of 0 bytes, 8000 Hz, 0 bytes a second",
         ),
+        (
+            odd,
+            "1 channels, frames of 4 bytes, 8000 Hz, 16000 bytes a second",
+        ),
+    ] {
+        let said = error("b.wav", &bytes);
+        assert!(
+            said.starts_with("b.wav: holds 16-bit sound of format 0x0001: Ill-formed WAVE file: "),
+            "{said}"
+        );
+        let found = format!("; found {found}, which do not agree");
+        assert!(said.ends_with(&found), "{said}");
+    }
+    for (bytes, found) in [
         (wav(7, 1, 8000, 8, &[1; 8]), "8-bit sound of format 0x0007"),
         (
             wav(3, 1, 8000, 64, &[1; 8]),
@@ -1168,7 +1193,7 @@ fn a_folder_of_several_devices_gives_each_a_topic() {
         [
             "D1.csv: angular velocities were in deg/s",
             "of no kind that is known, and left out: notes.txt",
-            "D2.csv: angular velocities were in deg/s",
+            "right/D2.csv: angular velocities were in deg/s",
             "drum.wav is left out: sound is given as a file of its own",
         ]
     );
@@ -1189,14 +1214,48 @@ fn a_folder_of_several_devices_gives_each_a_topic() {
     file(&mixed, "Accelerometer.csv", phone);
     let got = read(&[mixed], None).expect("ingests");
     assert_eq!(got.ingested.topics, topics(&["mixed", "a", "b", "c", "d"]));
+    // What the phone's app writes beside its tables is its own, what others write is not.
+    let beside = [
+        ("Accelerometer.csv", phone.to_owned()),
+        ("meta/device.csv", "property,value\n".to_owned()),
+        ("d.csv", dot(1)),
+        ("other/e.csv", "t,ax,ay,az\n1,2,3,4\n".to_owned()),
+    ];
+    let got = read(&[zipped(folder.path(), "mix.zip", &beside)], None).expect("ingests");
+    assert_eq!(got.ingested.topics, topics(&["mix", "d"]));
+    let told = |got: &Imported, what: &str| got.ingested.notes.iter().any(|n| n.ends_with(what));
+    assert!(
+        told(&got, "known, and left out: other/e.csv"),
+        "{:?}",
+        got.ingested.notes
+    );
+    // One that has no rows is no reason to refuse the others.
+    let empty = dot(1).lines().take(1).collect();
+    let head = shimmer.lines().take(1).collect();
+    let files = [("a.csv", empty), ("b.csv", dot(1)), ("c.csv", head)];
+    let got = read(&[zipped(folder.path(), "one.zip", &files)], None).expect("ingests");
+    assert_eq!(got.ingested.topics, topics(&["b"]));
+    for empty in ["a.csv", "c.csv"] {
+        let note = format!("{empty}: has a header but no rows, and is left out");
+        assert!(told(&got, &note), "{:?}", got.ingested.notes);
+    }
+    // A file that cannot be read is named with the zip that it is in.
+    let files = [("a/d.csv", dot(1).replace(",5,", ",x,")), ("b.csv", dot(1))];
+    let refused = read(&[zipped(folder.path(), "bad.zip", &files)], None);
+    let refused = refused.err().expect("refused").to_string();
+    assert!(
+        refused.contains("bad.zip: a/d.csv: line 2, column"),
+        "{refused}"
+    );
 
     let laid = folder.path().join("laid");
     file(&laid, "a.csv", x_io);
     file(&laid, "b.csv", x_io);
     let got = read(std::slice::from_ref(&laid), Some("x-io")).expect("ingests");
     assert_eq!(got.ingested.topics, topics(&["a", "b"]));
-    // What the layout does not fit is left out beside what it fits, and else says what it lacks.
-    file(&laid, "c.csv", "Time (s),gyro\n1,2\n");
+    // What the layout does not fit, by whole names, is left out beside what it fits, and else says what it lacks.
+    let means = x_io.replace("(g)", "(g) mean");
+    file(&laid, "c.csv", &means);
     let got = read(std::slice::from_ref(&laid), Some("x-io")).expect("ingests");
     assert_eq!(got.ingested.topics, topics(&["a", "b"]));
     let told = got
@@ -1230,22 +1289,80 @@ fn a_folder_of_several_devices_gives_each_a_topic() {
     }
     // Where a device has several files, nothing tells which belong together.
     let logger = "time,seconds_elapsed,z,y,x\n1700000000000000001,0.1,9.8,0.2,0.1\n";
-    for (one, other, text, what) in [
+    for (one, other, text, what, advice) in [
         (
             "a/TotalAcceleration.csv",
             "b/TotalAcceleration.csv",
             logger,
             "the name TotalAcceleration.csv",
+            "give each folder by itself",
         ),
-        ("a.csv", "b.csv", phone, "Acceleration x (m/s^2)"),
+        (
+            "a.csv",
+            "b.csv",
+            phone,
+            "Acceleration x (m/s^2)",
+            "give each device a folder of its own",
+        ),
     ] {
         let two = [(one, text.to_owned()), (other, text.to_owned())];
         let two = zipped(folder.path(), "two.zip", &two);
         let refused = read(&[two], None).err().expect("refused").to_string();
         let wanted = format!(
-            "two.zip: has two files with {what}, {one} and {other}; expected those of one device: give each device a folder of its own"
+            "two.zip: has two files with {what}, {one} and {other}; expected those of one device: {advice}"
         );
         assert!(refused.ends_with(&wanted), "{refused}");
+    }
+}
+
+/// Each note stands under the topic that it is of, and tells the file.
+#[test]
+fn notes_of_devices_with_one_name_stand_apart() {
+    let folder = folder();
+    let head = "PacketCounter,SampleTimeFine,Acc_X,Acc_Y,Acc_Z\n1,5,0,0,9.8\n";
+    let files = [
+        ("a/imu.csv", format!("{head}2,")),
+        ("b/imu.csv", format!("{head}2,6,0,0,9.8\n3,")),
+        ("c/imu_2.csv", format!("{head}2,6,0")),
+    ];
+    let imu = zipped(folder.path(), "imu.zip", &files);
+    let sound = folder.path().join("imu.wav");
+    fs::write(&sound, wav(1, 1, 4000, 8, &[128; 4000])).expect("writes");
+    let got = ingest(folder.path(), &[imu, sound], None).expect("ingests");
+    let metadata = &got.recording.info().metadata["rath"];
+    let cut = |file: &str, line: u32, cells: u32| {
+        format!(
+            "{file}: line {line}, the last, has {cells} of 5 cells: it was cut off and is left out"
+        )
+    };
+    assert_eq!(metadata["notes./imu/imu"], cut("a/imu.csv", 3, 2));
+    assert_eq!(metadata["notes./imu/imu_2"], cut("b/imu.csv", 4, 2));
+    assert_eq!(metadata["notes./imu/imu_2_2"], cut("c/imu_2.csv", 3, 3));
+    assert_eq!(metadata["notes./audio/imu"], "8-bit sound became 16-bit");
+}
+
+/// Whatever the folder is called that the log is in.
+#[test]
+fn phyphox_in_a_folder_called_meta() {
+    let folder = folder();
+    let head = "Time (s),Acceleration x (m/s^2),Acceleration y (m/s^2),Acceleration z (m/s^2)";
+    let start = "event,experiment time,system time\nSTART,0.0,1700000000.5\n";
+    let log = |time: &str| {
+        let run = folder.path().join("meta/run");
+        let rows = format!("{head}\n0.5,1,0,9.8\n{time},2,0,9.8\n");
+        file(&run, "Accelerometer.csv", &rows);
+        file(&run, "meta/time.csv", start);
+        ingest(folder.path(), &[run], None)
+    };
+    let got = log("0.6").expect("ingests");
+    assert_eq!(got.times("/imu/run")[0], 1_700_000_001_000_000_000);
+    // Times that no clock tells.
+    for time in ["-inf", "inf", "-1e12", "1e12"] {
+        let said = log(time).err().expect("refused").to_string();
+        assert!(
+            said.contains("run: Accelerometer.csv: has the time ") && said.contains(" in row 2; "),
+            "{said}"
+        );
     }
 }
 

@@ -30,6 +30,10 @@ pub(super) struct Log {
 pub(super) type Track = Vec<(i64, [f64; 3])>;
 
 impl Log {
+    pub fn topic(&self) -> String {
+        format!("/imu/{}", self.name)
+    }
+
     /// Puts a force and a rate track together. Where their times differ, the rate is interpolated linearly at the force's times; where
     /// it has a hole of more than three usual intervals, or none on one side, it is not given.
     pub fn join(name: String, force: Track, rate: Track, mut notes: Vec<String>) -> Self {

@@ -5,9 +5,8 @@ use std::path::Path;
 use serde::Deserialize;
 
 use super::{
-    ImportError,
+    HEADER_LINES, ImportError,
     date::times_ns,
-    has_header,
     imu::{self, Log, STANDARD_GRAVITY, Track},
     table::Table,
 };
@@ -135,13 +134,15 @@ pub(super) fn fitting(text: &str) -> Option<Layout> {
 
 /// Whether a text has the header, with the columns that a layout needs.
 pub(super) fn fits(layout: &Layout, text: &str) -> bool {
-    has_header(text, |line| {
-        let needed = [&layout.acceleration, &layout.angular_velocity];
-        let mut needed = needed.into_iter().flatten().filter(|v| !v.optional);
-        layout.is_header(line)
-            && line.contains(&layout.time.column)
-            && needed.all(|v| v.columns.iter().all(|c| line.contains(c)))
-    })
+    let mut lines = text.lines().take(HEADER_LINES);
+    let Some(header) = lines.find(|line| layout.is_header(line)) else {
+        return false;
+    };
+    let needed = [&layout.acceleration, &layout.angular_velocity];
+    let needed = needed.into_iter().flatten().filter(|v| !v.optional);
+    let mut needed = needed.flat_map(|v| &v.columns).chain([&layout.time.column]);
+    Table::parse("", header, |_| true)
+        .is_ok_and(|table| needed.all(|column| table.find(column).is_some()))
 }
 
 fn factor(vector: &Vector, units: &[(&str, f64)], name: &str) -> Result<f64, ImportError> {

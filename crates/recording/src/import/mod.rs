@@ -17,7 +17,7 @@ mod wav;
 mod xsens;
 
 use std::{
-    collections::BTreeMap,
+    collections::{BTreeMap, HashMap},
     fs, io,
     io::Read,
     path::{Path, PathBuf},
@@ -52,6 +52,19 @@ pub enum ImportError {
     /// The recording cannot be written.
     #[error(transparent)]
     Write(#[from] WriteError),
+}
+
+impl ImportError {
+    /// The same of a file in a folder or zip, named too.
+    fn within(self, files: &str) -> Self {
+        match self {
+            Self::Content { name, problem } if name != files => Self::Content {
+                name: format!("{files}: {name}"),
+                problem,
+            },
+            other => other,
+        }
+    }
 }
 
 /// What came of an ingestion.
@@ -112,10 +125,15 @@ impl Files {
 
     /// Two files of what one device has once.
     fn two(&self, what: &str, one: &str, other: &str) -> ImportError {
+        let folder = |path: &str| path.len() - file_name(path).len();
+        let advice = match one[..folder(one)] == other[..folder(other)] {
+            true => "give each device a folder of its own",
+            false => "give each folder by itself",
+        };
         ImportError::Content {
             name: self.name.clone(),
             problem: format!(
-                "has two files with {what}, {one} and {other}; expected those of one device: give each device a folder of its own"
+                "has two files with {what}, {one} and {other}; expected those of one device: {advice}"
             ),
         }
     }
@@ -189,23 +207,27 @@ pub fn ingest(
         ("source".to_owned(), "field".to_owned()),
     ]
     .into();
-    let mut note = |path: &Path, name: &str, said: &[String]| {
+    let mut note = |path: &Path, topic: &str, said: &[String]| {
         notes.extend(said.iter().map(|n| format!("{}: {n}", path.display())));
         if !said.is_empty() {
-            metadata.insert(format!("notes.{name}"), said.join("; "));
+            metadata.insert(format!("notes.{topic}"), said.join("; "));
         }
     };
+    let (mut devices, mut recorders) = (HashMap::new(), HashMap::new());
     for path in paths {
         if wav::is_wav(path)? {
-            let sound = wav::Sound::open(path)?;
-            note(path, &sound.name, &sound.notes);
+            let mut sound = wav::Sound::open(path)?;
+            sound.name = unique(&mut recorders, sound.name);
+            note(path, &sound.topic(), &sound.notes);
             sounds.push(sound);
             continue;
         }
         wav::refuse(path)?;
         let files = open(path)?;
-        for log in read(&files, layout.as_ref())? {
-            note(path, &log.name, &log.notes);
+        let read = read(&files, layout.as_ref()).map_err(|error| error.within(&files.name))?;
+        for mut log in read {
+            log.name = unique(&mut devices, log.name);
+            note(path, &log.topic(), &log.notes);
             logs.push(log);
         }
         beside.extend(files.sounds.iter().map(|sound| {
@@ -247,6 +269,18 @@ pub fn ingest(
     })
 }
 
+/// Two devices of one name stay two: the name, or the first of `name_2`, `name_3`, … that is not taken. `taken` holds names with the next number.
+fn unique(taken: &mut HashMap<String, u64>, name: String) -> String {
+    let mut found = name.clone();
+    while taken.contains_key(&found) {
+        let number = taken.entry(name.clone()).or_insert(2);
+        found = format!("{name}_{number}");
+        *number += 1;
+    }
+    taken.insert(found.clone(), 2);
+    found
+}
+
 /// Writes logs and sounds as one recording, in the order of time. Returns topics and how many messages each got.
 fn write(
     logs: &[imu::Log],
@@ -255,22 +289,9 @@ fn write(
 ) -> Result<Vec<(String, u64)>, ImportError> {
     let mut topics: Vec<(String, u64)> = Vec::new();
     let mut channels = Vec::new();
-    let names = logs
-        .iter()
-        .map(|log| (format!("/imu/{}", log.name), MessageKind::Imu));
-    let names = names.chain(
-        sounds
-            .iter()
-            .map(|sound| (format!("/audio/{}", sound.name), MessageKind::RawAudio)),
-    );
-    for (name, kind) in names {
-        // Two devices of one name stay two.
-        let mut topic = name.clone();
-        let mut number = 2;
-        while topics.iter().any(|(known, _)| *known == topic) {
-            topic = format!("{name}_{number}");
-            number += 1;
-        }
+    let of_logs = logs.iter().map(|log| (log.topic(), MessageKind::Imu));
+    let of_sounds = sounds.iter().map(|s| (s.topic(), MessageKind::RawAudio));
+    for (topic, kind) in of_logs.chain(of_sounds) {
         channels.push(writer.channel(&topic, kind)?);
         topics.push((topic, 0));
     }
@@ -286,18 +307,16 @@ fn write(
     }
     order.sort_unstable();
     for (t_ns, device, row) in order {
-        let (topic, count) = &mut topics[device];
         match logs.get(device) {
             Some(log) => {
-                let frame = topic.strip_prefix("/imu/").unwrap_or_default();
-                writer.message(channels[device], t_ns, &log.samples[row].message(frame))?;
+                writer.message(channels[device], t_ns, &log.samples[row].message(&log.name))?;
             }
             None => match sounds[device - logs.len()].block(t_ns) {
                 Some(block) => writer.message(channels[device], t_ns, &block)?,
                 None => continue,
             },
         }
-        *count += 1;
+        topics[device].1 += 1;
     }
     Ok(topics)
 }
@@ -306,6 +325,8 @@ fn write(
 struct Format {
     name: &'static str,
     is_header: fn(&str) -> bool,
+    /// How the names of its own files end that have another header.
+    beside: &'static [&'static str],
     device: Device,
 }
 
@@ -323,26 +344,31 @@ const FORMATS: &[Format] = &[
     Format {
         name: "Sensor Logger",
         is_header: sensor_logger::is_header,
+        beside: &["Metadata.csv"],
         device: Device::Folder(sensor_logger::read),
     },
     Format {
         name: "phyphox",
         is_header: phyphox::is_header,
+        beside: &["meta/time.csv", "meta/device.csv"],
         device: Device::Folder(phyphox::read),
     },
     Format {
         name: "Movella DOT / Xsens",
         is_header: xsens::is_header,
+        beside: &[],
         device: Device::File(xsens::read),
     },
     Format {
         name: "Shimmer",
         is_header: shimmer::is_header,
+        beside: &[],
         device: Device::File(shimmer::read),
     },
     Format {
         name: "MetaBase",
         is_header: metabase::is_header,
+        beside: &[],
         device: Device::Folder(metabase::read),
     },
 ];
@@ -355,10 +381,14 @@ fn read(files: &Files, layout: Option<&layout::Layout>) -> Result<Vec<imu::Log>,
     let folders: Vec<_> = FORMATS
         .iter()
         .filter_map(|format| match format.device {
-            Device::Folder(read) if layout.is_none() => Some((format.is_header, read)),
+            Device::Folder(read) if layout.is_none() => Some((format, read)),
             _ => None,
         })
-        .filter(|(is_header, _)| files.texts().any(|(_, text)| has_header(text, *is_header)))
+        .filter(|(format, _)| {
+            files
+                .texts()
+                .any(|(_, text)| has_header(text, format.is_header))
+        })
         .collect();
     let (mut devices, mut others) = (Vec::new(), Vec::new());
     for &(_, read) in &folders {
@@ -370,12 +400,16 @@ fn read(files: &Files, layout: Option<&layout::Layout>) -> Result<Vec<imu::Log>,
     for (name, text) in files.texts() {
         if folders
             .iter()
-            .any(|(is_header, _)| has_header(text, *is_header))
+            .any(|(format, _)| has_header(text, format.is_header))
         {
             continue;
         }
+        let of_app = || {
+            let mut beside = folders.iter().flat_map(|(format, _)| format.beside);
+            beside.any(|end| name.ends_with(end))
+        };
         match layout {
-            Some(_) if any_fits && !fits(text) => others.push(file_name(name)),
+            Some(_) if any_fits && !fits(text) => others.push(name),
             // Where none fits, the first says what it lacks.
             Some(layout) => {
                 let read: Reader = Box::new(|name, text| layout::read(layout, name, text));
@@ -383,7 +417,8 @@ fn read(files: &Files, layout: Option<&layout::Layout>) -> Result<Vec<imu::Log>,
             }
             None => match reader(text) {
                 Some(read) => devices.push((name, text, read)),
-                None => others.push(file_name(name)),
+                None if of_app() => {}
+                None => others.push(name),
             },
         }
     }
@@ -391,27 +426,32 @@ fn read(files: &Files, layout: Option<&layout::Layout>) -> Result<Vec<imu::Log>,
         return Err(unknown(files));
     }
     let is_alone = devices.len() == 1;
-    let mut logs = Vec::new();
+    let (mut logs, mut empty) = (Vec::new(), Vec::new());
     for (name, text, read) in devices {
         // What is alone is called as the folder or zip that it is in.
         let name = if is_alone { &files.name } else { name };
         let mut log = read(name, text)?;
         if log.samples.is_empty() {
-            return Err(ImportError::Content {
-                name: name.to_owned(),
-                problem: "has a header but no rows; expected at least one sample".to_owned(),
-            });
+            empty.push(name);
+            continue;
         }
-        if !is_alone {
+        if name != files.name {
             for note in &mut log.notes {
-                *note = format!("{}: {note}", file_name(name));
+                *note = format!("{name}: {note}");
             }
         }
         logs.push(log);
     }
-    // Apps put other tables beside theirs.
-    if folders.is_empty() && !others.is_empty() {
-        logs[0].notes.push(format!(
+    let Some(first) = logs.first_mut() else {
+        return Err(ImportError::Content {
+            name: empty[0].to_owned(),
+            problem: "has a header but no rows; expected at least one sample".to_owned(),
+        });
+    };
+    let left_out = |name: &&str| format!("{name}: has a header but no rows, and is left out");
+    first.notes.extend(empty.iter().map(left_out));
+    if !others.is_empty() {
+        first.notes.push(format!(
             "of no kind that is known, and left out: {}",
             others.join(", ")
         ));
@@ -503,7 +543,8 @@ fn open(path: &Path) -> Result<Files, ImportError> {
     };
     if path.is_dir() {
         // Apps put at most one level of folders (`meta`) beside their tables.
-        for folder in [path.to_owned(), path.join("meta")] {
+        for inside in ["", "meta/"] {
+            let folder = path.join(inside);
             if !folder.is_dir() {
                 continue;
             }
@@ -517,9 +558,10 @@ fn open(path: &Path) -> Result<Files, ImportError> {
                 if !is_log(&entry_name) {
                     continue;
                 }
-                let what = entry.path().display().to_string();
+                let what = format!("{inside}{entry_name}");
                 let mut file = fs::File::open(entry.path()).map_err(io)?;
-                texts.push((what.clone(), text(&mut file, &what)?));
+                let read = text(&mut file, &what)?;
+                texts.push((what, read));
             }
         }
         return Ok(Files {

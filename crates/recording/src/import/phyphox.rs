@@ -33,7 +33,7 @@ pub(super) fn read(files: &Files) -> Result<Log, ImportError> {
     let mut tracks: [(&str, Track); 3] = Default::default();
     let (mut seen, mut known) = (Vec::new(), false);
     for (name, text) in files.texts() {
-        if name.contains("meta/") || !text.lines().next().is_some_and(is_header) {
+        if !text.lines().next().is_some_and(is_header) {
             continue;
         }
         let mut table = Table::parse(name, text, is_header)?;
@@ -133,7 +133,8 @@ fn read_track(
                 .and_then(|base| base.checked_add(((t_s - experiment) * 1e9).round() as i64)),
             None => imu::nanoseconds(t_s),
         };
-        let Some(t_ns) = t_ns else {
+        // What is too large became the largest.
+        let Some(t_ns) = t_ns.filter(|t_ns| (0..i64::MAX).contains(t_ns)) else {
             return Err(table.problem(format!(
                 "has the time {t_s} s in row {}; expected seconds from 0 on",
                 row + 1

@@ -92,7 +92,7 @@ pub(super) fn read(name: &str, text: &str) -> Result<Log, ImportError> {
         }
     };
     let rate = track(gyro, factor)?;
-    if force.is_empty() && rate.is_empty() {
+    if force.is_empty() && rate.is_empty() && table.len() > 0 {
         return Err(table.problem(format!(
             "has neither {device}_Accel_LN_X_CAL, {device}_Accel_WR_X_CAL nor {device}_Gyro_X_CAL; found {}",
             table.listed()

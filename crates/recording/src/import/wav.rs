@@ -102,6 +102,7 @@ fn chunks(file: &mut BufReader<File>) -> io::Result<Result<(Vec<u8>, u64, u32), 
             // What is behind 40 bytes says no more of the format.
             b"fmt " => {
                 let most = length.min(40).into();
+                fmt.clear();
                 file.by_ref().take(most).read_to_end(&mut fmt)?;
             }
             b"data" => return Ok(Ok((fmt, at, length))),
@@ -211,10 +212,22 @@ impl Sound {
             .min(u64::from(u32::MAX) / frame_bytes * frame_bytes) as u32;
         let reader = WavReader::new(Cursor::new(head(&fmt, length)).chain(file)).map_err(|error| {
             let number = |at: usize| u16::from_le_bytes([fmt[at], fmt[at + 1]]);
+            let wide = |at: usize| u32::from(number(at + 2)) << 16 | u32::from(number(at));
+            let (format, bits) = (number(0), number(14));
+            let is_read = matches!((format, bits), (1 | 0xfffe, 8 | 16 | 24 | 32) | (3, 32));
+            let why = match error {
+                hound::Error::FormatError(_) if is_read => format!(
+                    "found {} channels, frames of {} bytes, {} Hz, {} bytes a second, which do not agree",
+                    number(2),
+                    number(12),
+                    wide(4),
+                    wide(8)
+                ),
+                _ => "expected PCM (0x0001) of 8 to 32 bits or floating point (0x0003) of 32"
+                    .to_owned(),
+            };
             content(format!(
-                "holds {}-bit sound of format {:#06x}: {error}; expected PCM (0x0001) of 8 to 32 bits or floating point (0x0003) of 32",
-                number(14),
-                number(0)
+                "holds {bits}-bit sound of format {format:#06x}: {error}; {why}"
             ))
         })?;
         let spec = reader.spec();
@@ -255,6 +268,10 @@ impl Sound {
             behind,
             samples,
         })
+    }
+
+    pub fn topic(&self) -> String {
+        format!("/audio/{}", self.name)
     }
 
     /// When each block begins, ns since 1970.
