@@ -135,6 +135,8 @@ fn empty<T>(spare: &mut Vec<Vec<T>>, length: usize) -> Vec<T> {
 }
 
 enum State {
+    /// Its schema has not been read: that makes columns, which nobody should have for all channels at once.
+    New,
     Ready(Box<dyn Decoder>),
     /// Nothing can decode the channel; why, and how that is called.
     Closed(Kind, String),
@@ -431,12 +433,10 @@ impl<'a> Worker<'a> {
 impl<'a> ChannelState<'a> {
     fn new(recording: &Recording, index: usize, select: Selection<'a>) -> Self {
         let info = &recording.info.channels[index];
-        let mut rows = Rows::new(&info.topic, select, recording.most_items(&info.schema));
-        let state = State::open(recording, index, &mut rows);
         ChannelState {
             index,
-            rows,
-            state,
+            rows: Rows::new(&info.topic, select, recording.most_items(&info.schema)),
+            state: State::New,
             fresh: true,
             waiting: Vec::new(),
             times: Vec::new(),
@@ -459,13 +459,10 @@ impl<'a> ChannelState<'a> {
             self.begin_anew(recording, select);
         }
         let fresh = std::mem::replace(&mut self.fresh, false);
-        if let State::Ready(decoder) = &mut self.state {
-            decoder.begin_block();
-        }
-        self.read(block);
+        self.read(block, recording);
         if self.rows.full && !fresh {
             self.begin_anew(recording, select);
-            self.read(block);
+            self.read(block, recording);
         }
         self.waiting.clear();
     }
@@ -477,7 +474,10 @@ impl<'a> ChannelState<'a> {
         self.failed = None;
     }
 
-    fn read(&mut self, block: &[u8]) {
+    fn read(&mut self, block: &[u8], recording: &Recording) {
+        if let State::New = self.state {
+            self.state = State::open(recording, self.index, &mut self.rows);
+        }
         let State::Ready(decoder) = &mut self.state else {
             // Messages without a decoder are counted, and tell their times.
             self.closed += self.waiting.len() as u64;
@@ -488,6 +488,7 @@ impl<'a> ChannelState<'a> {
                 .keep_alike(self.waiting.len() as u32, std::iter::empty());
             return;
         };
+        decoder.begin_block();
         let rows = &mut self.rows;
         self.times.reserve(self.waiting.len());
         let mut places = self.waiting.as_slice();
@@ -705,6 +706,9 @@ mod tests {
             let places = worker.channels.iter().flatten().map(|c| c.rows.places);
             let places: usize = places.sum();
             assert!(places <= MAX_PLACES && places == worker.places, "{places}");
+            let columns = worker.channels.iter().flatten();
+            let columns: usize = columns.map(|c| c.rows.columns.len()).sum();
+            assert_eq!(columns, worker.columns);
         }
         assert_eq!(values, 20 * 2 * 64 * 64);
     }
