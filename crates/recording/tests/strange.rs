@@ -421,6 +421,22 @@ fn second_representations_have_two_numbers_each() {
     }
 }
 
+/// One CDR message of an IDL type, on `/e`.
+fn of_idl(name: &str, text: &str, message: &[u8]) -> Recording {
+    recording(&WriterOptions::default(), |writer| {
+        let channel = RawChannel {
+            topic: "/e",
+            message_encoding: "cdr",
+            schema_name: name,
+            schema_encoding: "ros2idl",
+            schema_data: text.as_bytes(),
+            metadata: &BTreeMap::new(),
+        };
+        let channel = writer.raw_channel(&channel).expect("opens");
+        writer.message(channel, 0, message).expect("writes");
+    })
+}
+
 /// Collections of enums in XCDR2, and how writers differ in what stands before them. The first message is that of pycdr2 1.0.0
 /// (`serialize(use_version_2=True)`), Cyclone's, which keeps to the standard; Fast CDR puts a size before structs alone, and others before nothing.
 #[test]
@@ -429,20 +445,8 @@ fn enums_of_second_representations() {
         let schema = format!(
             "module p {{ enum Color {{ RED, GREEN, BLUE }}; struct In {{ long i; }}; struct M {{ {fields} }}; }};"
         );
-        let found = recording(&WriterOptions::default(), |writer| {
-            let channel = RawChannel {
-                topic: "/e",
-                message_encoding: "cdr",
-                schema_name: "p/M",
-                schema_encoding: "ros2idl",
-                schema_data: schema.as_bytes(),
-                metadata: &BTreeMap::new(),
-            };
-            let channel = writer.raw_channel(&channel).expect("opens");
-            let body: Vec<u8> = words.iter().flat_map(|word| word.to_le_bytes()).collect();
-            let message = [&[0, 7, 0, 0], &body[..]].concat();
-            (writer.message(channel, 0, message.as_slice())).expect("writes");
-        });
+        let body: Vec<u8> = words.iter().flat_map(|word| word.to_le_bytes()).collect();
+        let found = of_idl("p/M", &schema, &[&[0, 7, 0, 0], &body[..]].concat());
         let (signals, _) = found.signals(&|_| true).expect("reads");
         let mut values: Vec<(String, f64)> = (signals.iter())
             .map(|signal| (signal.path[3..].to_owned(), signal.values[0]))
@@ -498,19 +502,8 @@ fn what_is_inherited_is_bounded() {
         let others: String = (1..structs).map(one).collect();
         let fields: String = (0..structs).map(|k| format!("T{k} t{k}; ")).collect();
         let text = format!("struct M {{ {fields}}};\nstruct T0 {{ long f0; }};\n{others}");
-        let found = recording(&WriterOptions::default(), |writer| {
-            let channel = RawChannel {
-                topic: "/t",
-                message_encoding: "cdr",
-                schema_name: "M",
-                schema_encoding: "ros2idl",
-                schema_data: text.as_bytes(),
-                metadata: &BTreeMap::new(),
-            };
-            let channel = writer.raw_channel(&channel).expect("opens");
-            let message = [vec![0, 1, 0, 0], vec![0; 2 * structs * (structs + 1)]].concat();
-            (writer.message(channel, 0, message.as_slice())).expect("writes");
-        });
+        let message = [vec![0, 1, 0, 0], vec![0; 2 * structs * (structs + 1)]].concat();
+        let found = of_idl("M", &text, &message);
         let signals = found.signals(&|_| true).expect("reads").0.len();
         (signals, lines(&found).concat())
     };

@@ -227,6 +227,11 @@ impl Order {
     }
 }
 
+/// Whether a header stamp was never set.
+pub(super) fn unset(time: i64, stamp: i64) -> bool {
+    stamp == 0 && time != 0
+}
+
 fn is_gap(from: i64, to: i64, usual: i64) -> bool {
     to.saturating_sub(from) > usual.saturating_mul(GAP)
 }
@@ -256,7 +261,7 @@ impl Clocks {
             let (mut count, mut t_sum, mut s_sum, mut differ) = (0i64, 0i128, 0i128, 0i64);
             let mut first = None;
             for (&time, &stamp) in times.iter().zip(stamps) {
-                if stamp == 0 && time != 0 {
+                if unset(time, stamp) {
                     self.zero.add(time);
                     continue;
                 }

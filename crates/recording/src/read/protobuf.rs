@@ -445,6 +445,7 @@ impl Node {
             }
             hint = position + 1;
             match &mut self.fields[position].plan {
+                // Most fields are: read in place, a call each would take longer.
                 Plan::Number { number, value, .. } if wire == number.wire() => {
                     *value = Some(number.read(input)?);
                 }

@@ -53,9 +53,21 @@ impl<K: Clone + Eq + Hash> Counts<K> {
         })
     }
 
+    /// Counts one, and says where.
+    pub fn add(&mut self, of: K, times: u64) -> usize {
+        let place = self.place(of);
+        self.list[place].1 += times;
+        place
+    }
+
     /// Those that were seen at all.
     pub fn some(&self) -> impl Iterator<Item = (K, u64)> {
         self.list.iter().filter(|(_, count)| *count > 0).cloned()
+    }
+
+    /// None of them were seen; they keep their places.
+    fn zero(&mut self) {
+        self.list.iter_mut().for_each(|(_, count)| *count = 0);
     }
 
     fn clear(&mut self) {
@@ -249,8 +261,7 @@ impl<'a> Rows<'a> {
 
     /// Counts what is too long to become signals.
     pub fn note_long(&mut self, what: Long) {
-        let place = self.long.place(what);
-        self.long.list[place].1 += 1;
+        let place = self.long.add(what, 1);
         self.noted.push(Noted::Long(place));
     }
 
@@ -366,14 +377,8 @@ impl<'a> Rows<'a> {
     /// Empties everything for the next batch but keeps the columns and their memory.
     pub fn clear(&mut self) {
         self.row = 0;
-        self.absent
-            .list
-            .iter_mut()
-            .for_each(|(_, count)| *count = 0);
-        self.long_types
-            .list
-            .iter_mut()
-            .for_each(|(_, count)| *count = 0);
+        self.absent.zero();
+        self.long_types.zero();
         self.order.clear();
         self.stamps.clear();
         self.long.clear();

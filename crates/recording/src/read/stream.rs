@@ -2,7 +2,6 @@
 
 use std::{
     collections::{BTreeMap, HashMap, hash_map::Entry},
-    hash::Hash,
     sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError, atomic::Ordering},
 };
 
@@ -10,7 +9,7 @@ use super::{
     ReadError, Recording,
     block::{BlockResult, ChannelBatch, Records, Worker},
     chunk::{self, Unpacker},
-    clock::{Clocks, Order, seconds},
+    clock::{Clocks, Order, seconds, unset},
     container::{Block, op},
     json::MAX_KEYS,
     rows::{Counts, Long, MAX_COLUMNS, MAX_PLACES, Selection, too_many_columns},
@@ -427,18 +426,22 @@ impl<'a> Taker<'a> {
             if !stamps.is_empty() {
                 watch.clocks.observe(times, stamps);
                 // One that was never set is told as such, and is no leap of half a century.
-                let set = |(t, s): (&i64, &i64)| (*s != 0 || *t == 0).then_some(*s);
                 match stamps.contains(&0) {
                     true => {
-                        let stamps: Vec<i64> = times.iter().zip(stamps).filter_map(set).collect();
-                        watch.stamps.observe(&stamps);
+                        let set = times.iter().zip(stamps).filter(|(t, s)| !unset(**t, **s));
+                        let set: Vec<i64> = set.map(|(_, s)| *s).collect();
+                        watch.stamps.observe(&set);
                     }
                     false => watch.stamps.observe(stamps),
                 }
             }
         }
-        add(&mut watch.absent, std::mem::take(&mut batch.absent));
-        add(&mut watch.long, std::mem::take(&mut batch.long));
+        for (field, count) in std::mem::take(&mut batch.absent) {
+            watch.absent.add(field, count);
+        }
+        for (what, count) in std::mem::take(&mut batch.long) {
+            watch.long.add(what, count);
+        }
         watch.trailing += batch.trailing;
         let mut remark = batch.remark.take();
         let (info, topic) = (
@@ -727,13 +730,6 @@ impl<'a> Taker<'a> {
 
 /// More troubles than this are counted, not listed.
 const MAX_TROUBLES: usize = 1000;
-
-fn add<K: Clone + Eq + Hash>(counts: &mut Counts<K>, more: Vec<(K, u64)>) {
-    for (what, count) in more {
-        let place = counts.place(what);
-        counts.list[place].1 += count;
-    }
-}
 
 /// Messages as they are.
 pub(super) fn raw(

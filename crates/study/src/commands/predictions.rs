@@ -13,7 +13,7 @@ use study::predictions::{EXPERIMENTS, Finding, Lab, SEEDS, page, to_json};
 pub struct Args {
     /// Only these experiments: locking, coherence, lever, harmonics, onsets, stability.
     names: Vec<String>,
-    /// Seeds of an ensemble, from 1001 on; onsets take four times as many, each cell of the map of locking two
+    /// Seeds of an ensemble, from 1001 on; onsets take four times as many, each cell of the map of locking two.
     #[arg(long, value_name = "N", default_value_t = SEEDS, allow_negative_numbers = true, value_parser = count(2..=100_000))]
     seeds: u64,
     /// Threads; 0 is one per core. The result does not depend on it.

@@ -18,7 +18,8 @@ pub struct Score {
     pub information: Information,
 }
 
-/// What one carrier adds to them. Whole rows, though they are symmetric: sums of even length are quicker than half as many.
+/// What one carrier adds to them. Whole rows, though the matrix is symmetric: rows of one length are added quicker than half as many numbers.
+#[derive(Default)]
 struct Sums {
     value: f64,
     gradient: [f64; N],
@@ -189,11 +190,7 @@ impl Walk {
                 variance: error + noise * behind_s,
             };
             let mut window = Window::from(state);
-            let mut sums = Sums {
-                value: 0.0,
-                gradient: [0.0; N],
-                information: [[0.0; N]; N],
-            };
+            let mut sums = Sums::default();
             for k in first..phase.len() - 1 {
                 let h = self.t_s[k + 1] - self.t_s[k];
                 let psi = [self.beat[k], self.beat[k + 1]];
