@@ -144,6 +144,8 @@ pub struct Times {
     latest_ns: i64,
     steps: Moments,
     buffer: Vec<f64>,
+    /// Of the steps forward in a batch: the message that they lead to, how many messages share them, and their length (s).
+    came: Vec<(usize, u64, f64)>,
     /// Steps by their length, four to an octave: how many messages came with them, and their sum (s).
     lengths: BTreeMap<u16, (u64, f64)>,
     /// Messages that share the time of the last.
@@ -210,7 +212,9 @@ impl Times {
             self.earliest_ns = self.earliest_ns.min(*t);
             self.latest_ns = self.latest_ns.max(*t);
         }
-        let mut came = Vec::with_capacity(self.buffer.len());
+        self.came.clear();
+        // What is counted of the length at hand: steps of a clock are mostly of one.
+        let (mut length, mut held) = (None, (0, 0.0));
         for (k, step) in self.buffer.iter().enumerate() {
             // Messages that came together share the step to them; a clock that steps back tells no rate.
             if *step <= 0.0 {
@@ -219,16 +223,21 @@ impl Times {
                 continue;
             }
             let messages = std::mem::take(&mut self.shared) + 1;
-            let each = (step / messages as f64).to_bits() >> 50;
-            let (n, sum_s) = self.lengths.entry(each as u16).or_default();
-            *n += messages;
-            *sum_s += step;
-            came.push((k + place, messages, *step));
+            let each = ((step / messages as f64).to_bits() >> 50) as u16;
+            if length != Some(each) {
+                length.map(|length| self.lengths.insert(length, held));
+                held = self.lengths.get(&each).copied().unwrap_or_default();
+                length = Some(each);
+            }
+            held.0 += messages;
+            held.1 += step;
+            self.came.push((k + place, messages, *step));
         }
+        length.map(|length| self.lengths.insert(length, held));
         let (n, sum_s) = self.ordinary();
         if n >= FIRST {
             let per_s = n as f64 / sum_s;
-            let gaps = came.into_iter().filter_map(|(before, messages, step)| {
+            let gaps = self.came.iter().filter_map(|&(before, messages, step)| {
                 let periods = step * per_s;
                 (periods > GAP * messages as f64).then(|| Gap {
                     before,
