@@ -437,27 +437,29 @@ fn of_idl(name: &str, text: &str, message: &[u8]) -> Recording {
     })
 }
 
+/// What a message in XCDR2 of such words becomes, and what is said.
+fn of_second(fields: &str, words: &[u32]) -> (String, String) {
+    let schema = format!(
+        "module p {{ enum Color {{ RED, GREEN, BLUE }}; struct In {{ long i; }}; struct M {{ {fields} }}; }};"
+    );
+    let body: Vec<u8> = words.iter().flat_map(|word| word.to_le_bytes()).collect();
+    let found = of_idl("p/M", &schema, &[&[0, 7, 0, 0], &body[..]].concat());
+    let (signals, _) = found.signals(&|_| true).expect("reads");
+    let mut values: Vec<(String, f64)> = (signals.iter())
+        .map(|signal| (signal.path[3..].to_owned(), signal.values[0]))
+        .collect();
+    values.sort_by(|a, b| a.0.cmp(&b.0));
+    let values = values.iter().map(|(path, value)| format!("{path} {value}"));
+    (
+        values.collect::<Vec<_>>().join(", "),
+        lines(&found).concat(),
+    )
+}
+
 /// Collections of enums in XCDR2, and how writers differ in what stands before them. The first message is that of pycdr2 1.0.0
 /// (`serialize(use_version_2=True)`), Cyclone's, which keeps to the standard; Fast CDR puts a size before structs alone, and others before nothing.
 #[test]
 fn enums_of_second_representations() {
-    let of = |fields: &str, words: &[u32]| {
-        let schema = format!(
-            "module p {{ enum Color {{ RED, GREEN, BLUE }}; struct In {{ long i; }}; struct M {{ {fields} }}; }};"
-        );
-        let body: Vec<u8> = words.iter().flat_map(|word| word.to_le_bytes()).collect();
-        let found = of_idl("p/M", &schema, &[&[0, 7, 0, 0], &body[..]].concat());
-        let (signals, _) = found.signals(&|_| true).expect("reads");
-        let mut values: Vec<(String, f64)> = (signals.iter())
-            .map(|signal| (signal.path[3..].to_owned(), signal.values[0]))
-            .collect();
-        values.sort_by(|a, b| a.0.cmp(&b.0));
-        let values = values.iter().map(|(path, value)| format!("{path} {value}"));
-        (
-            values.collect::<Vec<_>>().join(", "),
-            lines(&found).concat(),
-        )
-    };
     let array = "unsigned long a; Color c[3]; sequence<Color> s; double d;";
     let (low, high) = (0, 1.5f64.to_bits().wrapping_shr(32) as u32);
     let expected = "a 7, c[0] 0, c[1] 1, c[2] 2, d 1.5, s[0] 2, s[1] 0";
@@ -465,7 +467,10 @@ fn enums_of_second_representations() {
         &[7, 12, 0, 1, 2, 12, 2, 2, 0, low, high][..],
         &[7, 0, 1, 2, 2, 2, 0, low, high],
     ] {
-        assert_eq!(of(array, words), (expected.to_owned(), String::new()));
+        assert_eq!(
+            of_second(array, words),
+            (expected.to_owned(), String::new())
+        );
     }
     let both = "sequence<In> x; sequence<Color> s;";
     for words in [
@@ -475,11 +480,11 @@ fn enums_of_second_representations() {
         &[1, 5, 3, 2, 1, 0],
     ] {
         let expected = "s[0] 2, s[1] 1, s[2] 0, x[0].i 5";
-        assert_eq!(of(both, words), (expected.to_owned(), String::new()));
+        assert_eq!(of_second(both, words), (expected.to_owned(), String::new()));
     }
     let expected = "s[0] 2, s[1] 1, s[2] 0".to_owned();
     assert_eq!(
-        of("sequence<Color> s;", &[3, 2, 1, 0]),
+        of_second("sequence<Color> s;", &[3, 2, 1, 0]),
         (expected, String::new())
     );
     // An array of several dimensions is of what its innermost one is of (Fast CDR's `is_multi_array_primitive`).
@@ -490,7 +495,47 @@ fn enums_of_second_representations() {
         &[1, 2, 3, 4, 5, 6, 12, 2, 7, 8][..],
         &[1, 2, 3, 4, 5, 6, 2, 7, 8],
     ] {
-        assert_eq!(of(rows, words), (expected.to_owned(), String::new()));
+        assert_eq!(of_second(rows, words), (expected.to_owned(), String::new()));
+    }
+}
+
+/// An array of several dimensions of structs, text or enums has one size before it, or each row has one too.
+#[test]
+fn sizes_stand_before_arrays_or_before_their_rows_too() {
+    // Texts of "a": length 2 and two bytes; what pads the last is not of its array.
+    let text = [2, u32::from(b'a')];
+    let texts = text.repeat(2);
+    let (twice, row) = (texts.repeat(2), [vec![14], texts.clone()].concat());
+    for (fields, one, nested, expected) in [
+        (
+            "In p[2][2]; long z;",
+            vec![16, 1, 2, 3, 4, 9],
+            vec![24, 8, 1, 2, 8, 3, 4, 9],
+            "p[0][0].i 1, p[0][1].i 2, p[1][0].i 3, p[1][1].i 4, z 9",
+        ),
+        (
+            "Color e[2][2]; long z;",
+            vec![16, 1, 2, 1, 0, 9],
+            vec![24, 8, 1, 2, 8, 1, 0, 9],
+            "e[0][0] 1, e[0][1] 2, e[1][0] 1, e[1][1] 0, z 9",
+        ),
+        (
+            "string s[2][2]; long z;",
+            [vec![30], twice, vec![9]].concat(),
+            [vec![38], row.clone(), row, vec![9]].concat(),
+            "z 9",
+        ),
+        (
+            "In p[1][2][1]; long z;",
+            vec![8, 1, 2, 9],
+            vec![20, 16, 4, 1, 4, 2, 9],
+            "p[0][0][0].i 1, p[0][1][0].i 2, z 9",
+        ),
+    ] {
+        for words in [one, nested] {
+            let found = of_second(fields, &words);
+            assert_eq!(found, (expected.to_owned(), String::new()), "{words:?}");
+        }
     }
 }
 

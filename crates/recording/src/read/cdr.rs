@@ -22,10 +22,12 @@ const PADDING: usize = 3;
 
 struct Cdr {
     types: Types,
-    /// Whether the message has wide text, collections of structs and text, or collections of enums: where readings differ.
+    /// Whether the message has wide text, collections of structs and text, collections of enums, or arrays of several dimensions of
+    /// any of these: where readings differ.
     wide: bool,
     collections: bool,
     enums: bool,
+    grids: bool,
     programs: Vec<(Shape, Program)>,
     /// The readings to try, by representation; the one that fitted last comes first.
     readings: Vec<(u8, Vec<Shape>)>,
@@ -50,7 +52,7 @@ pub(super) fn open_idl(
 }
 
 fn begin(types: Types) -> Result<Box<dyn Decoder>, String> {
-    let (mut wide, mut collections, mut enums) = (false, false, false);
+    let (mut wide, mut collections, mut enums, mut grids) = (false, false, false, false);
     for kind in types
         .structs
         .iter()
@@ -61,6 +63,7 @@ fn begin(types: Types) -> Result<Box<dyn Decoder>, String> {
             let item = kind.item();
             enums |= *item == Type::Enum;
             collections |= item.prim().is_none();
+            grids |= item != &**inner && !matches!(item, Type::Prim(_));
             kind = inner;
         }
         wide |= *kind == Type::WideText;
@@ -70,6 +73,7 @@ fn begin(types: Types) -> Result<Box<dyn Decoder>, String> {
         wide,
         collections,
         enums,
+        grids,
         programs: Vec::new(),
         readings: Vec::new(),
     }))
@@ -105,6 +109,7 @@ impl Cdr {
             big_endian,
             max_align: if second { 4 } else { 8 },
             headers: Headers::None,
+            each_row: false,
             wide: 2,
             empty_takes_byte: true,
         };
@@ -113,8 +118,22 @@ impl Cdr {
             (true, true, false) | (true, false, true) => &[Headers::All, Headers::None],
             _ => &[Headers::None],
         };
+        // One size before a whole array (XTypes 1.3: an array of several dimensions is one), or nested arrays as writers hold them.
+        let rows = |headers: Headers| match self.grids && headers != Headers::None {
+            true => &[false, true][..],
+            false => &[false],
+        };
         let mut readings: Vec<Shape> = (headers.iter())
-            .map(|&headers| Shape { headers, ..shape })
+            .flat_map(|&headers| {
+                rows(headers)
+                    .iter()
+                    .map(move |&each_row| (headers, each_row))
+            })
+            .map(|(headers, each_row)| Shape {
+                headers,
+                each_row,
+                ..shape
+            })
             .collect();
         if self.wide {
             let four: Vec<Shape> = readings

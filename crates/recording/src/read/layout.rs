@@ -17,6 +17,8 @@ pub(super) struct Shape {
     /// Numbers are aligned to their size, but to no more than this: 8 in XCDR1, 4 in XCDR2, 1 in ROS 1.
     pub max_align: usize,
     pub headers: Headers,
+    /// Whether each row of an array of several dimensions begins with its size too, not the whole alone.
+    pub each_row: bool,
     /// Bytes per character of a wide string.
     pub wide: usize,
     /// A struct without fields takes one byte (ROS 2).
@@ -135,6 +137,8 @@ struct Items {
     /// Size of an item that is a number; such items are skipped without being looked at.
     prim: Option<Prim>,
     header: bool,
+    /// Whether they are those of an array, not of a sequence.
+    part: bool,
     /// Whether they become signals, as those of items that are left out do not.
     take: bool,
     /// Programs of the items seen so far.
@@ -147,8 +151,8 @@ pub(super) struct Program {
     ops: Vec<Op>,
     /// How many fields it has, without those of items, at least one.
     places: usize,
-    /// Of a message: what walks over items of a type without taking anything.
-    skips: Vec<(Type, Program)>,
+    /// Of a message: what walks over items of a type, parts of an array or not, without taking anything.
+    skips: Vec<(Type, bool, Program)>,
     flat: Option<Box<Flat>>,
     /// How many messages in a row did not fit the flat table.
     misses: u32,
@@ -175,7 +179,7 @@ struct Context<'a> {
     types: &'a Types,
     shape: Shape,
     data: &'a [u8],
-    skips: Vec<(Type, Program)>,
+    skips: Vec<(Type, bool, Program)>,
     /// The flat table in the making; `None` where it is not wanted, or once something was met that it cannot hold.
     trace: Option<Box<Flat>>,
 }
@@ -273,7 +277,7 @@ struct Compiler<'a, 'r> {
 impl Program {
     /// Compiles the message type: the first struct of `types`.
     pub fn message(types: &Types, shape: Shape, rows: &mut Rows) -> Result<Self, String> {
-        compile(types, &Type::Struct(0), "", shape, rows, true)
+        compile(types, &Type::Struct(0), "", shape, rows, (true, false))
     }
 
     /// Decodes a message, aligned from the slice's start, and returns where it ended.
@@ -423,7 +427,7 @@ fn compile(
     field: &str,
     shape: Shape,
     rows: &mut Rows,
-    take: bool,
+    (take, part): (bool, bool),
 ) -> Result<Program, String> {
     let mut compiler = Compiler {
         types,
@@ -434,7 +438,10 @@ fn compile(
         run: Run::default(),
         fields: 0,
     };
-    compiler.add(kind, field, Role::Plain)?;
+    match part {
+        true => compiler.part(kind, field)?,
+        false => compiler.add(kind, field, Role::Plain)?,
+    }
     compiler.close_run();
     let mut program = compiler.program;
     let fields = |op: &Op| match op {
@@ -459,13 +466,29 @@ enum Role {
 }
 
 impl Compiler<'_, '_> {
-    fn add(&mut self, kind: &Type, field: &str, role: Role) -> Result<(), String> {
+    fn count(&mut self, field: &str) -> Result<(), String> {
         self.fields += places_of(field.len());
         if self.fields > MAX_FIELDS {
             return Err(format!(
                 "the message type has more than {MAX_FIELDS} fields, or names that take as much room"
             ));
         }
+        Ok(())
+    }
+
+    /// An item of an array: of several dimensions, the whole has a size before it, and its rows may have none.
+    fn part(&mut self, kind: &Type, field: &str) -> Result<(), String> {
+        match kind {
+            Type::Array(inner, count) if !self.shape.each_row => {
+                self.count(field)?;
+                self.array(inner, *count, false, field)
+            }
+            _ => self.add(kind, field, Role::Plain),
+        }
+    }
+
+    fn add(&mut self, kind: &Type, field: &str, role: Role) -> Result<(), String> {
+        self.count(field)?;
         match kind {
             Type::Prim(prim) => self.number(*prim, 1, field, role),
             Type::Enum => self.number(Prim::U32, 1, field, role),
@@ -507,7 +530,7 @@ impl Compiler<'_, '_> {
                 self.array(inner, *count, headed, field)?;
             }
             Type::Sequence(inner) => {
-                let items = self.items(inner, self.shape.has_header(kind), field);
+                let items = self.items(inner, self.shape.has_header(kind), false, field);
                 self.push(Op::Sequence(items));
             }
         }
@@ -573,21 +596,22 @@ impl Compiler<'_, '_> {
         }
         if items_wanted && !headed {
             for item in 0..count {
-                self.add(inner, &format!("{field}[{item}]"), Role::Plain)?;
+                self.part(inner, &format!("{field}[{item}]"))?;
             }
             return Ok(());
         }
-        let items = self.items(inner, headed, field);
+        let items = self.items(inner, headed, true, field);
         self.push(Op::Array(items, count));
         Ok(())
     }
 
-    fn items(&self, inner: &Type, header: bool, field: &str) -> Box<Items> {
+    fn items(&self, inner: &Type, header: bool, part: bool, field: &str) -> Box<Items> {
         Box::new(Items {
             field: field.to_owned(),
             kind: inner.clone(),
             prim: inner.prim(),
             header,
+            part,
             take: self.take,
             programs: Vec::new(),
         })
@@ -641,8 +665,15 @@ impl Items {
                 None if !rows.has_room(1) => rows.enter(1),
                 None => {
                     let (types, field) = (context.types, format!("{}[{taken}]", self.field));
-                    let program = compile(types, &self.kind, &field, context.shape, rows, true)
-                        .map_err(|_| other(at, &self.field, TOO_MANY))?;
+                    let program = compile(
+                        types,
+                        &self.kind,
+                        &field,
+                        context.shape,
+                        rows,
+                        (true, self.part),
+                    )
+                    .map_err(|_| other(at, &self.field, TOO_MANY))?;
                     let room = rows.enter(program.places);
                     if room {
                         rows.places += program.places;
@@ -684,11 +715,19 @@ impl Items {
             return end_of(context.data, start, bytes, &self.field);
         }
         // One program for all items of a type: none holds items of its own type.
-        let known = context.skips.iter().position(|(k, _)| *k == self.kind);
+        let own = |(kind, part, _): &_| *kind == self.kind && *part == self.part;
+        let known = context.skips.iter().position(own);
         let mut program = match known {
-            Some(known) => std::mem::take(&mut context.skips[known].1),
-            None => compile(context.types, &self.kind, "", context.shape, rows, false)
-                .map_err(|_| other(at, &self.field, TOO_MANY))?,
+            Some(known) => std::mem::take(&mut context.skips[known].2),
+            None => compile(
+                context.types,
+                &self.kind,
+                "",
+                context.shape,
+                rows,
+                (false, self.part),
+            )
+            .map_err(|_| other(at, &self.field, TOO_MANY))?,
         };
         let mut failed = None;
         for _ in 0..count {
@@ -703,8 +742,8 @@ impl Items {
             }
         }
         match known {
-            Some(known) => context.skips[known].1 = program,
-            None => context.skips.push((self.kind.clone(), program)),
+            Some(known) => context.skips[known].2 = program,
+            None => context.skips.push((self.kind.clone(), self.part, program)),
         }
         match failed {
             Some(fail) => Err(fail.within(&self.field)),

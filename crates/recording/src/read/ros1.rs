@@ -12,6 +12,7 @@ const SHAPE: Shape = Shape {
     big_endian: false,
     max_align: 1,
     headers: Headers::None,
+    each_row: false,
     wide: 2,
     empty_takes_byte: false,
 };
