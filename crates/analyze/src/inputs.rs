@@ -330,10 +330,14 @@ pub fn on_axis<'a>(
         .clone()
         .map(|k| start_s + k as f64 * step_s)
         .collect();
+    (*places.start(), drawn(t_s, x, &at_s, step_s).into())
+}
+
+/// `x(t)` at ascending times by a cubic spline, or by straight lines where samples of this mean step lie so close together that a spline would follow their noise.
+pub fn drawn(t_s: &[f64], x: &[f64], at_s: &[f64], step_s: f64) -> Vec<f64> {
     let close = t_s.windows(2).any(|t| t[1] - t[0] < CLOSE * step_s);
-    let smooth = (!close).then(|| resampled(t_s, x, &at_s)).flatten();
-    let x = smooth.unwrap_or_else(|| interpolate(t_s, x, &at_s));
-    (*places.start(), x.into())
+    let smooth = (!close).then(|| resampled(t_s, x, at_s)).flatten();
+    smooth.unwrap_or_else(|| interpolate(t_s, x, at_s))
 }
 
 /// `x(t)` at the times `at_s` by straight lines between samples; held beyond the ends. Both time axes ascend.

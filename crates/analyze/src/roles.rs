@@ -309,6 +309,8 @@ pub struct Roles {
     pub sensors: Sensors,
     /// Topics that were taken out of several that could have been, with a sentence each.
     pub chosen: Vec<(String, String)>,
+    /// Of inertial topics that are by name half a device, gyroscope or accelerometer: the other half.
+    halves: BTreeMap<String, String>,
 }
 
 /// What the user says of the sensors; `None` where nothing is said. See [`RolesFile`] for the meaning.
@@ -370,8 +372,13 @@ impl Roles {
                 .map(|(t, _)| (*t).to_owned())
                 .collect()
         };
-        let (carriers, others): (Vec<String>, Vec<String>) = of_type(&["sensor_msgs/Imu"])
+        let inertial = of_type(&["sensor_msgs/Imu"]);
+        roles.halves = halves(&inertial);
+        // The gyroscope stands for both: it is sampled at least as fast.
+        let stands = |t: &String| !roles.halves.contains_key(t) || half(t).is_some_and(|h| h.0);
+        let (carriers, others): (Vec<String>, Vec<String>) = inertial
             .into_iter()
+            .filter(stands)
             .partition(|t| is_carrier(t));
         if !others.is_empty() {
             let first = preferred(&others);
@@ -430,8 +437,26 @@ impl Roles {
                 roles.said.insert(role);
             }
         }
+        // A device is one sensor, whichever half names it.
+        for role in [Role::Imu, Role::Carriers] {
+            let topics = roles.patterns(role).to_vec();
+            let named = |topic: &String| topics.iter().position(|t| t == topic);
+            let again: Vec<String> = (topics.iter().zip(0..))
+                .filter(|(topic, k)| {
+                    let other = roles.halves.get(*topic).and_then(named);
+                    other.is_some_and(|other| other < *k)
+                })
+                .map(|(topic, _)| topic.clone())
+                .collect();
+            roles.leave_out(role, |topic| again.contains(topic));
+        }
         // One sensor is not on the load and on who carries it; and beats are heard in a sound without a role.
-        let load = roles.patterns(Role::Imu).to_vec();
+        let mut load = roles.patterns(Role::Imu).to_vec();
+        load.extend(
+            load.clone()
+                .iter()
+                .filter_map(|t| roles.halves.get(t).cloned()),
+        );
         let is_sound = |topic: &String| channels.iter().any(|(t, s)| t == topic && s == SOUND);
         roles.leave_out(Role::Carriers, |topic| load.contains(topic));
         roles.leave_out(Role::Beats, is_sound);
@@ -516,6 +541,20 @@ impl Roles {
         self.patterns(role).first().map(String::as_str)
     }
 
+    /// The topic that by its name is the other half of an inertial sensor: accelerometer to gyroscope, or the reverse.
+    pub fn other_half(&self, topic: &str) -> Option<&str> {
+        self.halves.get(topic).map(String::as_str)
+    }
+
+    /// The topics of inertial sensors on the load and its carriers, other halves included.
+    pub fn inertial(&self) -> Vec<&str> {
+        let each = self.patterns(Role::Imu).iter();
+        let each = each.chain(self.patterns(Role::Carriers));
+        each.flat_map(|topic| [Some(topic.as_str()), self.other_half(topic)])
+            .flatten()
+            .collect()
+    }
+
     /// The roles of signals that a path plays.
     pub fn of_signal(&self, path: &str) -> Option<Role> {
         let plays = |(role, patterns): (&Role, &Vec<String>)| {
@@ -577,6 +616,36 @@ pub(crate) fn about_the_load(topic: &str) -> bool {
     ["rath", "palanquin", "palki", "pole", "load"]
         .iter()
         .any(|word| topic.contains(word))
+}
+
+/// Whether a topic's name speaks of a gyroscope, or else of an accelerometer, and the rest of it: that of the device.
+fn half(topic: &str) -> Option<(bool, String)> {
+    let topic = topic.to_lowercase();
+    let words = [
+        (true, "gyroscope"),
+        (true, "gyro"),
+        (false, "accelerometer"),
+        (false, "accel"),
+    ];
+    let (is_gyro, word) = words.into_iter().find(|(_, word)| topic.contains(word))?;
+    // What no name holds marks the place.
+    Some((is_gyro, topic.replacen(word, "\0", 1)))
+}
+
+/// Of topics that are halves of one device by their names, each to the other.
+fn halves(topics: &[String]) -> BTreeMap<String, String> {
+    let mut devices: BTreeMap<String, [Vec<&String>; 2]> = BTreeMap::new();
+    for topic in topics {
+        if let Some((is_gyro, device)) = half(topic) {
+            devices.entry(device).or_default()[usize::from(is_gyro)].push(topic);
+        }
+    }
+    let pairs = devices.values().filter_map(|of| match of {
+        [a, g] if a.len() == 1 && g.len() == 1 => Some([a[0], g[0]]),
+        _ => None,
+    });
+    let both = |[a, g]: [&String; 2]| [(a.clone(), g.clone()), (g.clone(), a.clone())];
+    pairs.flat_map(both).collect()
 }
 
 /// `carrier_2` before `carrier_10`.
@@ -704,6 +773,45 @@ mod tests {
         let roles = Roles::infer(poses.into_iter(), None);
         assert_eq!(roles.chosen[0].0, "/aaa");
         assert!(roles.chosen[0].1.contains("(/odom)"));
+    }
+
+    #[test]
+    fn two_topics_of_one_device_are_one_sensor() {
+        let imu = "sensor_msgs/msg/Imu";
+        let topics = [
+            "/cam/accel/sample",
+            "/cam/gyro/sample",
+            "/carrier_1/Accelerometer",
+            "/carrier_1/Gyroscope",
+            "/carrier_2/imu",
+        ];
+        let roles = |topics: &[&str], said: &str| {
+            let user: RolesFile = toml::from_str(said).unwrap();
+            Roles::infer(topics.iter().map(|t| (*t, imu)), Some(&user))
+        };
+        let found = roles(&topics, "");
+        assert_eq!(found.patterns(Role::Imu), ["/cam/gyro/sample"]);
+        assert!(found.chosen.is_empty(), "{:?}", found.chosen);
+        assert_eq!(
+            found.patterns(Role::Carriers),
+            ["/carrier_1/Gyroscope", "/carrier_2/imu"]
+        );
+        assert_eq!(found.other_half("/cam/gyro/sample"), Some(topics[0]));
+        assert_eq!(found.other_half(topics[2]), Some(topics[3]));
+        assert_eq!(found.inertial().len(), 5);
+        // Whoever names one half names the device, and whoever names both names it once.
+        let found = roles(&topics, "imu = \"/cam/accel/sample\"");
+        assert_eq!(found.patterns(Role::Imu), ["/cam/accel/sample"]);
+        let found = roles(&topics, "imu = \"/cam/*\"\ncarriers = \"/carrier*\"");
+        assert_eq!(found.patterns(Role::Imu), ["/cam/accel/sample"]);
+        assert_eq!(found.patterns(Role::Carriers).len(), 2);
+        let found = roles(&topics, "imu = \"/carrier_1/Accelerometer\"");
+        assert_eq!(found.patterns(Role::Carriers), ["/carrier_2/imu"]);
+        // One half alone, and halves of two devices.
+        for topics in [&topics[..1], &["/a/gyro", "/b/accel"]] {
+            let found = roles(topics, "");
+            assert!(topics.iter().all(|t| found.other_half(t).is_none()));
+        }
     }
 
     #[test]

@@ -10,9 +10,12 @@ use analyze::imu::axes::{misfit, signed_permutations};
 use analyze::imu::rath::{Settings, motion};
 use analyze::quality::Quality;
 use nalgebra::{Matrix3, Vector3};
+use recording::cdr::Imu;
 use recording::import::{ImportOptions, ingest};
 use recording::read::{ReadOptions, Recording};
+use recording::topics::MessageKind;
 use recording::write::{RecordingWriter, WriterOptions};
+use std::f64::consts::TAU;
 use std::path::PathBuf;
 
 fn analysed(name: &str) -> Analysis {
@@ -344,6 +347,55 @@ fn a_sensor_on_the_load_does_not_walk() {
     assert!(steps("").is_some());
     assert_eq!(steps("imu_place_m = [0.5, 0.0, 0.3]"), None);
     assert_eq!(steps("imu = \"/imu/phone\""), None);
+}
+
+/// A depth camera's driver publishes its gyroscope and its accelerometer apart, zeros in the other's place.
+#[test]
+fn a_device_on_two_topics_is_one_sensor() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("camera.mcap");
+    let mut writer = RecordingWriter::create(&path, &WriterOptions::default()).unwrap();
+    let topics = ["/camera/accel/sample", "/camera/gyro/sample"];
+    let channels = topics.map(|topic| writer.channel(topic, MessageKind::Imu).unwrap());
+    let (amplitude, w) = (0.1, TAU);
+    for half_ms in 0..120_000 {
+        let t_ns = 500_000 * half_ms;
+        let (sin, cos) = (w * t_ns as f64 / 1e9).sin_cos();
+        let roll: f64 = amplitude * sin;
+        // 250 and 400 Hz.
+        if half_ms % 8 == 0 {
+            let felt = [0.0, 9.81 * roll.sin(), 9.81 * roll.cos()];
+            let message = Imu::raw(t_ns, "accel", [0.0; 3], felt);
+            writer.message(channels[0], t_ns, &message).unwrap();
+        }
+        if half_ms % 5 == 0 {
+            let message = Imu::raw(t_ns, "gyro", [amplitude * w * cos, 0.0, 0.0], [0.0; 3]);
+            writer.message(channels[1], t_ns, &message).unwrap();
+        }
+    }
+    writer.finish().unwrap();
+    let recording = Recording::open(&path, &ReadOptions::default()).unwrap();
+    let truth_deg = (amplitude / 2.0_f64.sqrt()).to_degrees();
+    for named in [None, Some(topics[0])] {
+        let imu = named.map_or(String::new(), |topic| format!("imu = \"{topic}\"\n"));
+        let said = format!("{imu}gyro_age_s = 0.0\naccel_age_s = 0.0");
+        let request = Request {
+            roles: Some(toml::from_str(&said).unwrap()),
+            window: (Some(10.0), Some(50.0)),
+            ..Request::default()
+        };
+        let found = examine("camera.mcap", &recording, &request).unwrap();
+        let roll = found.metrics.get("rms_roll_deg").unwrap();
+        let (value, [low, high]) = (roll.as_f64().unwrap(), roll.ci95.unwrap());
+        assert!(
+            (value / truth_deg - 1.0).abs() < 1e-3,
+            "{value} {truth_deg}"
+        );
+        assert!((low..=high).contains(&truth_deg), "{roll:?}");
+        let told = found.quality.iter().filter(|q| q.kind == "halves");
+        assert_eq!(told.count(), 1, "{:?}", found.quality);
+        assert!(found.quality.iter().all(|q| q.kind != "one_of_several"));
+    }
 }
 
 /// Sensors that are left aside because nothing says whose they are.

@@ -8,6 +8,7 @@ mod carriers;
 mod clocks;
 mod columns;
 pub(crate) mod dates;
+mod halves;
 mod judge;
 mod place;
 mod sound;
@@ -112,10 +113,10 @@ impl Field {
         beat_is_known: bool,
         window: impl FnOnce(f64) -> Window,
     ) -> Result<Self, ReadError> {
-        let topics: Vec<&str> = [Role::Imu, Role::Carriers, Role::Beats, Role::Truth]
-            .iter()
-            .flat_map(|r| roles.patterns(*r))
-            .map(String::as_str)
+        let others = [Role::Beats, Role::Truth];
+        let others = others.iter().flat_map(|r| roles.patterns(*r));
+        let topics: Vec<&str> = (roles.inertial().into_iter())
+            .chain(others.map(String::as_str))
             .filter(|t| recording.info().channels.iter().any(|c| c.topic == *t))
             .collect();
         let imus = roles
@@ -181,9 +182,15 @@ impl Field {
                 format!("motion is estimated from means over {factor} samples each, so that memory stays small"),
             ));
         }
-        let columns = Columns::new(signals, start_ns);
+        let mut columns = Columns::new(signals, start_ns);
         let sensors: Vec<&str> = imus.clone().map(String::as_str).collect();
-        let stamped = [&sensors, roles.topic(Role::Truth).as_slice()].concat();
+        let stamped = [&roles.inertial(), roles.topic(Role::Truth).as_slice()].concat();
+        for topic in &sensors {
+            let told = (roles.other_half(topic))
+                .and_then(|other| halves::join(&mut columns, topic, other, &stamped));
+            let told = told.map(|text| Quality::remark(topic, "halves", text));
+            field.quality.extend(told);
+        }
         let dates = |topic: &&str| columns.dates(topic, ACCEL[0], &stamped);
         let dates: Vec<Option<Dated>> = sensors.iter().map(dates).collect();
         for (topic, dated) in sensors.iter().zip(&dates) {
@@ -635,7 +642,11 @@ fn without_a_role(recording: &Recording, roles: &Roles) -> Option<Quality> {
     let mut left: Vec<&str> = channels
         .filter(|c| c.schema.replacen("/msg/", "/", 1) == "sensor_msgs/Imu")
         .map(|c| c.topic.as_str())
-        .filter(|topic| !played.iter().any(|p| p == topic) && !stands_beside(topic))
+        .filter(|topic| {
+            let of = [Some(*topic), roles.other_half(topic)];
+            let plays = |topic: &&str| played.iter().any(|p| p == topic);
+            !of.iter().flatten().any(plays) && !stands_beside(topic)
+        })
         .collect();
     left.sort_unstable();
     left.dedup();

@@ -33,10 +33,6 @@ pub fn factors(
     let info = recording.info();
     let span_s = (info.end_ns.saturating_sub(info.start_ns)) as f64 / 1e9;
     let rath = roles.topic(Role::Imu);
-    let topics = roles
-        .patterns(Role::Imu)
-        .iter()
-        .chain(roles.patterns(Role::Carriers));
     let messages = |topic: &str| -> u64 {
         let of_topic = info.channels.iter().filter(|c| c.topic == topic);
         of_topic.map(|c| c.messages).sum()
@@ -45,7 +41,7 @@ pub fn factors(
         true => RATH_BYTES,
         false => CARRIER_BYTES,
     };
-    let topics: BTreeSet<&str> = topics.map(String::as_str).collect();
+    let topics: BTreeSet<&str> = roles.inertial().into_iter().collect();
     let all = |factors: Vec<usize>| -> BTreeMap<String, usize> {
         let names = topics.iter().map(|topic| (*topic).to_owned());
         names.zip(factors).collect()
