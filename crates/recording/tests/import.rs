@@ -1341,6 +1341,63 @@ fn notes_of_devices_with_one_name_stand_apart() {
     assert_eq!(metadata["notes./audio/imu"], "8-bit sound became 16-bit");
 }
 
+/// Zips as no writer should make them: two files of one name, of which the library keeps one, and none at all.
+#[test]
+fn zips_that_hold_a_name_twice_or_nothing() {
+    let out = folder();
+    let out = out.path();
+    let table = |rows: usize| {
+        let header = "\"Time (s)\",\"Acceleration x (m/s^2)\",\"Acceleration y (m/s^2)\",\"Acceleration z (m/s^2)\"\n";
+        let rows = (0..rows).map(|k| format!("{}.0E-2,0.0E0,0.0E0,9.8E0\n", k));
+        [header.to_owned()]
+            .into_iter()
+            .chain(rows)
+            .collect::<String>()
+    };
+    let files = [
+        ("Accelerometer.csv", table(50)),
+        ("Accelerometer.csw", table(30)),
+    ];
+    let path = zipped(out, "twice.zip", &files);
+    let text = fs::read(&path).expect("reads");
+    let mut twice = text.clone();
+    for k in 0..text.len() - 4 {
+        if text[k..].starts_with(b".csw") {
+            twice[k + 3] = b'v';
+        }
+    }
+    fs::write(&path, twice).expect("writes");
+    let none = zipped(out, "none.zip", &[]);
+    for (path, expected) in [
+        (path, "several files of one name"),
+        (none, "has no CSV in it"),
+    ] {
+        let said = ingest(out, &[path], None).err().expect("refused");
+        let said = said.to_string();
+        assert!(said.contains(expected), "{said}");
+    }
+}
+
+/// A file whose name only ends like one that phyphox writes is another.
+#[test]
+fn another_folder_than_meta_tells_no_time() {
+    let out = folder();
+    let rows = (0..50).map(|k| format!("{k}.0E-2,0.0E0,0.0E0,9.8E0\n"));
+    let table = format!(
+        "\"Time (s)\",\"Acceleration x (m/s^2)\",\"Acceleration y (m/s^2)\",\"Acceleration z (m/s^2)\"\n{}",
+        rows.collect::<String>()
+    );
+    let files = [
+        ("Accelerometer.csv", table),
+        ("mymeta/time.csv", "hour,minute\n1,2\n".to_owned()),
+    ];
+    let path = zipped(out.path(), "walk.zip", &files);
+    let found = ingest(out.path(), &[path], None).expect("ingests");
+    let notes = found.ingested.notes.join("\n");
+    assert!(notes.contains("there is no meta/time.csv"), "{notes}");
+    assert!(notes.contains("left out: mymeta/time.csv"), "{notes}");
+}
+
 /// Whatever the folder is called that the log is in.
 #[test]
 fn phyphox_in_a_folder_called_meta() {

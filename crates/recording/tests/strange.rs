@@ -1135,6 +1135,93 @@ fn of_entries_with_one_key_the_last_counts() {
     }
 }
 
+/// Keys that differ by less than a float tells are different keys.
+#[test]
+fn keys_of_64_bits_are_exact() {
+    let keys = [1i64 << 60, (1 << 60) + 1, -(1 << 60) - 1];
+    for kind in [
+        Type::Fixed64,
+        Type::Sfixed64,
+        Type::Sint64,
+        Type::Int64,
+        Type::Uint64,
+    ] {
+        let mut map = field("m", 1, Type::Message, Some(".a.M.MEntry"));
+        map.label = Some(Label::Repeated as i32);
+        let entry = DescriptorProto {
+            name: Some("MEntry".into()),
+            field: vec![
+                field("key", 1, kind, None),
+                field("value", 2, Type::Uint32, None),
+            ],
+            options: Some(MessageOptions {
+                map_entry: Some(true),
+                ..MessageOptions::default()
+            }),
+            ..DescriptorProto::default()
+        };
+        let message = DescriptorProto {
+            name: Some("M".into()),
+            field: vec![map],
+            nested_type: vec![entry],
+            ..DescriptorProto::default()
+        };
+        let varint = |mut bits: u64| {
+            let mut out = vec![8];
+            while bits > 127 {
+                out.push(bits as u8 | 128);
+                bits >>= 7;
+            }
+            [out, vec![bits as u8]].concat()
+        };
+        let written = |key: i64| match kind {
+            Type::Fixed64 | Type::Sfixed64 => [vec![9], key.to_le_bytes().to_vec()].concat(),
+            Type::Sint64 => varint(((key << 1) ^ (key >> 63)).cast_unsigned()),
+            _ => varint(key.cast_unsigned()),
+        };
+        let entries = keys.iter().zip(5..).flat_map(|(key, value)| {
+            let entry = [written(*key), vec![16, value]].concat();
+            [vec![10, entry.len() as u8], entry].concat()
+        });
+        let found = one_message("proto3", message, &entries.collect::<Vec<u8>>());
+        let (signals, _) = found.signals(&|_| true).expect("reads");
+        let mut told: Vec<String> = (signals.iter())
+            .map(|s| format!("{} {}", s.path, s.values[0]))
+            .collect();
+        told.sort();
+        let expected = keys.iter().zip(5..).map(|(key, value)| match kind {
+            Type::Fixed64 | Type::Uint64 => format!("/p.m[{}] {value}", key.cast_unsigned()),
+            _ => format!("/p.m[{key}] {value}"),
+        });
+        let mut expected: Vec<String> = expected.collect();
+        expected.sort();
+        assert_eq!(told, expected, "{kind:?}");
+    }
+}
+
+/// Stamps that were not set yet leave no gap between those that were.
+#[test]
+fn unset_stamps_are_no_gap() {
+    let found = recording(&WriterOptions::default(), |writer| {
+        let imu = writer.channel("/imu", MessageKind::Imu).expect("opens");
+        for i in 0..1000i64 {
+            let t_ns = START_NS + i * 10_000_000;
+            let mut message = Imu::raw(t_ns, "imu", [0.0; 3], [0.0, 0.0, 9.81]);
+            if (300..500).contains(&i) || i % 97 == 0 {
+                message.header.stamp = Time::default();
+            }
+            writer.message(imu, t_ns, &message).expect("writes");
+        }
+    });
+    let told = lines(&found);
+    assert_eq!(
+        told[0],
+        "zero_stamp /imu: 209 header stamps are zero, first at 0.000 s"
+    );
+    // And that there is no orientation.
+    assert_eq!(told.len(), 2, "{told:?}");
+}
+
 /// When messages came is known of those that nobody can decode, too.
 #[test]
 fn messages_without_a_decoder_tell_their_times() {

@@ -155,7 +155,7 @@ mod tests {
                 // Within the other's times, but for its hole.
                 let measured = match keeps_fast {
                     true => !(0.9924..2.0003).contains(&t),
-                    false => t >= 0.1 && t <= 0.1 + 1199.0 * 0.0025,
+                    false => (0.1..=0.1 + 1199.0 * 0.0025).contains(&t),
                 };
                 for (x, truth) in [x[k], y[k], z[k]].iter().zip(truth) {
                     match measured {

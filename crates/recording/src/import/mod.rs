@@ -67,6 +67,12 @@ impl ImportError {
     }
 }
 
+/// Whether a file is called so, in whatever folder.
+fn is_called(file: &str, name: &str) -> bool {
+    let folder = file.strip_suffix(name);
+    folder.is_some_and(|folder| folder.is_empty() || folder.ends_with('/'))
+}
+
 /// What came of an ingestion.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Ingested {
@@ -103,10 +109,6 @@ impl Files {
         self.texts
             .iter()
             .map(|(name, text)| (name.as_str(), text.as_str()))
-    }
-
-    fn ending_with(&self, end: &str) -> Option<(&str, &str)> {
-        self.texts().find(|(name, _)| name.ends_with(end))
     }
 
     /// The one text that `is` holds for; an error where there are two of `what`, for nothing tells which belongs to the others.
@@ -406,7 +408,7 @@ fn read(files: &Files, layout: Option<&layout::Layout>) -> Result<Vec<imu::Log>,
         }
         let of_app = || {
             let mut beside = folders.iter().flat_map(|(format, _)| format.beside);
-            beside.any(|end| name.ends_with(end))
+            beside.any(|beside| is_called(name, beside))
         };
         match layout {
             Some(_) if any_fits && !fits(text) => others.push(name),
@@ -577,9 +579,17 @@ fn open(path: &Path) -> Result<Files, ImportError> {
     if let Some(kind) = foreign::kind(&head) {
         return Err(content(format!("is {kind}")));
     }
-    if head.starts_with(b"PK\x03\x04") {
+    // One without entries begins with its end.
+    if head.starts_with(b"PK\x03\x04") || head.starts_with(b"PK\x05\x06") {
+        let entries = entries_of(&mut file).map_err(io)?;
         let mut zip = zip::ZipArchive::new(io::BufReader::new(file))
             .map_err(|error| content(format!("is no zip: {error}")))?;
+        // The library keeps the last of several entries with one name.
+        if entries.is_some_and(|entries| entries > zip.len()) {
+            return Err(content(
+                "holds several files of one name, of which all but one would be lost; unpack it and give each a folder of its own".to_owned(),
+            ));
+        }
         for position in 0..zip.len() {
             let mut entry = zip
                 .by_index(position)
@@ -610,6 +620,22 @@ fn open(path: &Path) -> Result<Files, ImportError> {
         texts,
         sounds,
     })
+}
+
+/// How many entries a zip says that it has, up to the 65,534 that this place has room for. The file is left at its beginning.
+fn entries_of(file: &mut fs::File) -> io::Result<Option<usize>> {
+    // The record at the end has 22 bytes, of which 10 and 11 count, and up to 64 KiB of comment behind them.
+    let length = file.metadata()?.len();
+    io::Seek::seek(
+        file,
+        io::SeekFrom::Start(length.saturating_sub(22 + 65_535)),
+    )?;
+    let mut end = Vec::new();
+    file.read_to_end(&mut end)?;
+    io::Seek::rewind(file)?;
+    let record = end.windows(12).rev().find(|w| w.starts_with(b"PK\x05\x06"));
+    let count = record.map(|w| u16::from_le_bytes([w[10], w[11]]));
+    Ok(count.filter(|count| *count != u16::MAX).map(usize::from))
 }
 
 /// UTF-8; UTF-16 by its byte order mark, as spreadsheets write it; or else Latin-1.

@@ -7,6 +7,7 @@
 use super::{
     Files, ImportError,
     imu::{self, Log, Track},
+    is_called,
     table::Table,
 };
 
@@ -26,7 +27,7 @@ const SENSORS: &[(&str, &str)] = &[
 
 pub(super) fn read(files: &Files) -> Result<Log, ImportError> {
     let mut notes = Vec::new();
-    let starts = match files.ending_with("meta/time.csv") {
+    let starts = match files.only("meta/time.csv", |name, _| is_called(name, "meta/time.csv"))? {
         Some((name, text)) => starts(name, text, &mut notes)?,
         None => Vec::new(),
     };

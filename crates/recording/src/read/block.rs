@@ -200,13 +200,13 @@ pub(super) struct Worker<'a> {
     unknown: BTreeMap<u16, (u64, u64)>,
     /// Message records too short for their header.
     short: u64,
-    /// Places that the decoders of all channels remember, and their columns.
+    /// Places that the decoders of all channels remember, and their columns and fields of types.
     places: usize,
     columns: usize,
     spare: Spare,
 }
 
-/// No thread remembers more columns: those of a channel that it has not decoded lately are found again.
+/// No thread remembers more columns and fields of types: those of a channel that it has not decoded lately are found again.
 const MOST_COLUMNS: usize = 1 << 20;
 
 impl<'a> Worker<'a> {
@@ -344,11 +344,11 @@ impl<'a> Worker<'a> {
                 continue;
             };
             self.places -= channel.rows.places;
-            self.columns -= channel.rows.columns.len();
+            self.columns -= channel.remembers();
             channel.decode(block, self.recording, self.select);
             channel.harvest(result, &mut self.spare);
             let places = self.places + channel.rows.places;
-            let columns = self.columns + channel.rows.columns.len();
+            let columns = self.columns + channel.remembers();
             // Many channels may not remember together what each of them may.
             if places > MAX_PLACES || columns > MOST_COLUMNS {
                 self.channels[index] = None;
@@ -450,6 +450,11 @@ impl<'a> ChannelState<'a> {
     /// Whether the current block has given this channel anything yet.
     fn begun(&self) -> bool {
         self.seen > 0
+    }
+
+    /// Its columns, and the fields of its type.
+    fn remembers(&self) -> usize {
+        self.rows.columns.len() + self.rows.fields
     }
 
     /// Decodes the messages that wait, which lie in `block`. What comes of them depends on the block alone: where columns were left out because others
@@ -707,9 +712,40 @@ mod tests {
             let places: usize = places.sum();
             assert!(places <= MAX_PLACES && places == worker.places, "{places}");
             let columns = worker.channels.iter().flatten();
-            let columns: usize = columns.map(|c| c.rows.columns.len()).sum();
+            let columns: usize = columns.map(|c| c.remembers()).sum();
             assert_eq!(columns, worker.columns);
         }
         assert_eq!(values, 20 * 2 * 64 * 64);
+    }
+
+    /// Text gives no columns, yet what is known of its fields takes memory too.
+    #[test]
+    fn fields_that_give_no_columns_count() {
+        let path = tempfile::NamedTempFile::new().expect("makes a file");
+        let options = WriterOptions::default();
+        let mut writer = RecordingWriter::create(path.path(), &options).expect("begins");
+        let schema: String = (0..30_000).map(|k| format!("string s{k}\n")).collect();
+        for topic in 0..60 {
+            let channel = RawChannel {
+                topic: &format!("/{topic}"),
+                message_encoding: "cdr",
+                schema_name: "p/msg/Text",
+                schema_encoding: "ros2msg",
+                schema_data: schema.as_bytes(),
+                metadata: &BTreeMap::new(),
+            };
+            let id = writer.raw_channel(&channel).expect("opens");
+            (writer.message(id, 0, &[0, 1, 0, 0][..])).expect("writes");
+        }
+        writer.finish().expect("finishes");
+        let recording = Recording::open(path.path(), &ReadOptions::default()).expect("opens");
+        let mut worker = Worker::new(&recording, &|_| true);
+        for block in &recording.container.blocks {
+            worker.block(block);
+        }
+        let kept = worker.channels.iter().flatten();
+        let remembered: usize = kept.clone().map(|c| c.remembers()).sum();
+        assert!(remembered <= MOST_COLUMNS && remembered == worker.columns);
+        assert!((5..30).contains(&kept.count()), "{remembered}");
     }
 }

@@ -208,7 +208,7 @@ impl Decoder for Cdr {
             ));
         }
         if rows.places > MAX_PLACES {
-            rows.places = 0;
+            (rows.places, rows.fields) = (0, 0);
             self.programs.clear();
         }
         let known = match self

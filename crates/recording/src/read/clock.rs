@@ -21,6 +21,7 @@ const DRIFT_PPM: f64 = 20.0;
 #[derive(Debug, Default)]
 pub(super) struct Order {
     last: Option<i64>,
+    begun: bool,
     /// The earliest and the latest so far.
     earliest: i64,
     latest: i64,
@@ -57,7 +58,11 @@ impl Order {
         };
         match self.last {
             Some(last) => self.interval(last, first),
-            None => (self.earliest, self.latest) = (first, first),
+            None if self.begun => {
+                self.earliest = self.earliest.min(first);
+                self.latest = self.latest.max(first);
+            }
+            None => (self.earliest, self.latest, self.begun) = (first, first, true),
         }
         self.last = times.last().copied();
         let in_order = first >= self.latest;
@@ -83,6 +88,11 @@ impl Order {
         for pair in times.windows(2) {
             self.interval(pair[0], pair[1]);
         }
+    }
+
+    /// What comes next does not follow what came last: nothing is told of the time between them.
+    pub fn pause(&mut self) {
+        self.last = None;
     }
 
     fn interval(&mut self, from: i64, to: i64) {

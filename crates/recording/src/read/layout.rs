@@ -277,7 +277,10 @@ struct Compiler<'a, 'r> {
 impl Program {
     /// Compiles the message type: the first struct of `types`.
     pub fn message(types: &Types, shape: Shape, rows: &mut Rows) -> Result<Self, String> {
-        compile(types, &Type::Struct(0), "", shape, rows, (true, false))
+        let program = compile(types, &Type::Struct(0), "", shape, rows, (true, false))?;
+        let parsed = types.structs.iter().map(|s| s.fields.len());
+        rows.fields += program.places + parsed.sum::<usize>();
+        Ok(program)
     }
 
     /// Decodes a message, aligned from the slice's start, and returns where it ended.

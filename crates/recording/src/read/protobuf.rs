@@ -154,12 +154,14 @@ impl Number {
             Number::Unsigned32 => f64::from(input.varint()? as u32),
             Number::Unsigned => input.varint()? as f64,
             Number::Bool => f64::from(u8::from(input.varint()? != 0)),
-            Number::Zigzag => {
-                let bits = input.varint()?;
-                ((bits >> 1) as i64 ^ -((bits & 1) as i64)) as f64
-            }
+            Number::Zigzag => unfolded(input.varint()?) as f64,
         })
     }
+}
+
+/// A number whose sign is its last bit.
+fn unfolded(bits: u64) -> i64 {
+    (bits >> 1) as i64 ^ -((bits & 1) as i64)
 }
 
 /// The bytes that are left of a message.
@@ -716,8 +718,16 @@ fn read_entry(
                 (FieldKind::Bool, Some(number)) if wire == 0 => {
                     (number.read(&mut input)? != 0.0).to_string()
                 }
+                // A float has no room for these.
                 (FieldKind::Uint64, _) if wire == 0 => input.varint()?.to_string(),
                 (FieldKind::Int64, _) if wire == 0 => (input.varint()? as i64).to_string(),
+                (FieldKind::Sint64, _) if wire == 0 => unfolded(input.varint()?).to_string(),
+                (FieldKind::Fixed64, _) if wire == 1 => {
+                    u64::from_le_bytes(input.take()?).to_string()
+                }
+                (FieldKind::Sfixed64, _) if wire == 1 => {
+                    i64::from_le_bytes(input.take()?).to_string()
+                }
                 (_, Some(number)) if wire == number.wire() => number.read(&mut input)?.to_string(),
                 _ => return Err("a map's key has another wire type than its schema says"),
             };

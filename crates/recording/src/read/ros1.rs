@@ -43,7 +43,7 @@ impl Decoder for Ros1 {
 
     fn decode(&mut self, message: &[u8], rows: &mut Rows) -> Result<(), String> {
         if rows.places > MAX_PLACES {
-            rows.places = 0;
+            (rows.places, rows.fields) = (0, 0);
             self.program = Program::message(&self.types, SHAPE, rows)?;
         }
         let end = self

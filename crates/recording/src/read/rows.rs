@@ -106,6 +106,8 @@ pub(super) struct Rows<'a> {
     pub full: bool,
     /// Places that the decoder remembers because messages had them: keys, items, and the fields of these.
     pub places: usize,
+    /// At least so many fields the decoder remembers of the type, columns or not.
+    pub fields: usize,
     /// Those in the message in hand.
     entered: usize,
     row: u32,
@@ -152,6 +154,7 @@ impl<'a> Rows<'a> {
             order: Vec::new(),
             full: false,
             places: 0,
+            fields: 0,
             entered: 0,
             row: 0,
             stamp_ns: None,

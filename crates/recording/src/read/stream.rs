@@ -425,15 +425,18 @@ impl<'a> Taker<'a> {
             watch.log.observe(times);
             if !stamps.is_empty() {
                 watch.clocks.observe(times, stamps);
-                // One that was never set is told as such, and is no leap of half a century.
-                match stamps.contains(&0) {
-                    true => {
-                        let set = times.iter().zip(stamps).filter(|(t, s)| !unset(**t, **s));
-                        let set: Vec<i64> = set.map(|(_, s)| *s).collect();
-                        watch.stamps.observe(&set);
+                // One that was never set is told as such: it is no leap of half a century, and nothing is missing there.
+                let mut from = 0;
+                if stamps.contains(&0) {
+                    for (k, (t, s)) in times.iter().zip(stamps).enumerate() {
+                        if unset(*t, *s) {
+                            watch.stamps.observe(&stamps[from..k]);
+                            watch.stamps.pause();
+                            from = k + 1;
+                        }
                     }
-                    false => watch.stamps.observe(stamps),
                 }
+                watch.stamps.observe(&stamps[from..]);
             }
         }
         for (field, count) in std::mem::take(&mut batch.absent) {
