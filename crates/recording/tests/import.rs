@@ -1378,6 +1378,50 @@ fn zips_that_hold_a_name_twice_or_nothing() {
     }
 }
 
+/// One sensor of several that logged nothing is not lost without a word.
+#[test]
+fn a_table_without_rows_beside_others_is_told() {
+    let out = folder();
+    let phyphox = |sensor: &str, unit: &str, rows: usize| {
+        let axes = ["x", "y", "z"].map(|axis| format!("{sensor} {axis} ({unit})"));
+        let rows = (0..rows).map(|k| format!("{k}.0E-2,0.0E0,0.0E0,9.8E0\n"));
+        format!("Time (s),{}\n{}", axes.join(","), rows.collect::<String>())
+    };
+    let logger = |rows: i64| {
+        let row = |k| {
+            format!(
+                "{},{k}.0,0.1,0.2,9.8\n",
+                1_700_000_000_000_000_000 + k * 10_000_000
+            )
+        };
+        let rows: String = (0..rows).map(row).collect();
+        format!("time,seconds_elapsed,x,y,z\n{rows}")
+    };
+    for (files, empty) in [
+        (
+            [
+                ("Accelerometer.csv", phyphox("Acceleration", "m/s^2", 50)),
+                ("Gyroscope.csv", phyphox("Gyroscope", "rad/s", 0)),
+            ],
+            "Gyroscope.csv",
+        ),
+        (
+            [
+                ("TotalAcceleration.csv", logger(50)),
+                ("Gyroscope.csv", logger(0)),
+            ],
+            "Gyroscope.csv",
+        ),
+    ] {
+        let path = zipped(out.path(), "walk.zip", &files);
+        let found = ingest(out.path(), &[path], None).expect("ingests");
+        let expected = format!("{empty}: has a header but no rows, and is left out");
+        let notes = &found.ingested.notes;
+        let told = notes.iter().filter(|note| note.ends_with(&expected));
+        assert_eq!(told.count(), 1, "{notes:?}");
+    }
+}
+
 /// A file whose name only ends like one that phyphox writes is another.
 #[test]
 fn another_folder_than_meta_tells_no_time() {

@@ -765,6 +765,42 @@ const JSON: RawChannel<'static> = RawChannel {
     metadata: &BTreeMap::new(),
 };
 
+/// A few bytes of a packed file can ask for millions of signals: topics together have no more than are worth reading.
+#[test]
+fn topics_together_have_so_many_signals() {
+    let rule = "================================================================================";
+    let schema = format!("A[64] a\n{rule}\nMSG: p/A\nB[16] b\n{rule}\nMSG: p/B\nuint8[64] c\n");
+    let message = [&[0, 1, 0, 0][..], &[1; 1 << 16]].concat();
+    let found = recording(&WriterOptions::default(), |writer| {
+        for topic in 0..9 {
+            let channel = RawChannel {
+                topic: &format!("/{topic}"),
+                message_encoding: "cdr",
+                schema_name: "p/msg/Grid",
+                schema_encoding: "ros2msg",
+                schema_data: schema.as_bytes(),
+                ..JSON
+            };
+            let channel = writer.raw_channel(&channel).expect("opens");
+            (writer.message(channel, topic, message.as_slice())).expect("writes");
+        }
+    });
+    let (signals, findings) = found.signals(&|_| true).expect("reads");
+    assert_eq!(signals.len(), 1 << 19);
+    let said: Vec<String> = findings.iter().map(ToString::to_string).collect();
+    assert_eq!(
+        said,
+        [
+            "/8: the recording has more than 524288 numeric fields in all; the others of this topic are left out"
+        ]
+    );
+    // Of what is asked for, that is.
+    let (signals, findings) = found
+        .signals(&|path| path.starts_with("/8."))
+        .expect("reads");
+    assert_eq!((signals.len(), findings.len()), (1 << 16, 0));
+}
+
 /// Limits hold for a message, or for the recording in its order, never for what a thread happened to see.
 #[test]
 fn limits_do_not_depend_on_threads() {

@@ -39,6 +39,7 @@ pub(super) fn read(files: &Files) -> Result<Log, ImportError> {
         }
         let mut table = Table::parse(name, text, is_header)?;
         table.drop_cut_row(&files.name, &mut notes);
+        table.note_empty(&files.name, &mut notes);
         seen.extend(table.columns.iter().cloned());
         let mut untimed = 0;
         for ((sensor, unit), (from, track)) in SENSORS.iter().zip(&mut tracks) {

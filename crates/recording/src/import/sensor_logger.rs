@@ -127,6 +127,7 @@ fn read_track(
 ) -> Result<Track, ImportError> {
     let mut table = Table::parse(name, text, is_header)?;
     table.drop_cut_row(log, notes);
+    table.note_empty(log, notes);
     let [time, x, y, z] = table.find_all(["time", "x", "y", "z"])?;
     let elapsed = table.find("seconds_elapsed");
     let (mut track, mut untimed) = (Track::new(), 0);

@@ -125,6 +125,14 @@ impl Table {
         self.rows.pop();
     }
 
+    /// Notes that nothing was logged, of one table of several.
+    pub fn note_empty(&self, log: &str, notes: &mut Vec<String>) {
+        let file = self.told_in(log);
+        if self.len() == 0 && !file.is_empty() {
+            notes.push(format!("{file}has a header but no rows, and is left out"));
+        }
+    }
+
     /// Notes how many rows were left out for want of a time.
     pub fn note_untimed(&self, rows: u64, log: &str, notes: &mut Vec<String>) {
         if rows > 0 {

@@ -7,6 +7,8 @@ pub(super) const UNWANTED: u32 = u32::MAX;
 
 /// More columns than this in one channel are refused: items of items of items would otherwise fill the memory.
 pub(super) const MAX_COLUMNS: usize = 1 << 16;
+/// Numeric fields of all topics beyond these are left out: what is known of each takes a kilobyte or two in the end.
+pub(super) const MAX_SIGNALS: usize = 1 << 19;
 
 /// More places than this in the items, entries and keys of one message are left out, and a decoder that remembers more forgets them: messages that
 /// nest sequences in sequences, or never stop inventing keys, would otherwise fill the memory.
@@ -77,6 +79,12 @@ impl<K: Clone + Eq + Hash> Counts<K> {
 }
 
 /// What is said where there are more columns.
+pub(super) fn too_many_signals() -> String {
+    format!(
+        "the recording has more than {MAX_SIGNALS} numeric fields in all; the others of this topic are left out"
+    )
+}
+
 pub(super) fn too_many_columns() -> String {
     format!("it has more than {MAX_COLUMNS} numeric fields; the others are left out")
 }

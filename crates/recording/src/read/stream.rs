@@ -12,7 +12,10 @@ use super::{
     clock::{Clocks, Order, seconds, unset},
     container::{Block, op},
     json::MAX_KEYS,
-    rows::{Counts, Long, MAX_COLUMNS, MAX_PLACES, Selection, too_many_columns},
+    rows::{
+        Counts, Long, MAX_COLUMNS, MAX_PLACES, MAX_SIGNALS, Selection, too_many_columns,
+        too_many_signals,
+    },
 };
 use crate::{Finding, Kind, text::counted};
 
@@ -468,7 +471,9 @@ impl<'a> Taker<'a> {
                         mark.push(':');
                     }
                     // Each block by itself has no more, all of them together may.
-                    Entry::Vacant(_) if watch.numbered >= MAX_COLUMNS => break None,
+                    Entry::Vacant(_) if watch.numbered >= MAX_COLUMNS || next >= MAX_SIGNALS => {
+                        break None;
+                    }
                     Entry::Vacant(new) => {
                         watch.numbered += 1;
                         new.insert((next, topic));
@@ -490,7 +495,10 @@ impl<'a> Taker<'a> {
         for (column, (_, name, id)) in batch.columns.iter().zip(&watch.columns) {
             let id = *id;
             let Some(id) = id else {
-                remark.get_or_insert_with(too_many_columns);
+                remark.get_or_insert_with(match watch.numbered {
+                    MAX_COLUMNS.. => too_many_columns,
+                    _ => too_many_signals,
+                });
                 continue;
             };
             if let Some((count, row)) = column.odd {
