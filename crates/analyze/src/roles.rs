@@ -437,26 +437,12 @@ impl Roles {
                 roles.said.insert(role);
             }
         }
-        // A device is one sensor, whichever half names it.
-        for role in [Role::Imu, Role::Carriers] {
-            let topics = roles.patterns(role).to_vec();
-            let named = |topic: &String| topics.iter().position(|t| t == topic);
-            let again: Vec<String> = (topics.iter().zip(0..))
-                .filter(|(topic, k)| {
-                    let other = roles.halves.get(*topic).and_then(named);
-                    other.is_some_and(|other| other < *k)
-                })
-                .map(|(topic, _)| topic.clone())
-                .collect();
-            roles.leave_out(role, |topic| again.contains(topic));
-        }
         // One sensor is not on the load and on who carries it; and beats are heard in a sound without a role.
-        let mut load = roles.patterns(Role::Imu).to_vec();
-        load.extend(
-            load.clone()
-                .iter()
-                .filter_map(|t| roles.halves.get(t).cloned()),
-        );
+        let load = roles.patterns(Role::Imu).iter();
+        let load: Vec<String> = load
+            .flat_map(|topic| roles.device(topic))
+            .map(str::to_owned)
+            .collect();
         let is_sound = |topic: &String| channels.iter().any(|(t, s)| t == topic && s == SOUND);
         roles.leave_out(Role::Carriers, |topic| load.contains(topic));
         roles.leave_out(Role::Beats, is_sound);
@@ -496,8 +482,12 @@ impl Roles {
             if let Some(what) = what {
                 self.choose(&found, what);
             }
-            found.retain(|topic| !out.contains(topic));
-            out.extend(found);
+            // A device is one sensor, whichever half names it.
+            for topic in found {
+                if !self.device(&topic).any(|t| out.iter().any(|o| o == t)) {
+                    out.push(topic);
+                }
+            }
         }
         out
     }
@@ -550,9 +540,12 @@ impl Roles {
     pub fn inertial(&self) -> Vec<&str> {
         let each = self.patterns(Role::Imu).iter();
         let each = each.chain(self.patterns(Role::Carriers));
-        each.flat_map(|topic| [Some(topic.as_str()), self.other_half(topic)])
-            .flatten()
-            .collect()
+        each.flat_map(|topic| self.device(topic)).collect()
+    }
+
+    /// A topic and its other half, if it has one.
+    pub fn device<'a>(&'a self, topic: &'a str) -> impl Iterator<Item = &'a str> {
+        [Some(topic), self.other_half(topic)].into_iter().flatten()
     }
 
     /// The roles of signals that a path plays.

@@ -1,7 +1,7 @@
 //! Two topics of one device, the gyroscope's and the accelerometer's, as drivers of depth cameras publish them: each message fills its half and leaves zeros
 //! in the other.
 
-use recording::Signal;
+use recording::signal::{Signal, field_of};
 
 use super::columns::{ACCEL, ACCEL_MARK, Columns, GYRO, GYRO_MARK};
 use crate::inputs::{drawn, mean_step_in, stretches};
@@ -34,8 +34,8 @@ pub(super) fn join(
         .values(other, fields)?
         .map(|x| put(&taken_s, x, &at_s));
     columns.signals.retain(|s| {
-        let replaced = |field: &&str| s.path == format!("{topic}.{field}");
-        s.topic != topic || ![&fields[..], &[mark]].concat().iter().any(replaced)
+        let field = field_of(&s.path, topic);
+        field.is_none_or(|field| field != mark && !fields.contains(&field))
     });
     for (field, values) in fields.iter().zip(given) {
         columns.signals.push(Signal {

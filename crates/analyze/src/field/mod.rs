@@ -643,9 +643,8 @@ fn without_a_role(recording: &Recording, roles: &Roles) -> Option<Quality> {
         .filter(|c| c.schema.replacen("/msg/", "/", 1) == "sensor_msgs/Imu")
         .map(|c| c.topic.as_str())
         .filter(|topic| {
-            let of = [Some(*topic), roles.other_half(topic)];
-            let plays = |topic: &&str| played.iter().any(|p| p == topic);
-            !of.iter().flatten().any(plays) && !stands_beside(topic)
+            let plays = |topic: &str| played.iter().any(|p| p == topic);
+            !roles.device(topic).any(plays) && !stands_beside(topic)
         })
         .collect();
     left.sort_unstable();

@@ -450,8 +450,7 @@ fn read(files: &Files, layout: Option<&layout::Layout>) -> Result<Vec<imu::Log>,
             problem: "has a header but no rows; expected at least one sample".to_owned(),
         });
     };
-    let left_out = |name: &&str| format!("{name}: has a header but no rows, and is left out");
-    first.notes.extend(empty.iter().map(left_out));
+    first.notes.extend(empty.into_iter().map(without_rows));
     if !others.is_empty() {
         first.notes.push(format!(
             "of no kind that is known, and left out: {}",
@@ -459,6 +458,11 @@ fn read(files: &Files, layout: Option<&layout::Layout>) -> Result<Vec<imu::Log>,
         ));
     }
     Ok(logs)
+}
+
+/// The note for a file in which nothing was logged, beside others.
+fn without_rows(name: &str) -> String {
+    format!("{name}: has a header but no rows, and is left out")
 }
 
 /// Reads a device's file, by name and text.

@@ -2,7 +2,7 @@
 
 use std::borrow::Cow;
 
-use super::{ImportError, imu::Track};
+use super::{ImportError, imu::Track, without_rows};
 use crate::text::counted;
 
 /// How programs write a value that is missing.
@@ -127,9 +127,8 @@ impl Table {
 
     /// Notes that nothing was logged, of one table of several.
     pub fn note_empty(&self, log: &str, notes: &mut Vec<String>) {
-        let file = self.told_in(log);
-        if self.len() == 0 && !file.is_empty() {
-            notes.push(format!("{file}has a header but no rows, and is left out"));
+        if self.len() == 0 && self.name != log {
+            notes.push(without_rows(&self.name));
         }
     }
 

@@ -678,30 +678,38 @@ mod tests {
     use super::*;
     use crate::write::{RawChannel, RecordingWriter, WriterOptions};
 
-    /// Each of the channels remembers less than is allowed, all of them together would not; what they give is whole.
-    #[test]
-    fn channels_together_remember_no_more_than_one_may() {
+    /// So many channels of one kind, each with the message at each of so many times.
+    fn alike(topics: usize, kind: &RawChannel<'_>, message: &[u8], times: i64) -> Recording {
         let path = tempfile::NamedTempFile::new().expect("makes a file");
         let options = WriterOptions::default();
         let mut writer = RecordingWriter::create(path.path(), &options).expect("begins");
-        let line = format!("[{}]", vec!["1"; 64].join(","));
-        let message = format!("[{}]", vec![line; 64].join(","));
-        for topic in 0..20 {
-            let channel = RawChannel {
-                topic: &format!("/{topic}"),
-                message_encoding: "json",
-                schema_name: "",
-                schema_encoding: "",
-                schema_data: b"",
-                metadata: &BTreeMap::new(),
-            };
-            let id = writer.raw_channel(&channel).expect("opens");
-            for t_ns in 0..2 {
-                (writer.message(id, t_ns, message.as_bytes())).expect("writes");
+        for topic in 0..topics {
+            let topic = &format!("/{topic}");
+            let id = writer.raw_channel(&RawChannel { topic, ..*kind });
+            let id = id.expect("opens");
+            for t_ns in 0..times {
+                writer.message(id, t_ns, message).expect("writes");
             }
         }
         writer.finish().expect("finishes");
-        let recording = Recording::open(path.path(), &ReadOptions::default()).expect("opens");
+        Recording::open(path.path(), &ReadOptions::default()).expect("opens")
+    }
+
+    const JSON: RawChannel<'static> = RawChannel {
+        topic: "",
+        message_encoding: "json",
+        schema_name: "",
+        schema_encoding: "",
+        schema_data: b"",
+        metadata: &BTreeMap::new(),
+    };
+
+    /// Each of the channels remembers less than is allowed, all of them together would not; what they give is whole.
+    #[test]
+    fn channels_together_remember_no_more_than_one_may() {
+        let line = format!("[{}]", vec!["1"; 64].join(","));
+        let message = format!("[{}]", vec![line; 64].join(","));
+        let recording = alike(20, &JSON, message.as_bytes(), 2);
         let mut worker = Worker::new(&recording, &|_| true);
         let mut values = 0;
         for block in &recording.container.blocks {
@@ -721,24 +729,15 @@ mod tests {
     /// Text gives no columns, yet what is known of its fields takes memory too.
     #[test]
     fn fields_that_give_no_columns_count() {
-        let path = tempfile::NamedTempFile::new().expect("makes a file");
-        let options = WriterOptions::default();
-        let mut writer = RecordingWriter::create(path.path(), &options).expect("begins");
         let schema: String = (0..30_000).map(|k| format!("string s{k}\n")).collect();
-        for topic in 0..60 {
-            let channel = RawChannel {
-                topic: &format!("/{topic}"),
-                message_encoding: "cdr",
-                schema_name: "p/msg/Text",
-                schema_encoding: "ros2msg",
-                schema_data: schema.as_bytes(),
-                metadata: &BTreeMap::new(),
-            };
-            let id = writer.raw_channel(&channel).expect("opens");
-            (writer.message(id, 0, &[0, 1, 0, 0][..])).expect("writes");
-        }
-        writer.finish().expect("finishes");
-        let recording = Recording::open(path.path(), &ReadOptions::default()).expect("opens");
+        let kind = RawChannel {
+            message_encoding: "cdr",
+            schema_name: "p/msg/Text",
+            schema_encoding: "ros2msg",
+            schema_data: schema.as_bytes(),
+            ..JSON
+        };
+        let recording = alike(60, &kind, &[0, 1, 0, 0], 1);
         let mut worker = Worker::new(&recording, &|_| true);
         for block in &recording.container.blocks {
             worker.block(block);
