@@ -63,7 +63,7 @@ pub(super) struct BlockResult {
     pub times: Option<(u64, u64)>,
     /// Schemas and channels that are defined here otherwise than they are used.
     pub contradictions: u64,
-    /// The chunk is too large to be decoded in one go, or cut off: the caller reads it in pieces.
+    /// The block is too large to be decoded in one go, or cut off: the caller reads it in pieces.
     pub large: bool,
 }
 
@@ -206,6 +206,10 @@ pub(super) struct Worker<'a> {
     spare: Spare,
 }
 
+/// What a block gives is held up to so many numbers; twice as many as the largest chunk that is unpacked in one go can hold as doubles. Only messages that
+/// leave out what they mean, as protobuf's do, give many more than they have bytes.
+const MOST_VALUES: usize = 1 << 22;
+
 /// No thread remembers more columns and fields of types: those of a channel that it has not decoded lately are found again.
 const MOST_COLUMNS: usize = 1 << 20;
 
@@ -242,7 +246,9 @@ impl<'a> Worker<'a> {
     pub fn block(&mut self, block: &Block) -> BlockResult {
         let mut result = BlockResult::default();
         match block {
-            Block::Loose(range) => self.records(&self.recording.data[range.clone()], &mut result),
+            Block::Loose(range) => {
+                self.records(&self.recording.data[range.clone()], &mut result, None);
+            }
             Block::CutChunk(_) => {
                 result.large = true;
                 return result;
@@ -265,26 +271,34 @@ impl<'a> Worker<'a> {
                 // The unpacker's memory is borrowed while records are read from it.
                 let mut unpacker = std::mem::replace(&mut self.unpacker, Unpacker::new());
                 match unpacker.whole(&header) {
-                    Ok(records) => self.records(records, &mut result),
+                    Ok(records) => self.records(records, &mut result, None),
                     Err(loss) => result.lose(self.recording, body, *indexed, loss),
                 }
                 self.unpacker = unpacker;
             }
         }
+        if result.large {
+            // What was decoded of it stands in the way of what the caller reads next.
+            *self = Worker::new(self.recording, self.select);
+            return BlockResult {
+                large: true,
+                ..BlockResult::default()
+            };
+        }
         result
     }
 
-    /// Decodes a chunk in pieces and gives each piece's result away at once.
+    /// Decodes a block in pieces and gives each piece's result away at once.
     pub fn large(&mut self, block: &Block, give: &mut dyn FnMut(BlockResult)) {
         let recording = self.recording;
         let (options, packed) = (&recording.options, &recording.data[block.range().clone()]);
         let mut read = |records: &[u8]| {
             let mut result = BlockResult::default();
-            self.records(records, &mut result);
+            self.records(records, &mut result, Some(give));
             give(result);
         };
         let (too_long, indexed) = match block {
-            Block::Loose(_) => return,
+            Block::Loose(range) => return read(&recording.data[range.clone()]),
             Block::Chunk { indexed, .. } => {
                 let header = chunk::open(packed, options);
                 let pieces = header.and_then(|header| chunk::pieces(&header, options, &mut read));
@@ -318,8 +332,14 @@ impl<'a> Worker<'a> {
         give(result);
     }
 
-    /// Reads records that stand one after the other.
-    fn records(&mut self, block: &[u8], result: &mut BlockResult) {
+    /// Reads records that stand one after the other. Where they give more numbers than may be held, these are given away in between, or it ends there
+    /// with a result that says so.
+    fn records(
+        &mut self,
+        block: &[u8],
+        result: &mut BlockResult,
+        mut give: Option<&mut dyn FnMut(BlockResult)>,
+    ) {
         let mut records = Records::new(block);
         let mut misplaced: BTreeMap<u8, u64> = BTreeMap::new();
         while let Some((opcode, body)) = records.next() {
@@ -339,14 +359,31 @@ impl<'a> Worker<'a> {
         }
         // In the order of the channels, so that it does not depend on which came first.
         self.touched.sort_unstable();
+        let mut held = 0;
         for index in std::mem::take(&mut self.touched) {
             let Some(channel) = &mut self.channels[index] else {
                 continue;
             };
             self.places -= channel.rows.places;
             self.columns -= channel.remembers();
-            channel.decode(block, self.recording, self.select);
-            channel.harvest(result, &mut self.spare);
+            loop {
+                let room = MOST_VALUES.saturating_sub(held);
+                channel.decode(block, self.recording, self.select, room);
+                held += channel.rows.held;
+                let whole = channel.waiting.is_empty();
+                if !whole && give.is_none() {
+                    result.large = true;
+                    return;
+                }
+                channel.harvest(result, &mut self.spare);
+                if whole {
+                    break;
+                }
+                if let Some(give) = &mut give {
+                    give(std::mem::take(result));
+                    held = 0;
+                }
+            }
             let places = self.places + channel.rows.places;
             let columns = self.columns + channel.remembers();
             // Many channels may not remember together what each of them may.
@@ -457,19 +494,19 @@ impl<'a> ChannelState<'a> {
         self.rows.columns.len() + self.rows.fields
     }
 
-    /// Decodes the messages that wait, which lie in `block`. What comes of them depends on the block alone: where columns were left out because others
-    /// were known from blocks before, it is decoded with none known.
-    fn decode(&mut self, block: &[u8], recording: &Recording, select: Selection<'a>) {
+    /// Decodes messages that wait, which lie in `block`, until they give so many numbers. What comes of them depends on the block alone: where columns
+    /// were left out because others were known from blocks before, it is decoded with none known.
+    fn decode(&mut self, block: &[u8], recording: &Recording, select: Selection<'a>, room: usize) {
         if self.rows.full {
             self.begin_anew(recording, select);
         }
         let fresh = std::mem::replace(&mut self.fresh, false);
-        self.read(block, recording);
+        let mut done = self.read(block, recording, room);
         if self.rows.full && !fresh {
             self.begin_anew(recording, select);
-            self.read(block, recording);
+            done = self.read(block, recording, room);
         }
-        self.waiting.clear();
+        self.waiting.drain(..done);
     }
 
     fn begin_anew(&mut self, recording: &Recording, select: Selection<'a>) {
@@ -479,7 +516,8 @@ impl<'a> ChannelState<'a> {
         self.failed = None;
     }
 
-    fn read(&mut self, block: &[u8], recording: &Recording) {
+    /// Decodes messages until they give so many numbers, and says how many it took.
+    fn read(&mut self, block: &[u8], recording: &Recording, room: usize) -> usize {
         if let State::New = self.state {
             self.state = State::open(recording, self.index, &mut self.rows);
         }
@@ -491,13 +529,15 @@ impl<'a> ChannelState<'a> {
             // OK because rows are counted in u32 and a block is far from having as many messages.
             self.rows
                 .keep_alike(self.waiting.len() as u32, std::iter::empty());
-            return;
+            return self.waiting.len();
         };
         decoder.begin_block();
         let rows = &mut self.rows;
         self.times.reserve(self.waiting.len());
         let mut places = self.waiting.as_slice();
-        while let Some(place) = places.first() {
+        while let Some(place) = places.first()
+            && rows.held <= room
+        {
             let alike = decoder.decode_alike(block, places, rows);
             if alike > 0 {
                 let (done, rest) = places.split_at(alike);
@@ -521,6 +561,7 @@ impl<'a> ChannelState<'a> {
             }
             places = &places[1..];
         }
+        self.waiting.len() - places.len()
     }
 
     fn harvest(&mut self, result: &mut BlockResult, spare: &mut Spare) {
@@ -724,6 +765,84 @@ mod tests {
             assert_eq!(columns, worker.columns);
         }
         assert_eq!(values, 20 * 2 * 64 * 64);
+    }
+
+    /// Messages without a byte stand for a number in each of their fields: they are given out before they fill the memory.
+    #[test]
+    fn what_is_left_out_of_messages_does_not_fill_the_memory() {
+        use prost::Message as _;
+        use prost_types::field_descriptor_proto::{Label, Type};
+        use prost_types::{
+            DescriptorProto, FieldDescriptorProto, FileDescriptorProto, FileDescriptorSet,
+        };
+        const FIELDS: usize = 4000;
+        let field = |number: i32| FieldDescriptorProto {
+            name: Some(format!("f{number}")),
+            number: Some(number),
+            label: Some(Label::Optional.into()),
+            r#type: Some(Type::Double.into()),
+            ..FieldDescriptorProto::default()
+        };
+        let message = DescriptorProto {
+            name: Some("M".to_owned()),
+            field: (1..=FIELDS as i32).map(field).collect(),
+            ..DescriptorProto::default()
+        };
+        let file = FileDescriptorProto {
+            name: Some("m.proto".to_owned()),
+            package: Some("p".to_owned()),
+            message_type: vec![message],
+            syntax: Some("proto3".to_owned()),
+            ..FileDescriptorProto::default()
+        };
+        let set = FileDescriptorSet { file: vec![file] }.encode_to_vec();
+        let kind = RawChannel {
+            message_encoding: "protobuf",
+            schema_name: "p.M",
+            schema_encoding: "protobuf",
+            schema_data: &set,
+            ..JSON
+        };
+        // The last field as 1.5; every third one is cut off.
+        let given = [&[0x81, 0xfa, 0x01][..], &1.5f64.to_le_bytes()].concat();
+        let path = tempfile::NamedTempFile::new().expect("makes a file");
+        let mut writer =
+            RecordingWriter::create(path.path(), &WriterOptions::default()).expect("begins");
+        for topic in ["/a", "/b"] {
+            let id = writer.raw_channel(&RawChannel { topic, ..kind });
+            let id = id.expect("opens");
+            for k in 0..2250 {
+                let bytes = [&given[..], &[], &given[..5]][k as usize % 3];
+                writer.message(id, k, bytes).expect("writes");
+            }
+        }
+        writer.finish().expect("finishes");
+        let recording = Recording::open(path.path(), &ReadOptions::default()).expect("opens");
+        let [block] = &recording.container.blocks[..] else {
+            panic!("one chunk holds all");
+        };
+        let mut worker = Worker::new(&recording, &|_| true);
+        assert!(worker.block(block).large);
+        let (mut parts, mut failed, mut times, mut sum) = (0, 0, [const { Vec::new() }; 2], 0.0);
+        worker.large(block, &mut |result| {
+            assert!(result.bytes() <= 8 * (MOST_VALUES + FIELDS) + 8 * 2250);
+            parts += 1;
+            failed += result.troubles.iter().map(|t| t.count).sum::<u64>();
+            for batch in &result.batches {
+                times[batch.channel].extend_from_slice(&batch.times);
+                assert_eq!(batch.columns.len(), FIELDS);
+                for column in &batch.columns {
+                    assert_eq!(
+                        (column.values.len(), column.rows.len()),
+                        (batch.times.len(), 0)
+                    );
+                    sum += column.values.iter().sum::<f64>();
+                }
+            }
+        });
+        let kept: Vec<i64> = (0..2250).filter(|k| k % 3 < 2).collect();
+        assert!(times == [kept.clone(), kept]);
+        assert_eq!((parts, failed, sum), (3, 1500, 2.0 * 750.0 * 1.5));
     }
 
     /// Text gives no columns, yet what is known of its fields takes memory too.

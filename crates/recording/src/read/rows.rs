@@ -7,8 +7,8 @@ pub(super) const UNWANTED: u32 = u32::MAX;
 
 /// More columns than this in one channel are refused: items of items of items would otherwise fill the memory.
 pub(super) const MAX_COLUMNS: usize = 1 << 16;
-/// Numeric fields of all topics beyond these are left out: what is known of each takes a kilobyte or two in the end.
-pub(super) const MAX_SIGNALS: usize = 1 << 19;
+/// Numeric fields of all topics beyond these are left out: what is known of each takes up to four kilobytes in the end.
+pub(super) const MAX_SIGNALS: usize = 1 << 18;
 
 /// More places than this in the items, entries and keys of one message are left out, and a decoder that remembers more forgets them: messages that
 /// nest sequences in sequences, or never stop inventing keys, would otherwise fill the memory.
@@ -133,8 +133,10 @@ pub(super) struct Rows<'a> {
     pub remark: Option<String>,
     /// What the message in hand added to these counts, to be taken back with it.
     noted: Vec<Noted>,
-    /// The message in hand gave a number.
-    given: bool,
+    /// The columns that the message in hand gave a number.
+    given: Vec<u32>,
+    /// How many numbers the rows hold, at most.
+    pub held: usize,
     /// Messages with bytes left over.
     pub trailing: u64,
     /// Up to how many items of a sequence become signals.
@@ -172,7 +174,8 @@ impl<'a> Rows<'a> {
             long_types: Counts::default(),
             remark: None,
             noted: Vec::new(),
-            given: false,
+            given: Vec::new(),
+            held: 0,
             trailing: 0,
             max_items,
         }
@@ -221,7 +224,7 @@ impl<'a> Rows<'a> {
         let Some(known) = self.columns.get_mut(column as usize) else {
             return;
         };
-        self.given = true;
+        self.given.push(column);
         if !known.sparse && row > 0 && known.values.len() == row as usize {
             known.values.push(value);
         } else {
@@ -244,6 +247,7 @@ impl<'a> Rows<'a> {
         if known.values.is_empty() {
             self.order.push(column);
         }
+        self.held += values.len();
         if !known.sparse && known.values.len() == row as usize {
             known.values.extend(values);
         } else {
@@ -328,36 +332,30 @@ impl<'a> Rows<'a> {
         self.stamp_ns = None;
         self.entered = 0;
         self.noted.clear();
-        self.given = false;
+        self.given.clear();
     }
 
     /// Keeps the message that was decoded.
     pub fn keep(&mut self) {
         self.row += 1;
+        self.held += self.given.len();
         self.stamps.extend(self.stamp_ns);
     }
 
     /// Takes back what a message gave before it turned out to be broken.
     pub fn abort(&mut self) {
         self.take_back_counts();
-        // Mostly it broke before: with thousands of columns a look at each would take longer than the message.
-        if !std::mem::take(&mut self.given) {
-            return;
+        // Only the columns it gave a number: with thousands, a look at each would take longer than the message.
+        for &column in &self.given {
+            self.columns[column as usize].cut(self.row);
         }
-        let row = self.row;
-        for column in &mut self.columns {
-            if column.sparse {
-                while column.rows.last() == Some(&row) {
-                    column.rows.pop();
-                    column.values.pop();
-                }
-            } else {
-                column.values.truncate(row as usize);
-            }
+        self.given.clear();
+        // Columns without values from before it stand last.
+        while let Some(&last) = self.order.last()
+            && self.columns[last as usize].values.is_empty()
+        {
+            self.order.pop();
         }
-        let columns = &self.columns;
-        self.order
-            .retain(|column| !columns[*column as usize].values.is_empty());
     }
 
     /// Takes back what was counted of the message in hand, which is read again.
@@ -387,7 +385,7 @@ impl<'a> Rows<'a> {
 
     /// Empties everything for the next batch but keeps the columns and their memory.
     pub fn clear(&mut self) {
-        self.row = 0;
+        (self.row, self.held) = (0, 0);
         self.absent.zero();
         self.long_types.zero();
         self.order.clear();
@@ -404,6 +402,16 @@ impl<'a> Rows<'a> {
 }
 
 impl RowColumn {
+    /// Takes back the value of a row, which is the last one.
+    fn cut(&mut self, row: u32) {
+        if !self.sparse {
+            self.values.truncate(row as usize);
+        } else if self.rows.last() == Some(&row) {
+            self.rows.pop();
+            self.values.pop();
+        }
+    }
+
     fn become_sparse(&mut self) {
         self.sparse = true;
         // OK because rows are counted in u32.
