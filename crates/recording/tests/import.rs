@@ -708,10 +708,10 @@ fn what_is_missing_or_odd_is_named() {
     assert_eq!(
         error(
             "c.csv",
-            "PacketCounter,SampleTimeFine,Acc_X,Acc_Y,Acc_Z\n1,,0,0,9.8\n",
+            "PacketCounter,SampleTimeFine,Acc_X,Acc_Y,Acc_Z\n1,-5,0,0,9.8\n",
             None
         ),
-        "c.csv: has an empty SampleTimeFine in row 1; expected a count below 2^32"
+        "c.csv: line 2 has SampleTimeFine -5; expected a count below 2^32"
     );
     // What people take for a log.
     assert_eq!(
@@ -1461,7 +1461,7 @@ fn phyphox_in_a_folder_called_meta() {
     for time in ["-inf", "inf", "-1e12", "1e12"] {
         let said = log(time).err().expect("refused").to_string();
         assert!(
-            said.contains("run: Accelerometer.csv: has the time ") && said.contains(" in row 2; "),
+            said.contains("run: Accelerometer.csv: line 3 has the time "),
             "{said}"
         );
     }
@@ -1550,5 +1550,72 @@ fn a_log_of_the_archive_stands_alone() {
             said(paths, options),
             format!("a.npz: is a log of the archive, which stands alone; found {beside} beside it")
         );
+    }
+}
+
+#[test]
+fn a_row_without_a_time_costs_no_other_in_any_format() {
+    let folder = folder();
+    let shimmer = "Shimmer_A_Timestamp_Unix_CAL,Shimmer_A_Accel_LN_X_CAL,Shimmer_A_Accel_LN_Y_CAL,Shimmer_A_Accel_LN_Z_CAL\nms,m/(s^2),m/(s^2),m/(s^2)\n";
+    // Head; what follows a time; times, of which the third is missing; g in the file's unit, as m/s² of the results.
+    let dates = ["00.00", "00.01", "", "00.03"].map(|s| match s {
+        "" => String::new(),
+        s => format!("2025-11-24 16:00:{s}"),
+    });
+    let epochs = ["1700000000000", "1700000000010", "NaN", "1700000000030"].map(str::to_owned);
+    let counts = ["0", "10000", "-nan", "30000"].map(str::to_owned);
+    let (g, times) = (9.80665, [0, 10_000_000, 30_000_000]);
+    for (name, head, after, cells, z) in [
+        ("ax.csv", "", ",0,0,1", &dates, g),
+        (
+            "meta.csv",
+            "epoc (ms),x-axis (g),y-axis (g),z-axis (g)\n",
+            ",0,0,1",
+            &epochs,
+            g,
+        ),
+        ("shimmer.csv", shimmer, ",0,0,9.8", &epochs, 9.8),
+        (
+            "dot.csv",
+            "SampleTimeFine,Acc_X,Acc_Y,Acc_Z\n",
+            ",0,0,9.8",
+            &counts,
+            9.8,
+        ),
+        (
+            "toolbox.csv",
+            "time,ax,ay,az\n",
+            ",0,0,9.8",
+            &["0", "0.01", "null", "0.03"].map(str::to_owned),
+            9.8,
+        ),
+    ] {
+        let rows: String = cells.iter().map(|t| format!("{t}{after}\n")).collect();
+        let path = file(folder.path(), name, &(head.to_owned() + &rows));
+        let layout = (name == "toolbox.csv").then(|| {
+            let text = "[time]\ncolumn = \"time\"\nunit = \"s\"\n[acceleration]\ncolumns = [\"ax\", \"ay\", \"az\"]\nunit = \"m/s^2\"\n";
+            file(folder.path(), "layout.toml", text)
+        });
+        let got = ingest(
+            folder.path(),
+            &[path],
+            layout.as_deref().and_then(Path::to_str),
+        );
+        let got = got.unwrap_or_else(|why| panic!("{name}: {why}"));
+        let topic = format!("/imu/{}", name.trim_end_matches(".csv"));
+        let found = got.times(&topic);
+        assert_eq!(
+            found.iter().map(|t| t - found[0]).collect::<Vec<_>>(),
+            times,
+            "{name}"
+        );
+        let values = got.values(&format!("{topic}.linear_acceleration.z"));
+        assert!(
+            values.iter().all(|found| (found - z).abs() < 1e-12),
+            "{name}: {values:?}"
+        );
+        let notes = got.ingested.notes.join("; ");
+        let told = notes.contains("1 row has no time and is left out");
+        assert!(told, "{name}: {notes}");
     }
 }

@@ -40,6 +40,7 @@ pub(super) fn read(name: &str, text: &str) -> Result<Log, ImportError> {
         "it has no header: taken for an export of Axivity's, a date (UTC), acceleration in g{behind}"
     )];
     table.drop_cut_row(name, &mut notes);
+    table.drop_untimed(0, name, &mut notes);
     let times_ns = times_ns(&table, 0, 1)?;
     let force = table.track(&times_ns, [1, 2, 3], STANDARD_GRAVITY)?;
     let usual_g = imu::usual_length(&force).unwrap_or(0.0) / STANDARD_GRAVITY;

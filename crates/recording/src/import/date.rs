@@ -26,10 +26,9 @@ pub(super) fn times_ns(
             imu::nanoseconds(table.number(row, column)? * (unit_ns as f64 / 1e9))
         };
         t_ns.filter(|t_ns| *t_ns >= 0).ok_or_else(|| {
-            table.problem(format!(
-                "has the time {cell:?} in row {}; expected a time from 0 on, or a date and a clock",
-                row + 1
-            ))
+            let problem =
+                format!("has the time {cell:?}; expected a time from 0 on, or a date and a clock");
+            table.problem_in(row, &problem)
         })
     };
     (0..table.len()).map(read).collect()

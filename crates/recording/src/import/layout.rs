@@ -172,6 +172,7 @@ pub(super) fn read(layout: &Layout, name: &str, text: &str) -> Result<Log, Impor
     table.take_units();
     table.drop_cut_row(name, &mut notes);
     let time = table.find_all([layout.time.column.as_str()])?[0];
+    table.drop_untimed(time, name, &mut notes);
     let mut lacking = Vec::new();
     let mut columns = |vector: &Option<Vector>, units: &[(&str, f64)]| {
         let there = |v: &&Vector| !v.optional || v.columns.iter().any(|c| table.find(c).is_some());

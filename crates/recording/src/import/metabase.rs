@@ -36,6 +36,7 @@ pub(super) fn read(files: &Files) -> Result<Log, ImportError> {
             "epoc (ms)"
         };
         let time = table.find_all([epoch])?[0];
+        table.drop_untimed(time, &files.name, &mut notes);
         let names = ["x", "y", "z"].map(|axis| format!("{axis}-axis ({unit})"));
         let axes = table.find_all(names.each_ref().map(String::as_str))?;
         table.track(&times_ns(&table, time, 1_000_000)?, axes, factor)

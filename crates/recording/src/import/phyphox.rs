@@ -11,11 +11,14 @@ use super::{
     table::Table,
 };
 
+/// The column of times.
+const TIME: &str = "Time (s)";
+
 /// Whether a line is the header of a phyphox table.
 pub(super) fn is_header(line: &str) -> bool {
     line.trim_start_matches('\u{feff}')
         .trim_start_matches('"')
-        .starts_with("Time (s)")
+        .starts_with(TIME)
         && line.contains(" x (")
 }
 
@@ -40,8 +43,10 @@ pub(super) fn read(files: &Files) -> Result<Log, ImportError> {
         let mut table = Table::parse(name, text, is_header)?;
         table.drop_cut_row(&files.name, &mut notes);
         table.note_empty(&files.name, &mut notes);
+        if let Some(time) = table.find(TIME) {
+            table.drop_untimed(time, &files.name, &mut notes);
+        }
         seen.extend(table.columns.iter().cloned());
-        let mut untimed = 0;
         for ((sensor, unit), (from, track)) in SENSORS.iter().zip(&mut tracks) {
             let names = ["x", "y", "z"].map(|axis| format!("{sensor} {axis} ({unit})"));
             if table.find(&names[0]).is_none() {
@@ -49,7 +54,6 @@ pub(super) fn read(files: &Files) -> Result<Log, ImportError> {
             }
             known = true;
             let found = read_track(&table, names.each_ref().map(String::as_str), &starts)?;
-            untimed = table.len() - found.len();
             if !track.is_empty() && !found.is_empty() {
                 return Err(files.two(&names[0], from, name));
             }
@@ -57,7 +61,6 @@ pub(super) fn read(files: &Files) -> Result<Log, ImportError> {
                 (*from, *track) = (name, found);
             }
         }
-        table.note_untimed(untimed as u64, &files.name, &mut notes);
     }
     let [with_gravity, without, rate] = tracks.map(|(_, track)| track);
     if starts.is_empty() {
@@ -98,10 +101,8 @@ fn starts(name: &str, text: &str, notes: &mut Vec<String>) -> Result<Vec<(f64, f
         if table.text(row, event).eq_ignore_ascii_case("START") {
             let start = (table.number(row, experiment)?, table.number(row, system)?);
             if !start.0.is_finite() {
-                return Err(table.problem(format!(
-                    "has a START without an experiment time in row {}; expected seconds",
-                    row + 1
-                )));
+                let problem = "has a START without an experiment time; expected seconds";
+                return Err(table.problem_in(row, problem));
             }
             starts.push(start);
         }
@@ -109,20 +110,16 @@ fn starts(name: &str, text: &str, notes: &mut Vec<String>) -> Result<Vec<(f64, f
     Ok(starts)
 }
 
-/// The rows that have a time.
 fn read_track(
     table: &Table,
     names: [&str; 3],
     starts: &[(f64, f64)],
 ) -> Result<Track, ImportError> {
-    let time = table.find_all(["Time (s)"])?[0];
+    let time = table.find_all([TIME])?[0];
     let axes = table.find_all(names)?;
     let mut track = Track::new();
     for row in 0..table.len() {
         let t_s = table.number(row, time)?;
-        if t_s.is_nan() {
-            continue;
-        }
         // The last START before the sample; a sample a hair before the first belongs to it.
         let start = starts
             .iter()
@@ -137,10 +134,8 @@ fn read_track(
         };
         // What is too large became the largest.
         let Some(t_ns) = t_ns.filter(|t_ns| (0..i64::MAX).contains(t_ns)) else {
-            return Err(table.problem(format!(
-                "has the time {t_s} s in row {}; expected seconds from 0 on",
-                row + 1
-            )));
+            let problem = format!("has the time {t_s} s; expected seconds from 0 on");
+            return Err(table.problem_in(row, &problem));
         };
         track.push((t_ns, table.vector(row, axes)?));
     }

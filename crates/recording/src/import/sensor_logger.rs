@@ -130,27 +130,19 @@ fn read_track(
     table.note_empty(log, notes);
     let [time, x, y, z] = table.find_all(["time", "x", "y", "z"])?;
     let elapsed = table.find("seconds_elapsed");
-    let (mut track, mut untimed) = (Track::new(), 0);
+    table.drop_untimed(time, log, notes);
+    let mut track = Track::new();
     let mut ends: Option<[(i64, f64); 2]> = None;
     for row in 0..table.len() {
         // Nanoseconds since 1970 have more digits than a double holds.
         let t_ns = match table.text(row, time).parse::<i64>() {
             Ok(t_ns) => t_ns,
-            Err(_) => {
-                let t_ns = table.number(row, time)?;
-                if t_ns.is_nan() {
-                    untimed += 1;
-                    continue;
-                }
-                t_ns as i64
-            }
+            Err(_) => table.number(row, time)? as i64,
         };
         // What is too large became the largest.
         if !(0..i64::MAX).contains(&t_ns) {
-            return Err(table.problem(format!(
-                "has the time {t_ns} in row {}; expected nanoseconds since 1970",
-                row + 1
-            )));
+            let problem = format!("has the time {t_ns}; expected nanoseconds since 1970");
+            return Err(table.problem_in(row, &problem));
         }
         track.push((t_ns, table.vector(row, [x, y, z])?));
         if let Some(elapsed) = elapsed {
@@ -158,7 +150,6 @@ fn read_track(
             ends = Some([ends.map_or(here, |ends| ends[0]), here]);
         }
     }
-    table.note_untimed(untimed, log, notes);
     if let Some([(from_ns, from_s), (to_ns, to_s)]) = ends
         && track.is_sorted_by_key(|(t_ns, _)| *t_ns)
     {

@@ -39,6 +39,7 @@ pub(super) fn read(name: &str, text: &str) -> Result<Log, ImportError> {
         .iter()
         .find_map(|end| table.columns[time].strip_suffix(end));
     let device = device.unwrap_or_default().to_owned();
+    table.drop_untimed(time, name, &mut notes);
     let others = table.columns.iter().filter(|name| {
         !name.is_empty()
             && !name

@@ -132,8 +132,12 @@ impl Table {
         }
     }
 
-    /// Notes how many rows were left out for want of a time.
-    pub fn note_untimed(&self, rows: u64, log: &str, notes: &mut Vec<String>) {
+    /// Leaves out the rows that tell no time in a column, with a note.
+    pub fn drop_untimed(&mut self, time: usize, log: &str, notes: &mut Vec<String>) {
+        let all = self.rows.len();
+        let none = |cell: &str| is_missing(cell) || cell.parse().is_ok_and(f64::is_nan);
+        self.rows.retain(|row| !row.get(time).is_none_or(none));
+        let rows = (all - self.rows.len()) as u64;
         if rows > 0 {
             let one = "row has no time and is";
             let rows = counted(rows, one, "rows have no time and are");
@@ -206,6 +210,11 @@ impl Table {
             name: self.name.clone(),
             problem,
         }
+    }
+
+    /// An error about a row; `problem` goes on after its line.
+    pub fn problem_in(&self, row: usize, problem: &str) -> ImportError {
+        self.problem(format!("line {} {problem}", self.line(row)))
     }
 
     /// A cell's text.

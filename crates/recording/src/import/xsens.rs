@@ -24,6 +24,7 @@ pub(super) fn read(name: &str, text: &str) -> Result<Log, ImportError> {
     let mut notes = Vec::new();
     table.drop_cut_row(name, &mut notes);
     let time = table.find_all(["SampleTimeFine"])?[0];
+    table.drop_untimed(time, name, &mut notes);
     let all = |names: [&str; 3]| {
         names[0..]
             .iter()
@@ -112,15 +113,8 @@ fn counts(table: &Table, time: usize) -> Result<(Vec<i64>, i64), ImportError> {
     for row in 0..table.len() {
         let fine = table.number(row, time)?;
         if !(0.0..4_294_967_296.0).contains(&fine) {
-            let found = if table.text(row, time).is_empty() {
-                "an empty SampleTimeFine".to_owned()
-            } else {
-                format!("SampleTimeFine {fine}")
-            };
-            return Err(table.problem(format!(
-                "has {found} in row {}; expected a count below 2^32",
-                row + 1
-            )));
+            let problem = format!("has SampleTimeFine {fine}; expected a count below 2^32");
+            return Err(table.problem_in(row, &problem));
         }
         // OK because the range was checked.
         let fine = fine as i64;
