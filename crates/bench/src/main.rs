@@ -205,9 +205,11 @@ fn main() {
                 0.0
             };
             let (ms, calls) = (wall_s * 1e3, course.evaluations);
-            eprintln!(
-                "{name}  {who:<34} {ms:>9.3} ms  {calls:>9} evaluations  error {error:.1e} rad"
-            );
+            let told = match error.is_finite() {
+                true => format!("error {error:.1e} rad"),
+                false => "stopped before the end".to_owned(),
+            };
+            eprintln!("{name}  {who:<34} {ms:>9.3} ms  {calls:>9} evaluations  {told}");
             rungs.push(Rung {
                 who,
                 ours,

@@ -8,10 +8,12 @@ mod replay;
 mod scenes;
 
 use clap::{Subcommand, ValueEnum};
+use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
 use recording::whole::{Output, Usage};
 use serde_json::{Value, json};
 use std::path::Path;
 use std::process::ExitCode;
+use std::time::Duration;
 
 /// What `sim` can do.
 #[derive(Subcommand)]
@@ -35,6 +37,22 @@ pub enum Command {
 enum Format {
     Table,
     Json,
+}
+
+/// A bar that a terminal shows from the second second on, however slowly the work goes on.
+fn patient_bar(total: u64, template: &str) -> ProgressBar {
+    let bar = ProgressBar::with_draw_target(Some(total), ProgressDrawTarget::hidden());
+    let style = ProgressStyle::with_template(template);
+    bar.set_style(style.unwrap_or_else(|_| ProgressStyle::default_bar()));
+    let later = bar.downgrade();
+    std::thread::spawn(move || {
+        std::thread::sleep(Duration::from_secs(1));
+        if let Some(bar) = later.upgrade().filter(|bar| !bar.is_finished()) {
+            bar.set_draw_target(ProgressDrawTarget::stderr());
+            bar.enable_steady_tick(Duration::from_millis(250));
+        }
+    });
+    bar
 }
 
 /// Takes a `--set`.

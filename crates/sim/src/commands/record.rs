@@ -1,8 +1,8 @@
 //! `sim record`: a scene becomes a recording.
 
-use super::{real, setting};
+use super::{patient_bar, real, setting};
 use anyhow::{Context, Result, anyhow, bail};
-use indicatif::{ProgressBar, ProgressStyle};
+use indicatif::ProgressBar;
 use recording::whole::{Usage, remove_unfinished_files};
 use recording::write::{RecordingWriter, WriteError, WriterOptions};
 use sim::model::Model;
@@ -13,7 +13,7 @@ use sim::sensors::Reading;
 use sim::solve::Stopped;
 use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicBool, Ordering};
-use std::time::{Duration, Instant};
+use std::time::Instant;
 
 /// Arguments of `sim record`.
 #[derive(clap::Args)]
@@ -136,16 +136,15 @@ fn record(args: &Args) -> Result<()> {
     let mut watch = Watch {
         recorder,
         interrupted,
-        progress: None,
-        began,
-        duration_s: scene.duration_s,
+        progress: patient_bar(
+            (scene.duration_s * 1e3) as u64,
+            "{wide_bar} {percent}% of the scene, {eta} left",
+        ),
         samples: 0,
         astray: None,
     };
     let (stats, outcome) = run_model(&model, method_of(&scene), &settings(&scene), &mut watch);
-    if let Some(bar) = watch.progress.take() {
-        bar.finish_and_clear();
-    }
+    watch.progress.finish_and_clear();
     let nothing_left = if to_stdout {
         "the stream ends there"
     } else {
@@ -241,9 +240,7 @@ fn catch_interrupts() -> Result<&'static AtomicBool> {
 struct Watch<'m> {
     recorder: Recorder<'m>,
     interrupted: &'static AtomicBool,
-    progress: Option<ProgressBar>,
-    began: Instant,
-    duration_s: f64,
+    progress: ProgressBar,
     samples: u64,
     /// The handle farthest beside its shoulder, counted from 1: how far (m), and when (s).
     astray: Option<(usize, f64, f64)>,
@@ -272,19 +269,7 @@ impl Listener for Watch<'_> {
     fn sample(&mut self, sample: &Sample) -> bool {
         self.samples += 1;
         self.look_beside(sample);
-        // A short run needs no progress bar; indicatif shows one on a terminal only.
-        if self.samples.is_multiple_of(64) {
-            if self.progress.is_none() && self.began.elapsed() > Duration::from_secs(1) {
-                let bar = ProgressBar::new((self.duration_s * 1e3) as u64);
-                let style =
-                    ProgressStyle::with_template("{wide_bar} {percent}% of the scene, {eta} left");
-                bar.set_style(style.unwrap_or_else(|_| ProgressStyle::default_bar()));
-                self.progress = Some(bar);
-            }
-            if let Some(bar) = &self.progress {
-                bar.set_position((sample.t_s * 1e3) as u64);
-            }
-        }
+        self.progress.set_position((sample.t_s * 1e3) as u64);
         !self.interrupted.load(Ordering::Relaxed) && self.recorder.sample(sample)
     }
 }

@@ -1,7 +1,8 @@
 //! `sim replay`: a recording drives a scene.
 
-use super::{Format, print, seconds, setting};
+use super::{Format, patient_bar, print, seconds, setting};
 use anyhow::{Context, Result, anyhow, bail};
+use indicatif::ProgressBar;
 use recording::read::{ReadOptions, Recording};
 use recording::topics::{BEAT, FORCES, PHASES, STATE};
 use recording::whole::Usage;
@@ -180,6 +181,10 @@ pub fn run(args: &Args) -> Result<Input> {
             .collect(),
         epoch_ns: replay.epoch_ns,
         failed: None,
+        progress: patient_bar(
+            (replay.scene.duration_s * 1e3) as u64,
+            "{wide_bar} {percent}% of the replay, {eta} left",
+        ),
     };
     let (_, outcome) = run_model(
         &model,
@@ -187,6 +192,7 @@ pub fn run(args: &Args) -> Result<Input> {
         &settings(&replay.scene),
         &mut both,
     );
+    both.progress.finish_and_clear();
     // The first that failed knows the cause.
     if let Some(error) = both.recorder.failure().or(both.failed) {
         return Err(error.into());
@@ -379,10 +385,12 @@ struct Both<'m> {
     courses: BTreeMap<&'static str, Course>,
     epoch_ns: i64,
     failed: Option<WriteError>,
+    progress: ProgressBar,
 }
 
 impl Listener for Both<'_> {
     fn sample(&mut self, s: &Sample) -> bool {
+        self.progress.set_position((s.t_s * 1e3) as u64);
         let until_ns = self.epoch_ns + (s.t_s * 1e9).round() as i64;
         if let Err(error) = self.measured.write(until_ns, self.recorder.writer()) {
             self.failed = Some(error);

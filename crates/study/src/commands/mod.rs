@@ -17,6 +17,7 @@ use std::io::Write;
 use std::path::Path;
 use std::process::ExitCode;
 use std::sync::atomic::{AtomicBool, Ordering};
+use std::time::Duration;
 
 /// Runs many scenes and puts them into one table.
 #[derive(Parser)]
@@ -177,6 +178,8 @@ fn progress(runs: u64) -> Result<ProgressBar> {
     bar.set_style(ProgressStyle::with_template(
         "{wide_bar} {pos}/{len} runs, {per_sec}, {eta} left",
     )?);
+    // The first run may take long.
+    bar.enable_steady_tick(Duration::from_secs(1));
     Ok(bar)
 }
 

@@ -4,7 +4,7 @@ use super::{Format, count, jobs, make_folder, print, watch_interrupts, write_who
 use anyhow::{Result, bail};
 use indicatif::{ProgressBar, ProgressStyle};
 use std::path::PathBuf;
-use std::time::Instant;
+use std::time::{Duration, Instant};
 use study::predictions::{EXPERIMENTS, Finding, Lab, SEEDS, page, to_json};
 
 /// Arguments of `study predictions`.
@@ -58,6 +58,7 @@ pub fn run(args: &Args) -> Result<()> {
             "{msg}: {pos} pieces of work, {elapsed}",
         )?);
         bar.set_message(e.name);
+        bar.enable_steady_tick(Duration::from_secs(1));
         let lab = Lab {
             jobs: args.jobs,
             seeds: args.seeds,

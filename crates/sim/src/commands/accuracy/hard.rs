@@ -1,26 +1,20 @@
 //! `sim accuracy --hard`: every hard case, by every method that claims it.
 
-use super::{Watch, print};
+use super::{PROGRESS, patient_bar, print};
 use anyhow::{Result, bail};
 use serde_json::{Value, json};
 use sim::cases::{CASES, Verdict, run_all};
 use sim::solve::METHODS;
 use std::fmt::Write as _;
-use std::sync::Mutex;
 
 /// Runs and prints the table; an error when a case does not hold.
 pub fn run(as_json: bool) -> Result<()> {
-    let watch = Mutex::new((Watch::new(), 0));
+    let bar = patient_bar(CASES.len() as u64, PROGRESS);
     let rows = run_all(|case| {
-        if let Ok(mut watch) = watch.lock() {
-            watch.1 += 1;
-            let done = watch.1;
-            watch.0.look(done, CASES.len(), case.name);
-        }
+        bar.inc(1);
+        bar.set_message(case.name);
     });
-    if let Ok(watch) = watch.into_inner() {
-        watch.0.end();
-    }
+    bar.finish_and_clear();
     let text = if as_json {
         serde_json::to_string_pretty(&to_json(&rows))? + "\n"
     } else {

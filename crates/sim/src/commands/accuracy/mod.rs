@@ -3,9 +3,8 @@
 mod figure;
 mod hard;
 
-use super::{Format, number, print, setting};
+use super::{Format, number, patient_bar, print, setting};
 use anyhow::{Context, Result, anyhow};
-use indicatif::{ProgressBar, ProgressStyle};
 use recording::whole::write_whole;
 use serde_json::{Value, json};
 use sim::accuracy::{Judge, Quoted, REFERENCE, Rung, SECOND, Study, study};
@@ -13,7 +12,6 @@ use sim::scene::load;
 use std::fmt::Write as _;
 use std::io::Write as _;
 use std::path::PathBuf;
-use std::time::{Duration, Instant};
 
 /// Arguments of `sim accuracy`.
 #[derive(clap::Args)]
@@ -57,11 +55,13 @@ pub fn run(args: &Args) -> Result<()> {
         std::fs::create_dir_all(folder)
             .with_context(|| format!("cannot make the folder {}", folder.display()))?;
     }
-    let mut watch = Watch::new();
+    let bar = patient_bar(0, PROGRESS);
     let study = study(&scene, args.repeats.into(), |done, total, what| {
-        watch.look(done, total, what);
+        bar.set_length(total as u64);
+        bar.set_position(done as u64);
+        bar.set_message(what.to_owned());
     });
-    watch.end();
+    bar.finish_and_clear();
     let study = study.map_err(|cause| anyhow!(cause))?;
     let (table, json) = (
         table(&study),
@@ -87,39 +87,8 @@ pub fn run(args: &Args) -> Result<()> {
     print(text)
 }
 
-/// Progress on stderr, from the second second on; indicatif shows it on a terminal only.
-struct Watch {
-    began: Instant,
-    bar: Option<ProgressBar>,
-}
-
-impl Watch {
-    fn new() -> Self {
-        Self {
-            began: Instant::now(),
-            bar: None,
-        }
-    }
-
-    fn look(&mut self, done: usize, total: usize, what: &str) {
-        if self.bar.is_none() && self.began.elapsed() > Duration::from_secs(1) {
-            let bar = ProgressBar::new(total as u64);
-            let style = ProgressStyle::with_template("{wide_bar} {pos} of {len}, now {msg}");
-            bar.set_style(style.unwrap_or_else(|_| ProgressStyle::default_bar()));
-            self.bar = Some(bar);
-        }
-        if let Some(bar) = &self.bar {
-            bar.set_position(done as u64);
-            bar.set_message(what.to_owned());
-        }
-    }
-
-    fn end(&self) {
-        if let Some(bar) = &self.bar {
-            bar.finish_and_clear();
-        }
-    }
-}
+/// What a bar says of the work.
+const PROGRESS: &str = "{wide_bar} {pos} of {len}, now {msg}";
 
 /// A column of the table: its head, its width, and what it says of a rung.
 type Column = (&'static str, usize, fn(&Study, &Rung) -> String);
