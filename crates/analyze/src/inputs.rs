@@ -28,6 +28,11 @@ impl Window {
         }
     }
 
+    /// Whether a moment lies in it.
+    pub fn contains(&self, t_s: f64) -> bool {
+        (self.start_s..=self.end_s).contains(&t_s)
+    }
+
     /// The indices of an ascending time axis that lie in the window.
     pub fn range(&self, t_s: &[f64]) -> Range<usize> {
         let start = t_s.partition_point(|t| *t < self.start_s);

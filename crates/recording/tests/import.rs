@@ -415,7 +415,7 @@ fn a_log_that_begins_anew_is_refused() {
     let refused = ingest(folder.path(), &[path], layout.to_str());
     let said = refused.err().expect("is refused").to_string();
     assert!(
-        said.contains("step back by 1.990 s behind 1.990 s"),
+        said.contains("step back by 1.990 s, 1.990 s behind the first"),
         "{said}"
     );
 }
@@ -1617,5 +1617,77 @@ fn a_row_without_a_time_costs_no_other_in_any_format() {
         let notes = got.ingested.notes.join("; ");
         let told = notes.contains("1 row has no time and is left out");
         assert!(told, "{name}: {notes}");
+    }
+}
+
+#[test]
+fn a_row_with_a_comma_too_many_is_told() {
+    let folder = folder();
+    let layout = "[time]\ncolumn = \"t\"\nunit = \"s\"\n[acceleration]\ncolumns = [\"x\", \"y\", \"z\"]\nunit = \"m/s^2\"\n";
+    let layout = file(folder.path(), "layout.toml", layout);
+    let log = |head: &str, odd: &str, every: u64| {
+        let row = |k: u64| match k % every {
+            3 => format!("{}.5,{odd}\n", k),
+            _ => format!("{}.5,0,0,9.8,\n", k),
+        };
+        let rows: String = (0..40).map(row).collect();
+        let path = file(folder.path(), "a.csv", &format!("{head}\n{rows}"));
+        ingest(folder.path(), &[path], layout.to_str())
+    };
+    let got = log("t,x,y,z", "0,0,9,8", 40).expect("ingests");
+    assert_eq!(got.values("/imu/a.linear_acceleration.z"), [9.8; 39]);
+    let notes = got.ingested.notes.join("; ");
+    let told = "1 row has more cells than the header and is left out, the first in line 5";
+    assert!(notes.contains(told), "{notes}");
+    let said = |got: Result<Imported, ImportError>| got.err().expect("refused").to_string();
+    let why = said(log("t,x,y,z", "0,0,9,8", 4));
+    assert!(
+        why.contains("a.csv: line 5 and 9 more have more cells than the header, which has 4"),
+        "{why}"
+    );
+    let why = said(log("t,x,z,y,z", "0,0,9,8", 40));
+    assert!(why.contains("a.csv: has the column z 2 times"), "{why}");
+}
+
+/// What was measured before and after a clock was set back lies mixed: it would be two moments at once.
+#[test]
+fn a_clock_that_was_set_back_is_refused_in_every_format() {
+    let folder = folder();
+    let shimmer = "Shimmer_A_Timestamp_Unix_CAL,Shimmer_A_Accel_LN_X_CAL,Shimmer_A_Accel_LN_Y_CAL,Shimmer_A_Accel_LN_Z_CAL\nms,m/(s^2),m/(s^2),m/(s^2)\n";
+    let phyphox = "Time (s),Acceleration x (m/s^2),Acceleration y (m/s^2),Acceleration z (m/s^2)\n";
+    // Tenths of a second: late by a little, then set back by two seconds.
+    let tenths = |back: u64| (0..60).map(move |k| if k < 40 { k ^ 1 } else { k - back });
+    let ms = |k: u64| (1_700_000_000_000 + 100 * k).to_string();
+    let date = |k: u64| format!("2025-11-24 16:00:0{}.{}00", k / 10, k % 10);
+    type Time<'a> = &'a dyn Fn(u64) -> String;
+    let formats: [(&str, &str, &str, Time<'_>); 5] = [
+        ("ax.csv", "", ",0,0,1", &date),
+        (
+            "meta.csv",
+            "epoc (ms),x-axis (g),y-axis (g),z-axis (g)\n",
+            ",0,0,1",
+            &ms,
+        ),
+        ("shimmer.csv", shimmer, ",0,0,9.8", &ms),
+        (
+            "dot.csv",
+            "SampleTimeFine,Acc_X,Acc_Y,Acc_Z\n",
+            ",0,0,9.8",
+            &|k| (100_000 * k).to_string(),
+        ),
+        ("phy.csv", phyphox, ",0,0,9.8", &|k| {
+            format!("{}.{}", k / 10, k % 10)
+        }),
+    ];
+    for (name, head, after, time) in formats {
+        let log = |back: u64| {
+            let rows: String = tenths(back).map(|k| time(k) + after + "\n").collect();
+            let path = file(folder.path(), name, &(head.to_owned() + &rows));
+            ingest(folder.path(), &[path], None)
+        };
+        assert!(log(0).is_ok(), "{name}");
+        let why = log(20).err().expect(name).to_string();
+        let told = "its times step back by 1.900 s, 3.800 s behind the first";
+        assert!(why.contains(told), "{name}: {why}");
     }
 }

@@ -79,6 +79,7 @@ pub fn examine(
             request.truth,
             request.clocks,
             !inputs.beat_phase_rad.is_empty(),
+            request.asked(),
             |last_s| until(last_s, &mut Vec::new()),
         )?,
         Err(why) => {

@@ -1,6 +1,7 @@
 //! What is asked of a recording.
 
 use crate::field::DeviceClocks;
+use crate::inputs::Window;
 use crate::roles::{RolesFile, matches, of_topic};
 
 /// What is asked of a recording.
@@ -46,6 +47,14 @@ impl Request {
 
     /// Whether a moment is in the window that was asked for, s.
     pub(crate) fn holds(&self, t_s: f64) -> bool {
-        self.window.0.is_none_or(|a| t_s >= a) && self.window.1.is_none_or(|b| t_s <= b)
+        self.asked().contains(t_s)
+    }
+
+    /// The window that was asked for.
+    pub(super) fn asked(&self) -> Window {
+        Window {
+            start_s: self.window.0.unwrap_or(f64::NEG_INFINITY),
+            end_s: self.window.1.unwrap_or(f64::INFINITY),
+        }
     }
 }

@@ -22,8 +22,6 @@ const WALK_S: f64 = 10.0;
 const TAPPING_S: f64 = 0.5;
 /// What begins so near a beat is on it, s.
 const ON_BEAT_S: f64 = 0.07;
-/// How far the clocks of two sensors on the load are looked for by its motion, s.
-const TURNING_SEARCH_S: f64 = 10.0;
 /// Standard error of every moment heard alike, s: windows of 32 ms every 10 ms tell when a sound begins.
 const HEARD_SD_S: f64 = 0.003;
 
@@ -92,7 +90,7 @@ impl Clocks {
     pub fn hold_against(&mut self, topic: &str, track: &Track) {
         let (t_s, turning) = &self.turning;
         let own = norms(&track.gyro_rad_per_s);
-        let found = from_signals((&track.t_s, &own), (t_s, turning), TURNING_SEARCH_S);
+        let found = from_signals((&track.t_s, &own), (t_s, turning), SEARCH_S);
         let (kind, text) = match found {
             Ok(clock) => (
                 "clock_offset",

@@ -6,7 +6,7 @@ use std::sync::Arc;
 use recording::read::{ReadError, Recording};
 use recording::signal::{Signal, field_of, seconds_since};
 
-use super::dates::{Dated, dated, delay_s, ends_s};
+use super::dates::{Dated, dated, delay_s, ends_s, twice};
 use crate::imu::Track;
 
 /// The six columns of an inertial message.
@@ -180,6 +180,23 @@ impl Columns {
             sorted = columns.map(|x| order.iter().map(|k| x[*k]).collect::<Vec<f64>>());
             columns = sorted.each_ref().map(|x| &x[..]);
         }
+        let mut once = columns[0].to_vec();
+        let mixed = twice(&once);
+        if let Some(first) = mixed.first() {
+            let many: usize = mixed.iter().map(|mixed| mixed.len()).sum();
+            remarks.push((
+                "mixed",
+                format!(
+                    "{many} samples come twice as often as the others, first from {:.3} to {:.3} s: a clock was set back, and they are left out; what follows stands that much too early",
+                    once[first.start],
+                    once[first.end - 1]
+                ),
+            ));
+        }
+        for k in mixed.into_iter().flatten() {
+            once[k] = f64::NAN;
+        }
+        columns[0] = &once;
         let [t_s, x, y, z, accel @ ..] = columns;
         let track = Track::from_columns(t_s, [x, y, z], accel);
         let dropped = track.dropped - if turns { without } else { 0 };

@@ -4,11 +4,13 @@
 //! t = s + min(l − s)        in the first and the last third of the recording; between and beyond them along a straight line
 //! ```
 //! s header stamp, l log time (s). What was never late lies on the lower edge of l − s: the two clocks' offset and drift, and the least delay. The
-//! log's clock stays everybody's; its scatter does not get into the motion, whose height is two integrals of it.
+//! log's clock stays everybody's; its scatter does not get into the motion, whose height is two integrals of it. Where that edge leaps, one of the clocks
+//! was set anew, which is put right before: no straight line goes through a leap.
 //! Source: the lower-envelope estimate of one-way delays, Moon, Skelly & Towsley, INFOCOM 1999.
 
 use crate::inputs::{mean_step_in, stretches};
 use crate::median::median;
+use std::fmt::{self, Display, Formatter};
 use std::ops::Range;
 
 /// Stamps are believed where their steps scatter by less than this share of the log times' own scatter.
@@ -27,8 +29,19 @@ const SAME_SPAN: f64 = 0.1;
 /// unless the log's mean step is shorter than any device's (s).
 const FARTHEST_PACE: f64 = 20.0;
 const AT_ONCE_S: f64 = 1e-3;
-/// A clock is set back once or twice; what goes back more often are messages that overtake each other.
-const SET_BACK: usize = 3;
+/// A clock is set anew once or twice; what goes back more often are messages that overtake each other.
+const SET_ANEW: usize = 3;
+/// Parts of a log whose least delays are compared; of so few samples each they tell nothing.
+const PARTS: usize = 16;
+const FEWEST_IN_PART: usize = 8;
+/// Samples that are looked at together for their density; such that come in less than this share of the usual time are dense.
+const AT_ONCE: usize = 20;
+const DENSE: f64 = 0.75;
+/// Less (s) is what comes late.
+const LEAST_TWICE_S: f64 = 0.3;
+/// Least delays that leap by more than this (s), and by so many times what they usually change by, are those of a clock that was set anew.
+const LEAP_S: f64 = 0.02;
+const LEAP: f64 = 10.0;
 
 /// Times of the samples, s, ascending or not; and what was done, where that is worth a word.
 pub struct Dated {
@@ -58,11 +71,13 @@ pub fn ends_s(t_s: impl Iterator<Item = f64>) -> Option<(f64, f64)> {
 /// From log times (s since the recording begins) and, where every sample has one, header stamps (s, moved by [`delay_s`]), in the order of the log.
 pub fn dated(log_s: Vec<f64>, stamp_s: Option<Vec<f64>>) -> Dated {
     let of_log = scatter_s(&log_s);
-    if let Some(stamp_s) =
+    if let Some(mut stamp_s) =
         stamp_s.filter(|s| s.len() == log_s.len() && s.iter().all(|s| s.is_finite()))
     {
+        let mut log_s = log_s.clone();
+        let set = put_right(&mut log_s, &mut stamp_s);
         let back = stamp_s.windows(2).filter(|w| w[1] < w[0]).count();
-        let overtaken = back > SET_BACK;
+        let overtaken = back > SET_ANEW;
         let mut ordered = stamp_s.clone();
         if overtaken {
             ordered.sort_by(f64::total_cmp);
@@ -84,7 +99,8 @@ pub fn dated(log_s: Vec<f64>, stamp_s: Option<Vec<f64>>) -> Dated {
                 )),
             };
         }
-        if same_span && of_log > EVEN_S && of_stamps < MORE_EVEN * of_log {
+        let more_even = of_log > EVEN_S && of_stamps < MORE_EVEN * of_log;
+        if same_span && (more_even || set.iter().any(|set| set.of_log)) {
             return Dated {
                 t_s: on_the_logs_clock(&log_s, &stamp_s),
                 overtaken,
@@ -92,9 +108,10 @@ pub fn dated(log_s: Vec<f64>, stamp_s: Option<Vec<f64>>) -> Dated {
                 remark: Some((
                     "by_stamps",
                     format!(
-                        "samples are dated by their header stamps, whose steps scatter by {:.2} ms, those of the log times by {:.2} ms",
+                        "samples are dated by their header stamps, whose steps scatter by {:.2} ms, those of the log times by {:.2} ms{}",
                         1e3 * of_stamps,
-                        1e3 * of_log
+                        1e3 * of_log,
+                        set.iter().map(Set::to_string).collect::<String>()
                     ),
                 )),
             };
@@ -123,9 +140,131 @@ pub fn dated(log_s: Vec<f64>, stamp_s: Option<Vec<f64>>) -> Dated {
     }
 }
 
+/// Where samples in the order of their times come twice as often as they do before: a clock was set back there, and what lies side by side was not
+/// measured together. A queue that is emptied comes as often, but nothing comes before it.
+pub fn twice(t_s: &[f64]) -> Vec<Range<usize>> {
+    let steps: Vec<f64> = t_s.windows(2).map(|w| w[1] - w[0]).collect();
+    let Some(usual_s) = median(&mut steps.clone()).filter(|s| *s > 0.0) else {
+        return Vec::new();
+    };
+    let dense = |k: usize| t_s[k + AT_ONCE] - t_s[k] < DENSE * AT_ONCE as f64 * usual_s;
+    let mut found = Vec::new();
+    let mut k = 0;
+    while k + AT_ONCE < t_s.len() {
+        if !dense(k) {
+            k += 1;
+            continue;
+        }
+        let first = k;
+        while k + AT_ONCE < t_s.len() && dense(k) {
+            k += 1;
+        }
+        // The last that is dense ends where its samples do; on either side the first few are still single.
+        let within = first + AT_ONCE / 4..k + AT_ONCE * 3 / 4;
+        let (from_s, to_s) = (t_s[within.start], t_s[within.end.min(t_s.len() - 1)]);
+        let lasts_s = to_s - from_s;
+        let before = t_s.partition_point(|t| *t < from_s - lasts_s);
+        let (single, double) = (within.start - before, within.len());
+        let alone = lasts_s / usual_s;
+        let like = |count: usize, times: f64| (count as f64 / (times * alone) - 1.0).abs() < 0.25;
+        if lasts_s >= LEAST_TWICE_S && like(single, 1.0) && like(double, 2.0) {
+            found.push(within.start..within.end.min(t_s.len()));
+        }
+    }
+    found
+}
+
 /// What stamps (s since the first of them) are moved by, so that none lies behind its log time, nor before the recording begins.
 pub fn delay_s(late: impl Iterator<Item = f64>) -> f64 {
     late.fold(f64::MAX, f64::min).max(0.0)
+}
+
+/// That a clock was set while it ran.
+struct Set {
+    of_log: bool,
+    at_s: f64,
+    by_s: f64,
+}
+
+impl Display for Set {
+    fn fmt(&self, f: &mut Formatter<'_>) -> fmt::Result {
+        let Set { of_log, at_s, by_s } = *self;
+        let whose = if of_log { "the log's" } else { "the stamps'" };
+        write!(
+            f,
+            "; {whose} clock was set by {by_s:+.3} s at {at_s:.1} s, which is put right"
+        )
+    }
+}
+
+/// Takes out the leaps of a clock that was set anew: of the stamps', behind it; of the log's, in the shorter part, for the others' times are on the
+/// clock of the longer one.
+fn put_right(log_s: &mut [f64], stamp_s: &mut [f64]) -> Vec<Set> {
+    let n = log_s.len();
+    if n < PARTS * FEWEST_IN_PART {
+        return Vec::new();
+    }
+    let mut order: Vec<usize> = (0..n).collect();
+    // Where the log was set back its samples come mixed; where the stamps were, they do in the order of the stamps.
+    if stamp_s.windows(2).filter(|w| w[1] < w[0]).count() > SET_ANEW {
+        order.sort_by(|a, b| stamp_s[*a].total_cmp(&stamp_s[*b]));
+    }
+    let late: Vec<f64> = order.iter().map(|k| log_s[*k] - stamp_s[*k]).collect();
+    let part = |p: usize| p * n / PARTS..(p + 1) * n / PARTS;
+    let least = |within: Range<usize>| late[within].iter().copied().fold(f64::MAX, f64::min);
+    let changes: Vec<f64> = (1..PARTS)
+        .map(|p| least(part(p)) - least(part(p - 1)))
+        .collect();
+    let drift = median(&mut changes.clone()).unwrap_or(0.0);
+    let apart = changes.iter().map(|change| (change - drift).abs());
+    let usual = median(&mut apart.clone().collect::<Vec<_>>()).unwrap_or(0.0);
+    let leaps = |(_, apart): &(usize, f64)| *apart > LEAP_S.max(LEAP * usual);
+    let leaps: Vec<usize> = apart.enumerate().filter(leaps).map(|(p, _)| p).collect();
+    if leaps.len() > SET_ANEW {
+        return Vec::new();
+    }
+    let step_of = |t_s: &[f64], k: usize| t_s[order[k]] - t_s[order[k - 1]];
+    let usual_step = |t_s: &[f64]| {
+        let mut steps: Vec<f64> = (1..n).map(|k| step_of(t_s, k)).collect();
+        median(&mut steps).unwrap_or(0.0)
+    };
+    let usual_steps = [usual_step(log_s), usual_step(stamp_s)];
+    let mut sets = Vec::new();
+    for p in leaps {
+        let leap_s = changes[p] - drift;
+        let (from, to) = (part(p).start.max(1), part(p + 1).end);
+        // What comes late lies above the edge, on whichever side.
+        let middle_s = least(part(p)) + 0.5 * leap_s;
+        let below = |k: &usize| late[*k] < middle_s;
+        let first = match leap_s > 0.0 {
+            true => (from..to).rfind(below).map(|last| last + 1),
+            false => (from..to).find(below),
+        };
+        let Some(first) = first.filter(|k| *k < n) else {
+            continue;
+        };
+        // A part that holds a little of both tells too little of it.
+        let each = n / PARTS;
+        let behind = least(first..(first + each).min(n));
+        let leap_s = behind - least(first.saturating_sub(each)..first) - drift;
+        let odd = |t_s: &[f64], usual: f64| (step_of(t_s, first) - usual).abs();
+        let of_log = odd(log_s, usual_steps[0]) > odd(stamp_s, usual_steps[1]);
+        let at_s = log_s[order[first]];
+        let (before, behind) = order.split_at(first);
+        match of_log {
+            false => behind.iter().for_each(|k| stamp_s[*k] += leap_s),
+            true if before.len() < behind.len() => {
+                before.iter().for_each(|k| log_s[*k] += leap_s);
+            }
+            true => behind.iter().for_each(|k| log_s[*k] -= leap_s),
+        }
+        sets.push(Set {
+            of_log,
+            at_s,
+            by_s: if of_log { leap_s } else { -leap_s },
+        });
+    }
+    sets
 }
 
 /// From the earliest to the latest, s.
@@ -282,6 +421,66 @@ mod tests {
         for stamps in [vec![0.0; 6000], taken.iter().map(|t| 1e-3 * t).collect()] {
             assert_eq!(dated(log.clone(), Some(stamps)).t_s, log);
         }
+    }
+
+    #[test]
+    fn a_clock_that_is_set_on_the_way_stretches_nothing() {
+        let mut random = Random(7);
+        let taken: Vec<f64> = (0..7000).map(|k| f64::from(k) * 0.01).collect();
+        let mut delay = || 0.003 - 0.002 * (1.0 - random.uniform()).ln();
+        let delay: Vec<f64> = taken.iter().map(|_| delay()).collect();
+        for leap_s in [0.05, 0.4, 3.0, -0.05, -0.8, -3.0] {
+            for at_s in [9.0, 35.0, 61.0] {
+                let set = |t: &f64| t + if *t > at_s { leap_s } else { 0.0 };
+                let late = |t: Vec<f64>| t.iter().zip(&delay).map(|(t, d)| t + d).collect();
+                // The log's clock: times are those of the longer part. A recording comes in the order of its log times.
+                let log: Vec<f64> = late(taken.iter().map(set).collect());
+                let mut both: Vec<(f64, f64)> = log.into_iter().zip(taken.clone()).collect();
+                both.sort_by(|a, b| a.0.total_cmp(&b.0));
+                let (log, stamps): (Vec<f64>, Vec<f64>) = both.into_iter().unzip();
+                let moved_s = if at_s < 30.0 { leap_s } else { 0.0 } + 0.003;
+                let found = dated(log, Some(stamps.clone()));
+                let off = worst(&found.t_s, stamps.iter().map(|t| t + moved_s));
+                let said = found.remark.expect("a remark").1;
+                assert!(off < 1e-4, "{leap_s} {at_s}: {off}, {said}");
+                assert!(said.contains("the log's clock was set by "), "{said}");
+                // The stamps'.
+                let stamps = taken.iter().map(set).collect();
+                let found = dated(late(taken.clone()), Some(stamps));
+                let off = worst(&found.t_s, taken.iter().map(|t| t + 0.003));
+                let said = found.remark.expect("a remark").1;
+                assert!(off < 1e-3, "{leap_s} {at_s}: {off}, {said}");
+                assert!(said.contains("the stamps' clock was set by "), "{said}");
+            }
+        }
+    }
+
+    #[test]
+    fn what_lies_mixed_where_a_clock_was_set_back_is_found() {
+        for (back_s, jitter_s) in [(0.504, 0.0), (2.004, 1e-3), (15.304, 1e-3)] {
+            let mut random = Random(11);
+            let at = |t: f64| if t > 35.0 { t - back_s } else { t };
+            let mut t_s: Vec<f64> = (0..7000)
+                .map(|k| at(f64::from(k) * 0.01) + jitter_s * random.uniform())
+                .collect();
+            assert!(twice(&t_s[..3400]).is_empty());
+            t_s.sort_by(f64::total_cmp);
+            let [found] = &twice(&t_s)[..] else {
+                panic!("{back_s}: {:?}", twice(&t_s));
+            };
+            let (from_s, to_s) = (t_s[found.start], t_s[found.end - 1]);
+            let off_s = (from_s - (35.0 - back_s)).abs().max((to_s - 35.0).abs());
+            assert!(off_s < 0.06, "{back_s}: {from_s} {to_s}");
+        }
+        // A queue that is emptied after a second, and a sensor that changes its rate.
+        let queue = |k: i32| f64::from(k) * 0.01;
+        let queue: Vec<f64> = (0..7000)
+            .map(|k| match k {
+                3000..3100 => 31.0 + 0.002 * f64::from(k - 3000),
+                _ => queue(k),
+            })
+            .collect();
+        assert!(twice(&queue).is_empty());
     }
 
     #[test]

@@ -81,6 +81,9 @@ pub struct Field {
     pub own_s: BTreeMap<String, (f64, f64)>,
 }
 
+/// Of a log that is too long for memory so much is read before and behind the window, s.
+const ABOUT_S: f64 = 60.0;
+
 /// What hangs on when a beat is heard beside a step, or on when the beat began.
 const BY_SOUNDS_CLOCK: [&str; 4] = [
     "beat_lead_deg",
@@ -100,7 +103,7 @@ struct Filled {
 impl Field {
     /// Reads the sensors' topics; nothing when the recording has none. Clocks are put on the rath's by taps, or the carriers' on each other by
     /// their motion, as `devices` says. Beats are read beside sensors, and where the beat is not known. `window` is asked with the time of the
-    /// sensors' last sample (s).
+    /// sensors' last sample (s); of a log that is too long, what lies about the window that was `asked` for is read.
     ///
     /// # Errors
     /// Where the file cannot be read.
@@ -111,6 +114,7 @@ impl Field {
         truth: bool,
         devices: DeviceClocks,
         beat_is_known: bool,
+        asked: Window,
         window: impl FnOnce(f64) -> Window,
     ) -> Result<Self, ReadError> {
         let others = [Role::Beats, Role::Truth];
@@ -130,11 +134,26 @@ impl Field {
         if topics.is_empty() || !(senses || beats || truth) {
             return Ok(field);
         }
-        let factors = match thin::factors(recording, roles)? {
+        let mut part = Window::ALL;
+        let mut factors = thin::factors(recording, roles, part)?;
+        if factors.is_err() && asked != Window::ALL {
+            part = Window {
+                start_s: asked.start_s - ABOUT_S,
+                end_s: asked.end_s + ABOUT_S,
+            };
+            factors = thin::factors(recording, roles, part)?;
+            if factors.is_ok() {
+                let text = format!(
+                    "motion is estimated from what lies within {ABOUT_S} s of the window alone: the whole would take too much memory, and taps elsewhere are not looked for"
+                );
+                field.quality.push(Quality::remark("", "part", text));
+            }
+        }
+        let factors = match factors {
             Ok(factors) => factors,
             Err(samples) => {
                 let why = format!(
-                    "motion is not estimated from {samples} inertial samples, which would take too much memory: name fewer sensors in a roles file, or give a part of the recording"
+                    "motion is not estimated from {samples} inertial samples, which would take too much memory: give a --window of an hour or two, or name fewer sensors in a roles file"
                 );
                 field
                     .quality
@@ -144,7 +163,10 @@ impl Field {
                 return Ok(field);
             }
         };
-        let thinned = |topic: &str| factors.get(topic).is_some_and(|factor| *factor > 1);
+        let thinned = |topic: &str| {
+            let factor = factors.get(topic);
+            factor.is_some_and(|factor| *factor > 1 || part != Window::ALL)
+        };
         let wanted = |path: &str| {
             let mut whole = topics.iter().filter(|t| !thinned(t));
             let field = whole.find_map(|topic| field_of(path, topic));
@@ -159,7 +181,7 @@ impl Field {
             }) || (truth && path.starts_with(judge::STEP_TOPIC))
         };
         let (mut signals, _) = recording.signals(&wanted)?;
-        signals.extend(thin::read(recording, &factors)?);
+        signals.extend(thin::read(recording, &factors, part)?);
         if let Some(topic) = roles.topic(Role::Beats)
             && !signals
                 .iter()

@@ -8,7 +8,9 @@ use recording::read::{Batch, Column, ReadError, Recording};
 use recording::signal::field_of;
 
 use super::columns::{ACCEL, GYRO, GYRO_MARK, STAMPS};
+use crate::inputs::Window;
 use crate::roles::{Role, Roles};
+use crate::summary::seconds;
 
 /// Bytes that the estimates hold per sample of the rath's sensor, and of a carrier's (measured on 300,000 and 600,000; they hold many columns at once).
 const RATH_BYTES: u64 = 850;
@@ -22,20 +24,29 @@ const LEAST_HZ: [f64; 2] = [100.0, 50.0];
 /// No device samples faster (Hz): such a log was written at once, and the stamps tell the rate.
 const MOST_HZ: f64 = 2e4;
 
-/// How many samples of each topic become one; 1 where all are kept. `Ok(Err)` gives the number of samples that are too many all the same.
+/// How many samples of each topic become one; 1 where all are kept, of what lies within `part`. `Ok(Err)` gives the number of samples that are too
+/// many all the same.
 ///
 /// # Errors
 /// Where the file cannot be read.
 pub fn factors(
     recording: &Recording,
     roles: &Roles,
+    part: Window,
 ) -> Result<Result<BTreeMap<String, usize>, u64>, ReadError> {
     let info = recording.info();
     let span_s = (info.end_ns.saturating_sub(info.start_ns)) as f64 / 1e9;
     let rath = roles.topic(Role::Imu);
+    let part_s = part.end_s.min(span_s) - part.start_s.max(0.0);
+    let share = match part == Window::ALL {
+        true => 1.0,
+        false => (part_s / span_s.max(1e-9)).clamp(0.0, 1.0),
+    };
+    let span_s = share * span_s;
     let messages = |topic: &str| -> u64 {
         let of_topic = info.channels.iter().filter(|c| c.topic == topic);
-        of_topic.map(|c| c.messages).sum()
+        let all: u64 = of_topic.map(|c| c.messages).sum();
+        (share * all as f64).round() as u64
     };
     let weight = |topic: &str| match rath == Some(topic) {
         true => RATH_BYTES,
@@ -96,15 +107,17 @@ fn stamped_s(recording: &Recording) -> Result<BTreeMap<String, f64>, ReadError> 
     Ok(each.filter(|(_, span_s)| *span_s > 0.0).collect())
 }
 
-/// The inertial columns and stamps of the topics whose factor is above 1: means over so many samples in the order of the file, at log times.
+/// The inertial columns and stamps of the topics whose factor is above 1, of all where only a part is read: means over so many samples in the order of
+/// the file, at log times.
 /// Samples that are not finite are left out, and of a sensor that gives angular velocities those without one.
 pub fn read(
     recording: &Recording,
     factors: &BTreeMap<String, usize>,
+    part: Window,
 ) -> Result<Vec<Signal>, ReadError> {
     let topics: Vec<&str> = factors
         .iter()
-        .filter(|(_, factor)| **factor > 1)
+        .filter(|(_, factor)| **factor > 1 || part != Window::ALL)
         .map(|(topic, _)| topic.as_str())
         .collect();
     if topics.is_empty() {
@@ -120,9 +133,11 @@ pub fn read(
         .iter()
         .map(|topic| (*topic, Sensor::new(factors[*topic])))
         .collect();
+    let start_ns = recording.info().start_ns;
+    let within = |t_ns: i64| part.contains(seconds(start_ns, t_ns));
     recording.stream(&wanted, &mut |batch| {
         if let Some(sensor) = sensors.get_mut(batch.topic) {
-            sensor.take(batch);
+            sensor.take(batch, &within);
         }
     })?;
     Ok(sensors
@@ -177,7 +192,7 @@ impl Sensor {
         }
     }
 
-    fn take(&mut self, batch: &Batch<'_>) {
+    fn take(&mut self, batch: &Batch<'_>, within: &impl Fn(i64) -> bool) {
         let mut parts: [Option<Cow<'_, [f64]>>; COLUMNS.len()] = Default::default();
         let mut mark = None;
         for column in batch.columns {
@@ -199,7 +214,7 @@ impl Sensor {
                 None if self.has[k] => f64::NAN,
                 None => 0.0,
             });
-            if !sample.iter().all(|x| x.is_finite()) {
+            if !sample.iter().all(|x| x.is_finite()) || !within(t_ns) {
                 continue;
             }
             match mark.as_ref().is_some_and(|mark| mark[row] == -1.0) {
@@ -327,7 +342,7 @@ mod tests {
                 .collect();
             let times_ns: Vec<i64> = (from..from + length).map(|k| 1_000 * k as i64).collect();
             let columns = [column("/a.linear_acceleration.x", &values)];
-            sensor.take(&batch(&times_ns, &columns));
+            sensor.take(&batch(&times_ns, &columns), &|_| true);
             x.extend(values);
         }
         let signals = sensor.signals("/a");
@@ -344,15 +359,17 @@ mod tests {
         let times_ns: Vec<i64> = (0..12).collect();
         let mut sensor = Sensor::new(2);
         let x = column("/a.linear_acceleration.x", &values[..6]);
-        sensor.take(&batch(&times_ns[..6], &[x]));
+        sensor.take(&batch(&times_ns[..6], &[x]), &|_| true);
         let rows = [0, 2, 3];
         let x = Column {
             rows: Some(&rows),
             ..column("/a.linear_acceleration.x", &[6.0, 8.0, 9.0])
         };
         let y = column("/a.linear_acceleration.y", &values[6..]);
-        sensor.take(&batch(&times_ns[6..], &[x, y]));
-        sensor.take(&batch(&times_ns[6..], &[y]));
+        sensor.take(&batch(&times_ns[6..], &[x, y]), &|_| true);
+        sensor.take(&batch(&times_ns[6..], &[y]), &|_| true);
+        // Beyond the part that is read.
+        sensor.take(&batch(&times_ns[6..], &[x, y]), &|_| false);
         let signals = sensor.signals("/a");
         let [x, y] = &signals[..] else {
             panic!("{signals:?}")
@@ -379,7 +396,7 @@ mod tests {
             column("/a.header.stamp.sec", &sec),
             column("/a.header.stamp.nanosec", &nanosec),
         ];
-        sensor.take(&batch(&times_ns, &columns));
+        sensor.take(&batch(&times_ns, &columns), &|_| true);
         let signals = sensor.signals("/a");
         let of = |field: &str| {
             &signals
@@ -407,7 +424,7 @@ mod tests {
                 column("/a.linear_acceleration.x", &values),
                 column("/a.angular_velocity_covariance[0]", &mark),
             ];
-            sensor.take(&batch(&times_ns, &columns));
+            sensor.take(&batch(&times_ns, &columns), &|_| true);
             let signals = sensor.signals("/a");
             let x = signals.iter().find(|s| s.path.ends_with(".x")).unwrap();
             assert_eq!(x.values, left);

@@ -39,7 +39,7 @@ pub(super) fn read(name: &str, text: &str) -> Result<Log, ImportError> {
     let mut notes = vec![format!(
         "it has no header: taken for an export of Axivity's, a date (UTC), acceleration in g{behind}"
     )];
-    table.drop_cut_row(name, &mut notes);
+    table.drop_broken_rows(name, &mut notes);
     table.drop_untimed(0, name, &mut notes);
     let times_ns = times_ns(&table, 0, 1)?;
     let force = table.track(&times_ns, [1, 2, 3], STANDARD_GRAVITY)?;

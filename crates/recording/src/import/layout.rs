@@ -163,14 +163,11 @@ fn factor(vector: &Vector, units: &[(&str, f64)], name: &str) -> Result<f64, Imp
     }
 }
 
-/// Rows that come later than this behind their time belong to another recording.
-const LATE_S: f64 = 1.0;
-
 pub(super) fn read(layout: &Layout, name: &str, text: &str) -> Result<Log, ImportError> {
     let mut table = Table::parse(name, text, |line| layout.is_header(line))?;
     let mut notes = Vec::new();
     table.take_units();
-    table.drop_cut_row(name, &mut notes);
+    table.drop_broken_rows(name, &mut notes);
     let time = table.find_all([layout.time.column.as_str()])?[0];
     table.drop_untimed(time, name, &mut notes);
     let mut lacking = Vec::new();
@@ -236,19 +233,6 @@ pub(super) fn read(layout: &Layout, name: &str, text: &str) -> Result<Log, Impor
         let mut track = table.track(&times_ns, columns, factor)?;
         // Others may have a row of their own.
         track.retain(|(_, values)| !values.iter().all(|x| x.is_nan()));
-        // The sensors of one table may come late, not before each other.
-        let mut latest_ns = i64::MIN;
-        for (t_ns, _) in &track {
-            let back_s = latest_ns.saturating_sub(*t_ns) as f64 / 1e9;
-            if back_s > LATE_S {
-                let from_s = (latest_ns - start_ns) as f64 / 1e9;
-                return Err(table.problem(format!(
-                    "the times of the {what} step back by {back_s:.3} s behind {from_s:.3} s: two recordings in one, or a clock that was set anew; expected one that goes on, cut the file there"
-                )));
-            }
-            latest_ns = latest_ns.max(*t_ns);
-        }
-        track.sort_by_key(|row| row.0);
         if let Some(new) = imu::without_repeats(&track) {
             notes.push(format!(
                 "{} of {} rows repeat the {what} of the one before: they hold no sample of it and are left out",

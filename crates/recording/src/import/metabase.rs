@@ -28,7 +28,7 @@ pub(super) fn read(files: &Files) -> Result<Log, ImportError> {
             return Ok(Track::new());
         };
         let mut table = Table::parse(name, text, is_header)?;
-        table.drop_cut_row(&files.name, &mut notes);
+        table.drop_broken_rows(&files.name, &mut notes);
         table.note_empty(&files.name, &mut notes);
         let epoch = if table.find("epoch (ms)").is_some() {
             "epoch (ms)"

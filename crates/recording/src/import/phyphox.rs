@@ -41,7 +41,7 @@ pub(super) fn read(files: &Files) -> Result<Log, ImportError> {
             continue;
         }
         let mut table = Table::parse(name, text, is_header)?;
-        table.drop_cut_row(&files.name, &mut notes);
+        table.drop_broken_rows(&files.name, &mut notes);
         table.note_empty(&files.name, &mut notes);
         if let Some(time) = table.find(TIME) {
             table.drop_untimed(time, &files.name, &mut notes);
@@ -93,7 +93,7 @@ pub(super) fn read(files: &Files) -> Result<Log, ImportError> {
 /// Experiment and UNIX time of every START, s.
 fn starts(name: &str, text: &str, notes: &mut Vec<String>) -> Result<Vec<(f64, f64)>, ImportError> {
     let mut table = Table::parse(name, text, |line| line.contains("experiment time"))?;
-    table.drop_cut_row("", notes);
+    table.drop_broken_rows("", notes);
     let [event, experiment, system] =
         table.find_all(["event", "experiment time", "system time"])?;
     let mut starts = Vec::new();
@@ -139,5 +139,6 @@ fn read_track(
         };
         track.push((t_ns, table.vector(row, axes)?));
     }
+    table.put_in_order(&mut track, |row| row.0)?;
     Ok(track)
 }

@@ -126,7 +126,7 @@ fn read_track(
     notes: &mut Vec<String>,
 ) -> Result<Track, ImportError> {
     let mut table = Table::parse(name, text, is_header)?;
-    table.drop_cut_row(log, notes);
+    table.drop_broken_rows(log, notes);
     table.note_empty(log, notes);
     let [time, x, y, z] = table.find_all(["time", "x", "y", "z"])?;
     let elapsed = table.find("seconds_elapsed");
@@ -170,7 +170,7 @@ fn read_track(
         notes.push(format!(
             "{name}: the clock steps back {often}; rows were put in the order of their times"
         ));
-        track.sort_by_key(|(t_ns, _)| *t_ns);
     }
+    table.put_in_order(&mut track, |row| row.0)?;
     Ok(track)
 }

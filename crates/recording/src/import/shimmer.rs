@@ -31,7 +31,7 @@ pub(super) fn read(name: &str, text: &str) -> Result<Log, ImportError> {
     let mut table = Table::parse(name, text, is_header)?;
     let mut notes = Vec::new();
     let units = table.take_units();
-    table.drop_cut_row(name, &mut notes);
+    table.drop_broken_rows(name, &mut notes);
     let ends = |end: &str| table.columns.iter().position(|name| name.ends_with(end));
     // The header has one of them.
     let time = TIMES.iter().find_map(|end| ends(end)).unwrap_or_default();

@@ -18,6 +18,8 @@ pub(super) struct Table {
     decimal_comma: bool,
     /// Line of the header in the file, from 1.
     header_line: usize,
+    /// Rows that have more cells than the header, where they are left out: their lines, the first and how many.
+    overlong: (usize, u64),
 }
 
 impl Table {
@@ -62,8 +64,8 @@ impl Table {
         let columns = reader
             .headers()
             .map_err(|error| problem(format!("its header cannot be read: {error}")))?;
-        let columns = columns.iter().map(str::to_owned).collect();
-        let mut rows = Vec::new();
+        let columns: Vec<String> = columns.iter().map(str::to_owned).collect();
+        let (mut rows, mut overlong) = (Vec::new(), (0, 0));
         for row in reader.records() {
             let mut row = row.map_err(|error| problem(format!("cannot be read: {error}")))?;
             // The reader begins a row with the empty lines before it.
@@ -75,9 +77,25 @@ impl Table {
                 at.set_line(at.line() + empty);
                 row.set_position(Some(at));
             }
-            if row.iter().any(|cell| !cell.is_empty()) {
+            // A comma too many, as of a decimal sign, moves all that follow it.
+            if row.iter().skip(columns.len()).any(|cell| !cell.is_empty()) {
+                // OK because a line's number fits where the text does.
+                let line = row.position().map_or(0, |at| at.line() as usize) + header_line - 1;
+                if overlong.1 == 0 {
+                    overlong.0 = line;
+                }
+                overlong.1 += 1;
+            } else if row.iter().any(|cell| !cell.is_empty()) {
                 rows.push(row);
             }
+        }
+        if overlong.1 > MOST_OVERLONG * rows.len() as u64 / 100 + 1 {
+            return Err(problem(format!(
+                "line {} and {} more have more cells than the header, which has {}: are there commas within numbers, or do columns have no name?",
+                overlong.0,
+                overlong.1 - 1,
+                columns.len()
+            )));
         }
         // With another separator a comma can only be the decimal sign.
         let decimal_comma = separator != b','
@@ -91,6 +109,7 @@ impl Table {
             rows,
             decimal_comma,
             header_line,
+            overlong,
         })
     }
 
@@ -104,10 +123,18 @@ impl Table {
         Ok(table)
     }
 
-    /// Leaves out a last row that was cut off, with a note; `log` is the log that this table belongs to.
+    /// Leaves out a last row that was cut off, and says which rows are left out as broken; `log` is the log that this table belongs to.
     ///
     /// Its last cell may be half a number. Rows may all be shorter than the header: what counts is also the row before.
-    pub fn drop_cut_row(&mut self, log: &str, notes: &mut Vec<String>) {
+    pub fn drop_broken_rows(&mut self, log: &str, notes: &mut Vec<String>) {
+        if let (first, rows @ 1..) = self.overlong {
+            let one = "row has more cells than the header and is";
+            let rows = counted(rows, one, "rows have more cells than the header and are");
+            notes.push(format!(
+                "{}{rows} left out, the first in line {first}",
+                self.told_in(log)
+            ));
+        }
         let [.., last] = self.rows.as_slice() else {
             return;
         };
@@ -189,6 +216,16 @@ impl Table {
                 self.listed()
             )));
         }
+        let times = |wanted: &&str| {
+            let wanted = plain(wanted);
+            self.columns.iter().filter(|c| plain(c) == wanted).count()
+        };
+        if let Some(twice) = names.iter().find(|name| times(name) > 1) {
+            return Err(self.problem(format!(
+                "has the column {twice} {} times; expected one of that name",
+                times(twice)
+            )));
+        }
         Ok(names.map(|name| self.find(name).unwrap_or(0)))
     }
 
@@ -267,7 +304,30 @@ impl Table {
         let times = times_ns.iter().enumerate();
         let each =
             times.map(|(row, t_ns)| Ok((*t_ns, self.vector(row, columns)?.map(|x| x * factor))));
-        each.collect()
+        let mut track = each.collect::<Result<Track, ImportError>>()?;
+        self.put_in_order(&mut track, |row| row.0)?;
+        Ok(track)
+    }
+
+    /// Puts what its rows tell in the order of their times; one clock may be late, it does not begin again.
+    pub fn put_in_order<T>(
+        &self,
+        rows: &mut [T],
+        t_ns: impl Fn(&T) -> i64,
+    ) -> Result<(), ImportError> {
+        let mut latest_ns = i64::MIN;
+        for row in rows.iter() {
+            let back_s = latest_ns.saturating_sub(t_ns(row)) as f64 / 1e9;
+            if back_s > LATE_S {
+                let from_s = latest_ns.saturating_sub(t_ns(&rows[0])) as f64 / 1e9;
+                return Err(self.problem(format!(
+                    "its times step back by {back_s:.3} s, {from_s:.3} s behind the first: two recordings in one, or a clock that was set anew; expected one that goes on, cut the file there"
+                )));
+            }
+            latest_ns = latest_ns.max(t_ns(row));
+        }
+        rows.sort_by_key(t_ns);
+        Ok(())
     }
 
     /// Three numbers of a row.
@@ -279,6 +339,12 @@ impl Table {
         ])
     }
 }
+
+/// Of a hundred rows at most so many may be broken.
+const MOST_OVERLONG: u64 = 10;
+
+/// Rows that come later than this behind their time belong to another recording.
+const LATE_S: f64 = 1.0;
 
 /// The sign that separates the header's names: the commonest of tab, semicolon, comma outside quotes.
 fn separator(header: &str) -> u8 {

@@ -22,7 +22,7 @@ pub(super) fn is_header(line: &str) -> bool {
 pub(super) fn read(name: &str, text: &str) -> Result<Log, ImportError> {
     let mut table = Table::parse(name, text, is_header)?;
     let mut notes = Vec::new();
-    table.drop_cut_row(name, &mut notes);
+    table.drop_broken_rows(name, &mut notes);
     let time = table.find_all(["SampleTimeFine"])?[0];
     table.drop_untimed(time, name, &mut notes);
     let all = |names: [&str; 3]| {
@@ -96,6 +96,7 @@ pub(super) fn read(name: &str, text: &str) -> Result<Log, ImportError> {
             orientation,
         });
     }
+    table.put_in_order(&mut samples, |sample| sample.t_ns)?;
     if turns > 0 {
         notes.push(format!("SampleTimeFine wrapped {turns} times"));
     }

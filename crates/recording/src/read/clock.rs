@@ -16,6 +16,10 @@ const OPEN: usize = 1 << 14;
 const OFFSET_S: f64 = 0.1;
 /// Drift below this is what quartz does, parts per million.
 const DRIFT_PPM: f64 = 20.0;
+/// Means of 64 messages scatter by less about a drift, s.
+const SCATTER_S: f64 = 5e-3;
+/// A line through one step changes by up to six times what it leaves.
+const LINE: f64 = 8.0;
 
 /// Times of one kind (log times or stamps) in the order of the file.
 #[derive(Debug, Default)]
@@ -362,18 +366,18 @@ impl Clocks {
             && change_s.abs() > 3.0 * residual
             && change_s.abs() > 1e-3
         {
-            say(
-                Kind::ClockDrift,
-                1,
-                None,
+            let text = if residual > SCATTER_S && change_s.abs() < LINE * residual {
+                "log time and header stamp part, but not evenly: was a clock set anew?".to_owned()
+            } else {
                 format!(
                     "log time runs {:.0} ppm {} than the header stamp ({:.1} ms over {:.1} s)",
                     (slope * 1e6).abs(),
                     if slope > 0.0 { "faster" } else { "slower" },
                     change_s * 1e3,
                     self.span_s
-                ),
-            );
+                )
+            };
+            say(Kind::ClockDrift, 1, None, text);
         }
     }
 }
