@@ -133,7 +133,7 @@ fn metrics_are_what_numpy_makes_of_their_definitions() {
         assert_ne!(
             compared,
             OTHERWISE.contains(&metric.name),
-            "{}",
+            "{}: tests/data/make_metrics.py should compute it anew, or OTHERWISE name it",
             metric.name
         );
     }

@@ -533,7 +533,7 @@ fn what_is_wrong_is_named() {
             // Without values, but with their times.
             2,
             vec![
-                "no_decoder /a: skipped 2 messages: encoding \"h264\" with schema encoding \"\" has no decoder",
+                "no_decoder /a: skipped 2 messages: encoding \"h264\" with schema encoding \"\" has no decoder; there are cdr/ros2msg, cdr/ros2idl, cdr/omgidl, ros1/ros1msg, protobuf/protobuf, json",
             ],
         ),
         (
@@ -974,5 +974,17 @@ fn a_checksum_over_all_but_the_chunks_is_taken() {
         bytes.extend(record(0x02, &[0; 20]));
         bytes.extend(b"\x89MCAP0\r\n");
         assert_eq!(lines(bytes), (1, expected));
+    }
+}
+
+#[test]
+fn docs_list_the_encodings_that_are_read() {
+    let docs = include_str!("../../../docs/recording.md");
+    for (message, schema) in recording::read::supported() {
+        let named = |line: &&str| {
+            line.starts_with(&format!("| `{message}` |"))
+                && (schema == "*" || line.contains(&format!("`{schema}`")))
+        };
+        assert!(docs.lines().any(|line| named(&line)), "{message} {schema}");
     }
 }

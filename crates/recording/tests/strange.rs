@@ -1285,7 +1285,7 @@ fn messages_without_a_decoder_tell_their_times() {
     assert_eq!(
         lines(&found),
         [
-            "no_decoder /c: skipped 60 messages: encoding \"h264\" with schema encoding \"\" has no decoder",
+            "no_decoder /c: skipped 60 messages: encoding \"h264\" with schema encoding \"\" has no decoder; there are cdr/ros2msg, cdr/ros2idl, cdr/omgidl, ros1/ros1msg, protobuf/protobuf, json",
             "gap /c: 1 gap in the log times (usual interval 0.010000 s), the longest 0.210 s at 0.390 s"
         ]
     );

@@ -9,7 +9,7 @@ use sim::scene::Scene;
 
 /// A scene with every effect.
 fn everything() -> Scene {
-    scene(
+    let all = scene(
         &(include_str!("everything.toml").to_owned()
             + r#"
         [effects.measured]
@@ -18,7 +18,12 @@ fn everything() -> Scene {
         [effects.imu]
         [effects.drum]
         "#),
-    )
+    );
+    for effect in TABLE {
+        let on = (effect.is_on)(&all.effects);
+        assert!(on, "{} is missing in everything.toml", effect.name);
+    }
+    all
 }
 
 /// The scene without an effect, and without what cannot be without it.

@@ -211,18 +211,23 @@ impl Carriers {
         })
     }
 
-    /// For each clock that taps have set: with it 1.96 standard errors behind, and ahead.
+    /// For each clock that taps or motion have set: with it as far behind as its 95 % interval goes, and as far ahead.
     pub fn phases_by_clocks(&self) -> impl Iterator<Item = [Option<Phases>; 2]> + '_ {
-        let set = (0..self.worn.len()).filter(|k| self.worn[*k].clock_sd_s > 0.0);
-        set.map(|k| {
-            [-1.96, 1.96].map(|sds| {
-                let moved = |worn: &Worn| match std::ptr::eq(worn, &self.worn[k]) {
-                    true => worn.ahead_s + sds * worn.clock_sd_s,
-                    false => worn.ahead_s,
-                };
-                self.phases_as(|steps| steps.phase_rad.clone(), moved)
+        let error_s = |worn: &Worn| match worn.ahead_s == 0.0 {
+            true => 1.96 * worn.clock_sd_s,
+            false => OFFSET_ERROR_S,
+        };
+        let set = (0..self.worn.len()).map(move |k| (k, error_s(&self.worn[k])));
+        set.filter(|(_, error_s)| *error_s > 0.0)
+            .map(|(k, error_s)| {
+                [-error_s, error_s].map(|by_s| {
+                    let moved = |worn: &Worn| match std::ptr::eq(worn, &self.worn[k]) {
+                        true => worn.ahead_s + by_s,
+                        false => worn.ahead_s,
+                    };
+                    self.phases_as(|steps| steps.phase_rad.clone(), moved)
+                })
             })
-        })
     }
 
     fn phases_as(
@@ -298,16 +303,20 @@ impl Carriers {
 
     /// 95 % intervals of the synchrony and the pull: the phases' own error, what had to be put back into them (`detected`: the same metrics
     /// without), and, of the synchrony, the clocks: those that were put on each other by motion, as twins show them, or otherwise (`synchrony_else`), and what
-    /// the errors of those that taps have set make of it (`by_taps`).
+    /// the errors of those that were set make of it (`by_clocks`): the more, the further apart the steps are.
     pub fn interval(
         &self,
         metrics: &mut Metrics,
         detected: &Metrics,
         synchrony_else: &[f64],
-        by_taps: f64,
+        by_clocks: f64,
     ) {
         let moved = self.worn.iter().any(|worn| worn.ahead_s != 0.0);
-        let clocks = if moved { MOVED_ERROR } else { by_taps };
+        let clocks = if moved {
+            MOVED_ERROR.hypot(by_clocks)
+        } else {
+            by_clocks
+        };
         let put_back = |name: &str, x: f64| x - detected.number(name).unwrap_or(x);
         let ends = metrics.number("synchrony").map(|x| {
             let all = synchrony_else.iter().copied().filter(|x| x.is_finite());
@@ -662,9 +671,9 @@ mod tests {
             ("pull_rad_per_s", value(1.9)),
         ]);
         let mut carriers = pair(0.0);
-        let with = |carriers: &Carriers, synchrony, others: &[f64], by_taps| {
+        let with = |carriers: &Carriers, synchrony, others: &[f64], by_clocks| {
             let mut metrics = of(synchrony);
-            carriers.interval(&mut metrics, &detected, others, by_taps);
+            carriers.interval(&mut metrics, &detected, others, by_clocks);
             metrics
         };
         let near = |a: [f64; 2], b: [f64; 2]| (a[0] - b[0]).abs() + (a[1] - b[1]).abs() < 1e-12;
@@ -680,10 +689,10 @@ mod tests {
         let most = with(&carriers, 0.999, &[], 0.0);
         assert_eq!(ci95(&most, "synchrony")[1], 1.0);
         assert_eq!(ci95(&with(&carriers, 0.01, &[], 0.0), "synchrony")[0], 0.0);
-        // Put on each other by motion: 0.013 instead of what taps leave, and no lag to the beat.
+        // Put on each other by motion: 0.013 beside what the clocks leave, and no lag to the beat.
         carriers.worn[1].ahead_s = 0.1;
-        let found = with(&carriers, 0.9, &[0.86, f64::NAN, 0.92], 0.5);
-        let half = (0.002f64.powi(2) + 0.013f64.powi(2) + 0.02f64.powi(2)).sqrt();
+        let found = with(&carriers, 0.9, &[0.86, f64::NAN, 0.92], 0.03);
+        let half = 0.002f64.hypot(0.013).hypot(0.02).hypot(0.03);
         assert!(near(ci95(&found, "synchrony"), [0.86 - half, 0.92 + half]));
         assert_eq!(found.number("beat_lead_deg"), None);
         // Offsets that leave it anywhere within more than a tenth tell none.

@@ -124,9 +124,11 @@ impl Clocks {
         }
         // The other way round: the taps are few, and sound begins all the time.
         let fit = from_events(&self.tap_s, onset_s, SEARCH_S, TOLERANCE_S);
+        // A tap is felt at the largest sample of its ringing, up to a sample behind its beginning, every time alike; between two sensors that cancels.
+        let felt_late_s = 0.5 * period_s(&self.turning.0).unwrap_or_default();
         if let Some(clock) = self.found(topic, fit, self.tap_s.len()) {
             let clock = Clock {
-                offset_sd_s: clock.offset_sd_s.hypot(HEARD_SD_S),
+                offset_sd_s: clock.offset_sd_s.hypot(HEARD_SD_S).hypot(felt_late_s),
                 ..clock
             };
             self.say(topic, &clock, clock.ahead().map(|of_rath| -of_rath));

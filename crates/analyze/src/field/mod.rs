@@ -566,7 +566,7 @@ impl Field {
             let synchrony = |phases| as_of(phases, |n| n == "synchrony").number("synchrony");
             let others: Vec<f64> = self.carriers.phases_else().filter_map(synchrony).collect();
             let here = together.number("synchrony");
-            let by_taps = here.map_or(0.0, |x| {
+            let by_clocks = here.map_or(0.0, |x| {
                 let each = self.carriers.phases_by_clocks();
                 let farthest = each.map(|ends| {
                     let ends = ends.into_iter().flatten().filter_map(synchrony);
@@ -578,7 +578,7 @@ impl Field {
                 &mut together,
                 &detected.unwrap_or_default(),
                 &others,
-                by_taps,
+                by_clocks,
             );
             for lost in &self.carriers_lost {
                 interval::without_those(&mut together, *lost, carriers::gives);

@@ -159,8 +159,10 @@ impl State {
             Err(NoDecoder::Unknown) => State::Closed(
                 Kind::NoDecoder,
                 format!(
-                    "encoding {:?} with schema encoding {:?} has no decoder",
-                    info.encoding, info.schema_encoding
+                    "encoding {:?} with schema encoding {:?} has no decoder; there are {}",
+                    info.encoding,
+                    info.schema_encoding,
+                    decoders::listed()
                 ),
             ),
             Err(NoDecoder::BadSchema(problem)) => State::Closed(

@@ -35,6 +35,15 @@ pub fn supported() -> impl Iterator<Item = (&'static str, &'static str)> {
         .map(|(message, schema, _)| (*message, *schema))
 }
 
+/// The same in a sentence.
+pub(super) fn listed() -> String {
+    let each = supported().map(|(message, schema)| match schema {
+        "*" => message.to_owned(),
+        _ => format!("{message}/{schema}"),
+    });
+    each.collect::<Vec<_>>().join(", ")
+}
+
 /// Finds the decoder of a channel and lets it read the schema.
 pub(super) fn open(
     message_encoding: &str,

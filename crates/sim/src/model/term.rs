@@ -265,7 +265,8 @@ pub struct Power<T = f64> {
 
 /// An effect's page in the energy ledger.
 pub trait Account: Send + Sync {
-    /// Power at the evaluated state, of `pairs` alone: those from the pair numbered `first` on.
+    /// Power at the evaluated state, of `pairs` alone: those from the pair numbered `first` on. It is asked for each block of pairs and summed: what
+    /// belongs to no pair counts where `first` is 0 alone.
     fn power(&self, w: &Workspace, pairs: &[Pair], first: usize) -> Power;
     /// The same by fused arithmetic.
     ///

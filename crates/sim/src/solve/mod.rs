@@ -121,7 +121,7 @@ pub enum Stopped {
     },
     /// The energy ledger shows more energy from nowhere than can be believed.
     #[error(
-        "{method} gave up at t = {t_s} s: {nowhere_j:.1e} J came from nowhere where {supplied_j:.1e} J were supplied; take a smaller --set solver.step_s, a smaller --tolerance or another --method"
+        "{method} gave up at t = {t_s} s: {nowhere_j:.1e} J came from nowhere where {supplied_j:.1e} J were supplied; take a smaller --set solver.step_s, a smaller --tolerance or another --method (an effect that keeps no account in the ledger looks so too)"
     )]
     FromNowhere {
         /// Method name.

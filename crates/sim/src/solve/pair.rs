@@ -627,6 +627,10 @@ impl<'m, P: Pair, const EVENTS: bool> Run<'m, P, EVENTS> {
         observer: &mut dyn Observer,
     ) -> Result<Moved, Stopped> {
         let t0 = self.course.t_s;
+        const {
+            let (from, to) = (P::STAGES + 1, P::STAGES + 1 + P::DENSE_STAGES);
+            assert!(from == to || from >= 7 && to <= 16, "list the stages here");
+        }
         stages!(self, h, P::STAGES + 1, P::STAGES + 1 + P::DENSE_STAGES, [7 8 9 10 11 12 13 14 15]);
         for ((out, k), (y0, y1)) in self
             .dense
