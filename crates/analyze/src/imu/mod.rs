@@ -13,6 +13,7 @@
 //! | [`budget`] | how sure a sensor can be |
 //! | [`interval`] | every metric that rests on the motion, with its interval |
 //! | [`unloading`] | when the support falls below a share of the weight |
+//! | [`floating`] | for what part of the time it is there |
 //! | [`saturation`] | where a sensor came to the end of its range |
 //! | [`axes`] | whether a gyroscope stands on its accelerometer's axes |
 //! | [`frozen`] | where a sensor stands still in moving hands |
@@ -21,6 +22,7 @@
 pub mod axes;
 pub mod bridge;
 pub mod budget;
+pub mod floating;
 pub mod frozen;
 pub mod interval;
 pub mod orientation;

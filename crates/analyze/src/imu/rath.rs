@@ -2,7 +2,7 @@
 //!
 //! ```text
 //! f_com = f − ( α × r + ω × (ω × r) )        specific force at the centre of mass
-//! s     = (R f_com)_z / g = N_tot / (M g)     the support ratio: T_float counts s ≤ 0.05
+//! s     = (R f_com)_z / g = N_tot / (M g)     the support ratio: T_float is the time with s ≤ 0.05
 //! a_up  = (R f_com)_z − g                     its double integral is the height
 //! ```
 //! f specific force at the sensor [m/s²], r from the centre of mass to the sensor in the body's axes (m), ω angular velocity [rad/s], α its
