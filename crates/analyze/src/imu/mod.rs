@@ -6,6 +6,7 @@
 //! | module | gives |
 //! |---|---|
 //! | [`track`] | a clean series of samples out of whatever columns a file had |
+//! | [`stray`] | single samples that nothing carried could have felt |
 //! | [`bridge`] | what short holes most likely held |
 //! | [`orientation`] | sensor → earth (z up), causal and batch |
 //! | [`vertical`] | height by drift-free double integration, with its valid band |
@@ -28,6 +29,7 @@ pub mod interval;
 pub mod orientation;
 pub mod rath;
 pub mod saturation;
+pub mod stray;
 pub mod track;
 pub mod truth;
 pub mod unloading;
