@@ -413,6 +413,13 @@ impl Field {
                     ));
                     self.lost.push(Lost::Mounting);
                 }
+                if let Some(turned) = motion.turned() {
+                    self.quality.push(Quality {
+                        t_s: Some(turned.t_s),
+                        ..Quality::remark(topic, "turned", turned.told())
+                    });
+                    self.lost.push(Lost::Turned);
+                }
                 self.motion = Some(motion);
             }
             Err(error) => self.no_motion = Some(error.to_string()),

@@ -244,6 +244,8 @@ pub enum Lost {
     Axes,
     /// How it sits on the body.
     Mounting,
+    /// That it sits there as it did before.
+    Turned,
 }
 
 /// Takes the intervals from numbers that rest on what was lost, which is in no budget. An accelerometer's missing peaks hardly turn the attitude.
@@ -266,6 +268,10 @@ pub fn without_those(metrics: &mut Metrics, lost: Lost, rests_on: impl Fn(&str) 
         Lost::Mounting => (
             Instrument::Accelerometer,
             "shows gravity elsewhere than below the load as the sensor is said to be mounted",
+        ),
+        Lost::Turned => (
+            Instrument::Accelerometer,
+            "shows gravity elsewhere in the sensor's axes from a moment of the window on",
         ),
     };
     for (name, value) in &mut metrics.0 {

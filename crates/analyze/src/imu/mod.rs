@@ -18,6 +18,7 @@
 //! | [`saturation`] | where a sensor came to the end of its range |
 //! | [`axes`] | whether a gyroscope stands on its accelerometer's axes |
 //! | [`frozen`] | where a sensor stands still in moving hands |
+//! | [`turned`] | whether a sensor slipped in its mounting |
 //! | [`truth`] | errors against a recorded truth |
 
 pub mod axes;
@@ -32,6 +33,7 @@ pub mod saturation;
 pub mod stray;
 pub mod track;
 pub mod truth;
+pub mod turned;
 pub mod unloading;
 pub mod vertical;
 
