@@ -97,6 +97,13 @@ fn jumps(c: &Context, out: &mut Vec<Event>) {
     if ratio.len() != t_s.len() {
         return;
     }
+    // What a sensor feels passes the threshold between samples; a recorded force is counted as the metrics count it.
+    let passes = |k: usize| match inputs.normal_n.is_empty() {
+        true => {
+            t_s[k - 1] + (t_s[k] - t_s[k - 1]) * (ratio[k - 1] - FLIGHT) / (ratio[k - 1] - ratio[k])
+        }
+        false => t_s[k],
+    };
     // None goes on through a hole.
     for stretch in stretches(t_s, 0.0) {
         let last = stretch.end - 1;
@@ -107,12 +114,20 @@ fn jumps(c: &Context, out: &mut Vec<Event>) {
                 (None, true) => start = Some(k),
                 (Some(from), false) => {
                     if k - from >= 2 {
+                        let begins_s = match from > stretch.start && ratio[from - 1].is_finite() {
+                            true => passes(from),
+                            false => t_s[from],
+                        };
+                        let ends_s = match k <= last && ratio[k].is_finite() {
+                            true => passes(k),
+                            false => t_s[k.min(last)],
+                        };
                         out.push(Event {
-                            t_s: t_s[from],
+                            t_s: begins_s,
                             kind: "jump",
                             what: format!(
                                 "next to nothing holds it for {:.2} s",
-                                t_s[k.min(last)] - t_s[from]
+                                ends_s - begins_s
                             ),
                         });
                     }
@@ -268,6 +283,28 @@ mod tests {
                 (5.0, "beat_start")
             ]
         );
+    }
+
+    /// A load thrown at 2 Hz: what a sensor feels passes a twentieth of the weight 73 and 177 ms behind each half second, wherever its samples fall.
+    #[test]
+    fn a_jump_that_a_sensor_feels_begins_and_ends_between_samples() {
+        let ratio = |t: &f64| 1.0 - 1.2 * (TAU * 2.0 * t).sin();
+        let passes_s = (0.95f64 / 1.2).asin() / TAU / 2.0;
+        for shift in [0.0, 0.3, 0.7] {
+            let t_s: Vec<f64> = (0..200).map(|k| 0.01 * (f64::from(k) + shift)).collect();
+            let inputs = Inputs {
+                support_ratio: t_s.iter().map(ratio).collect(),
+                t_s,
+                ..Inputs::default()
+            };
+            let jumps = events(&inputs, Window::ALL);
+            assert_eq!(jumps.len(), 4, "{jumps:?}");
+            for (k, jump) in jumps.iter().enumerate() {
+                let off_s = jump.t_s - 0.5 * k as f64 - passes_s;
+                assert!(off_s.abs() < 5e-4, "{shift}: {jump:?} {passes_s}");
+                assert!(jump.what.ends_with("for 0.10 s"), "{jump:?}");
+            }
+        }
     }
 
     /// 2.15 Hz: unwrapped at a sample a second, wrapped at 30 Hz with steps that scatter, and wrapped at a sample a second, which tells no tempo.

@@ -1977,6 +1977,89 @@ fn a_sensor_that_came_to_its_end_gives_no_interval() {
 }
 
 /// An accelerometer that stops at 30 s, a gyroscope whose y has died: both are told, and the first leaves no interval.
+/// Messages of a load that sways by 17° (RMS) and heaves, its sensor turned over its x by so much at a time.
+fn swaying(turned_rad: impl Fn(f64) -> f64) -> Vec<(f64, String)> {
+    let (w, g) = (std::f64::consts::TAU, 9.80665);
+    let roll = |t: f64| 0.42 * (1.07 * w * t).sin() + turned_rad(t);
+    let message = |k: u32| {
+        let t = 0.01 * f64::from(k);
+        let rate = (roll(t + 1e-4) - roll(t - 1e-4)) / 2e-4;
+        let up = g + 9.0 * (2.14 * w * t).sin();
+        (t, inertial(rate, [up * roll(t).sin(), up * roll(t).cos()]))
+    };
+    (0..6000).map(message).collect()
+}
+
+fn inertial(rate: f64, [y, z]: [f64; 2]) -> String {
+    format!(
+        "{{\"angular_velocity\":{{\"x\":{rate},\"y\":0.001,\"z\":0.0}},\
+         \"linear_acceleration\":{{\"x\":0.0,\"y\":{y},\"z\":{z}}}}}"
+    )
+}
+
+/// One message of zeros, one of a bit that fell over, one of a gyroscope at its end: what they say is not taken for motion.
+#[test]
+fn samples_that_nothing_carried_could_feel_count_as_lost() {
+    let folder = tempfile::tempdir().unwrap();
+    let sound = swaying(|_| 0.0);
+    let mut bad = sound.clone();
+    bad[2015].1 = inertial(0.0, [0.0, 0.0]);
+    bad[3000].1 = inertial(0.1, [-1500.0, 700.0]);
+    bad[4000].1 = inertial(34.9, [0.0, 9.8]);
+    let roles = "imu = \"/s\"\n";
+    let [sound, bad] = [sound, bad].map(|messages| {
+        let file = told(folder.path(), &[("/s", messages)]);
+        with_roles(folder.path(), &file, roles)
+    });
+    assert!(!kinds(&sound).contains(&"stray".to_owned()), "{sound}");
+    let all = bad["quality"].as_array().unwrap();
+    let stray: Vec<&Value> = all.iter().filter(|q| q["kind"] == "stray").collect();
+    assert_eq!(stray.len(), 1, "{all:?}");
+    assert!(
+        stray[0]["count"] == 3 && stray[0]["t_s"] == 20.15,
+        "{stray:?}"
+    );
+    for (name, within) in [("rms_roll_deg", 1e-3), ("dz_pp_m", 1e-3), ("t_float", 1e-3)] {
+        let (x, y) = (metric(&sound, name), metric(&bad, name));
+        assert!((x - y).abs() < within, "{name}: {x} {y}");
+    }
+}
+
+/// A sensor that slips by 25° is told with its moment, and what rests on it has no interval; one that stays is not.
+#[test]
+fn a_sensor_that_slips_in_its_mounting_is_told() {
+    let folder = tempfile::tempdir().unwrap();
+    let slip = |t: f64| 25f64.to_radians() * ((t - 37.0) / 0.5).clamp(0.0, 1.0);
+    for (messages, slips) in [(swaying(|_| 0.0), false), (swaying(slip), true)] {
+        let file = told(folder.path(), &[("/s", messages)]);
+        let found = with_roles(
+            folder.path(),
+            &file,
+            "imu = \"/s\"\nanalysis_start_s = 10.0\n",
+        );
+        let roll = &found["metrics"]["rms_roll_deg"];
+        let all = found["quality"].as_array().unwrap();
+        let said: Vec<&Value> = all.iter().filter(|q| q["kind"] == "turned").collect();
+        assert_eq!(
+            (said.len(), roll["ci95"].is_null()),
+            (usize::from(slips), slips),
+            "{all:?}"
+        );
+        if slips {
+            let text = said[0]["text"].as_str().unwrap();
+            assert!(
+                text.starts_with("from 37 s on gravity lies 25° elsewhere"),
+                "{text}"
+            );
+            let why = roll["reason"].as_str().unwrap();
+            assert!(
+                why.starts_with("without an interval: the accelerometer shows gravity elsewhere"),
+                "{why}"
+            );
+        }
+    }
+}
+
 #[test]
 fn a_sensor_that_stands_still_in_motion_is_told() {
     let folder = tempfile::tempdir().unwrap();

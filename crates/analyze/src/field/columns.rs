@@ -8,6 +8,7 @@ use recording::signal::{Signal, field_of, seconds_since};
 
 use super::dates::{Dated, dated, delay_s, ends_s, twice};
 use crate::imu::Track;
+use crate::imu::stray::strays;
 
 /// The six columns of an inertial message.
 pub(crate) const GYRO: [&str; 3] = [
@@ -37,6 +38,8 @@ const MANY: f64 = 0.01;
 /// What is read of an inertial sensor.
 pub(super) struct Sensor {
     pub track: Track,
+    /// When samples that count as lost were taken, though they are there (s).
+    pub strays_s: Vec<f64>,
     /// Whether it has a gyroscope, and an accelerometer.
     pub turns: bool,
     pub feels: bool,
@@ -206,8 +209,10 @@ impl Columns {
                 format!("{dropped} of {n} samples are left out: not finite, beyond any sensor's range, or no later than the one before"),
             ));
         }
+        let strays = strays(&track);
         Some(Sensor {
-            track,
+            strays_s: strays.iter().map(|k| track.t_s[*k]).collect(),
+            track: track.without(&strays),
             turns,
             feels,
             remarks,

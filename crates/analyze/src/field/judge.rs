@@ -84,6 +84,15 @@ pub fn wants(field: &str) -> bool {
 /// Corner below which the second derivative of an optical height is more than its noise, Hz.
 const SUPPORT_HZ: f64 = 10.0;
 
+/// Errors that compare both at one moment, whatever their clocks.
+const OF_A_MOMENT: &[&str] = &[
+    "inclination_error_deg",
+    "inclination_error_batch_deg",
+    "onset_time_s_error",
+];
+/// Clocks further apart are worth a word, s: more than how old samples usually are at their stamps.
+const APART_S: f64 = 0.01;
+
 /// A recorded truth and the raw sensor beside it.
 pub struct Judge {
     truth: Truth,
@@ -166,12 +175,13 @@ impl Judge {
         let recorded = inputs.phase_rad.len();
         let mut out: Vec<(&'static str, Value)> = Vec::new();
         let mut of_pose = Metrics::default();
-        let mut slow_m = None;
+        let (mut slow_m, mut apart) = (None, None);
         if let (Some(motion), Some(sensor)) = (motion, &self.sensor)
             && !self.truth.t_s.is_empty()
         {
-            self.orientation(motion, sensor, window, &mut out);
             let heave = self.heave(motion);
+            apart = heave.as_ref().and_then(Heave::apart);
+            self.orientation(motion, sensor, window, &mut out);
             if let Some(heave) = &heave {
                 self.height_errors(motion, heave, window, &mut out);
             }
@@ -260,6 +270,15 @@ impl Judge {
             let mut error = difference(found, &truth);
             of_all(&mut error);
             out.push(("step_rate_hz_error", error));
+        }
+        if let Some(apart) = apart {
+            for (_, error) in out
+                .iter_mut()
+                .filter(|(name, _)| OF_A_MOMENT.contains(name))
+            {
+                let said = error.reason.take().map(|r| format!("; {r}"));
+                error.reason = Some(format!("{apart}{}", said.unwrap_or_default()));
+            }
         }
         metrics.0.extend(out);
     }
@@ -474,6 +493,21 @@ struct Heave {
 impl Heave {
     fn offset_s(&self) -> f64 {
         self.clock.map_or(0.0, |c| c.offset_s)
+    }
+
+    /// Said where the two clocks are apart, or where nothing tells.
+    fn apart(&self) -> Option<String> {
+        let Some(clock) = self.clock else {
+            return Some("nothing tells whether the two clocks agree".to_owned());
+        };
+        let unsure_s = 1.96 * clock.offset_sd_s;
+        (clock.offset_s.abs() > APART_S.max(unsure_s)).then(|| {
+            format!(
+                "by the height the two clocks are {:+.1} ± {:.1} ms apart, and what moved meanwhile is in this error",
+                1e3 * clock.offset_s,
+                1e3 * unsure_s
+            )
+        })
     }
 
     /// SD of what of it is slower than the sensor's corner, m; `None` where that is below a tenth of the whole.
@@ -800,12 +834,18 @@ mod tests {
     /// are taken against is in closed form.
     #[test]
     fn a_true_pose_of_the_sensor_judges_the_motion_of_the_centre_of_mass() {
-        judged(UnitQuaternion::identity());
-        judged(UnitQuaternion::from_euler_angles(0.3, -0.2, 0.9));
+        judged(UnitQuaternion::identity(), 0.0);
+        judged(UnitQuaternion::from_euler_angles(0.3, -0.2, 0.9), 0.0);
     }
 
-    /// `mount`: body from sensor.
-    fn judged(mount: UnitQuaternion<f64>) {
+    /// A truth whose clock is 60 ms off: 0.3 rad at 0.9 Hz turn by 2 · 0.3 sin(ω 30 ms) meanwhile, 4.1° (RMS).
+    #[test]
+    fn a_truth_of_another_clock_says_so() {
+        judged(UnitQuaternion::identity(), 0.06);
+    }
+
+    /// `mount`: body from sensor; `late_s`: of the truth.
+    fn judged(mount: UnitQuaternion<f64>, late_s: f64) {
         const G: f64 = 9.81;
         let lever_m = [0.0, 0.2, 0.3];
         let (roll, heave) = (0.3, 1.4 * G / (TAU * 1.8).powi(2));
@@ -832,9 +872,9 @@ mod tests {
             let turning = mount.inverse() * Vector3::new(rate, 0.0, 0.0);
             track.gyro_rad_per_s.push(turning.into());
             track.accel_m_per_s2.push((mount.inverse() * force).into());
-            truth.t_s.push(t);
+            truth.t_s.push(t + late_s);
             truth.world_from_body.push(world_from_body * mount);
-            height.0.push(t);
+            height.0.push(t + late_s);
             height.1.push(z + r.z);
         }
         let settings = Settings {
@@ -875,6 +915,19 @@ mod tests {
             &Inputs::default(),
             window,
         );
+        let inclination = metrics.get("inclination_error_batch_deg").unwrap();
+        let said = inclination.reason.as_deref().unwrap_or_default();
+        if late_s > 0.0 {
+            let turned_deg = (SQRT_2 * roll * (TAU * 0.9 * 0.5 * late_s).sin()).to_degrees();
+            let found = inclination.as_f64().unwrap();
+            assert!((found - turned_deg).abs() < 0.1, "{found} {turned_deg}");
+            assert!(
+                said.starts_with("by the height the two clocks are +60.0 ± "),
+                "{said}"
+            );
+            return;
+        }
+        assert!(!said.contains("clocks"), "{said}");
         let floating = (PI - 2.0 * (0.95f64 / 1.4).asin()) / TAU;
         for (name, error, truth, within) in [
             (

@@ -31,6 +31,7 @@ use crate::imu::interval::{self, Lost};
 use crate::imu::orientation::Options;
 use crate::imu::rath::{self, Motion, Settings};
 use crate::imu::saturation::saturated;
+use crate::imu::stray;
 use crate::imu::track::Instrument;
 use crate::imu::unloading::unloadings;
 use crate::inputs::{self, Inputs, Window};
@@ -230,6 +231,7 @@ impl Field {
         for (topic, dated) in imus.zip(dates) {
             let Some(Sensor {
                 mut track,
+                strays_s,
                 turns,
                 feels,
                 remarks,
@@ -240,6 +242,14 @@ impl Field {
             let said = remarks.into_iter();
             let said = said.map(|(kind, text)| Quality::remark(topic, kind, text));
             field.quality.extend(said);
+            if let Some(first_s) = strays_s.first() {
+                let (count, all) = (strays_s.len(), track.len() + strays_s.len());
+                field.quality.push(Quality {
+                    count: count as u64,
+                    t_s: Some(*first_s),
+                    ..Quality::remark(topic, "stray", stray::told(count, all))
+                });
+            }
             let is_rath = roles.topic(Role::Imu) == Some(topic.as_str());
             let carries = roles.patterns(Role::Carriers).contains(topic);
             let within = window.range(&track.t_s);
@@ -424,6 +434,13 @@ impl Field {
                         format!("as it is declared to be mounted, the load leans by {lean_deg:.0}° on average: it lies on its side or its back, or the sensor sits otherwise; what rests on its motion has no interval"),
                     ));
                     self.lost.push(Lost::Mounting);
+                }
+                if let Some(turned) = motion.turned() {
+                    self.quality.push(Quality {
+                        t_s: Some(turned.t_s),
+                        ..Quality::remark(topic, "turned", turned.told())
+                    });
+                    self.lost.push(Lost::Turned);
                 }
                 self.motion = Some(motion);
             }

@@ -5,13 +5,13 @@
 //! drawn through, what as many holes again would change counts as one more.
 
 use super::budget::UNCALIBRATED_M_PER_S2;
+use super::floating::floating;
 use super::rath::{Motion, Mounting};
 use super::track::Instrument;
 use super::unloading::unloadings;
 use crate::inputs::{Inputs, Window, between};
 use crate::line::rival_hz;
 use crate::mechanism::Verdict;
-use crate::median::median;
 use crate::metrics::{Datum, Metrics, metrics_of};
 use crate::random::Random;
 use std::ops::Range;
@@ -94,7 +94,14 @@ pub fn metrics(motion: &Motion, window: Window) -> Metrics {
         (again != found).then(|| format!("with as many holes again {what} would be found"))
     };
     let range = window.range(&motion.inputs.t_s);
-    let t_float = |inputs: &Inputs| floating(&inputs.support_ratio[range.clone()]);
+    let t_float = |inputs: &Inputs| {
+        let within = |r: &Range<usize>| {
+            let (from, to) = (r.start.max(range.start), r.end.min(range.end));
+            (from < to).then(|| &inputs.support_ratio[from..to])
+        };
+        let parts: Vec<&[f64]> = motion.stretches.iter().filter_map(within).collect();
+        floating(&parts)
+    };
     let rate_hz = rate_hz(&motion.inputs);
     for (name, value) in &mut out.0 {
         if let Some((_, why)) = BEYOND.iter().find(|(n, _)| n == name) {
@@ -169,21 +176,22 @@ pub fn metrics(motion: &Motion, window: Window) -> Metrics {
             value.ci95 = Some(apart(extremes(x, &drawn), x, off(name, x)));
             continue;
         }
-        let floats = *name == "t_float";
-        let x = if floats { t_float(&motion.inputs) } else { x };
+        let floats = (*name == "t_float").then(|| t_float(&motion.inputs));
+        let x = floats.map_or(x, |found| found.share);
         let off = match (&again, *name) {
             (Some((again, _)), "dz_pp_m") => {
                 let heights = [&motion.inputs, *again].map(|i| &i.height_m[range.clone()]);
                 farthest_apart(heights) / 1.96
             }
-            (Some((again, _)), "t_float") => t_float(again) - x,
+            (Some((again, _)), "t_float") => t_float(again).share - x,
             _ => off(name, x),
         };
         let beyond = beyond_the_budget(name, motion, window);
+        let beyond = floats.map_or(beyond, |found| found.edges_sd.max(beyond));
         let half = 1.96 * (variance(&drawn) + beyond.powi(2) + off.powi(2)).sqrt();
         value.datum = Datum::Number(x);
         // None of them is below nothing, and a share is one at most.
-        let most = if floats { 1.0 } else { f64::INFINITY };
+        let most = if floats.is_some() { 1.0 } else { f64::INFINITY };
         value.ci95 = Some([(x - half).max(0.0), (x + half).min(most)]);
         let of_height = OF_COURSE.contains(name).then(|| {
             let corner_hz = motion.settings.height_corner_hz;
@@ -236,6 +244,8 @@ pub enum Lost {
     Axes,
     /// How it sits on the body.
     Mounting,
+    /// That it sits there as it did before.
+    Turned,
 }
 
 /// Takes the intervals from numbers that rest on what was lost, which is in no budget. An accelerometer's missing peaks hardly turn the attitude.
@@ -258,6 +268,10 @@ pub fn without_those(metrics: &mut Metrics, lost: Lost, rests_on: impl Fn(&str) 
         Lost::Mounting => (
             Instrument::Accelerometer,
             "shows gravity elsewhere than below the load as the sensor is said to be mounted",
+        ),
+        Lost::Turned => (
+            Instrument::Accelerometer,
+            "shows gravity elsewhere in the sensor's axes from a moment of the window on",
         ),
     };
     for (name, value) in &mut metrics.0 {
@@ -389,34 +403,6 @@ fn apart([low, high]: [f64; 2], x: f64, off: f64) -> [f64; 2] {
 fn doubtful(others: usize, what: &str) -> Option<String> {
     (others > 1)
         .then(|| format!("of {DRAWS} sensors as good as this one {others} would find {what}"))
-}
-
-/// Share of samples with a support of a twentieth of the weight or less, without what noise makes of it: where the support stays a little below
-/// that for long and passes above it fast, noise takes more samples out than it brings in. The same noise takes out as much once more.
-///
-/// ```text
-/// 2 ⟨s ≤ c⟩ − ⟨Φ((c − s)/σ)⟩,    σ = median |s₋₁ − 2 s₀ + s₊₁| / (0.6745 √6)
-/// ```
-/// c = 0.05; the median is of samples up to 2c, where little else bends; σ takes the noise for white. Source: as [`without_noise`].
-fn floating(support_ratio: &[f64]) -> f64 {
-    let n = support_ratio.len() as f64;
-    let c = crate::metrics::FLOAT_SHARE;
-    let counted = support_ratio.iter().filter(|s| **s <= c).count() as f64 / n;
-    let mut bends: Vec<f64> = support_ratio
-        .windows(3)
-        .filter(|w| w.iter().all(|s| s.abs() <= 2.0 * c))
-        .map(|w| (w[0] - 2.0 * w[1] + w[2]).abs())
-        .collect();
-    let sigma = median(&mut bends).unwrap_or(0.0) / (0.6745 * 6f64.sqrt());
-    if !(sigma > 0.0) {
-        return counted;
-    }
-    let blurred = support_ratio
-        .iter()
-        .map(|s| 0.5 * libm::erfc((s - c) / (sigma * std::f64::consts::SQRT_2)))
-        .sum::<f64>()
-        / n;
-    (2.0 * counted - blurred).clamp(0.0, 1.0)
 }
 
 /// Of a sample about its mean.

@@ -6,6 +6,7 @@
 //! | module | gives |
 //! |---|---|
 //! | [`track`] | a clean series of samples out of whatever columns a file had |
+//! | [`stray`] | single samples that nothing carried could have felt |
 //! | [`bridge`] | what short holes most likely held |
 //! | [`orientation`] | sensor → earth (z up), causal and batch |
 //! | [`vertical`] | height by drift-free double integration, with its valid band |
@@ -13,21 +14,26 @@
 //! | [`budget`] | how sure a sensor can be |
 //! | [`interval`] | every metric that rests on the motion, with its interval |
 //! | [`unloading`] | when the support falls below a share of the weight |
+//! | [`floating`] | for what part of the time it is there |
 //! | [`saturation`] | where a sensor came to the end of its range |
 //! | [`axes`] | whether a gyroscope stands on its accelerometer's axes |
 //! | [`frozen`] | where a sensor stands still in moving hands |
+//! | [`turned`] | whether a sensor slipped in its mounting |
 //! | [`truth`] | errors against a recorded truth |
 
 pub mod axes;
 pub mod bridge;
 pub mod budget;
+pub mod floating;
 pub mod frozen;
 pub mod interval;
 pub mod orientation;
 pub mod rath;
 pub mod saturation;
+pub mod stray;
 pub mod track;
 pub mod truth;
+pub mod turned;
 pub mod unloading;
 pub mod vertical;
 

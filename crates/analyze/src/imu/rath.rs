@@ -2,7 +2,7 @@
 //!
 //! ```text
 //! f_com = f − ( α × r + ω × (ω × r) )        specific force at the centre of mass
-//! s     = (R f_com)_z / g = N_tot / (M g)     the support ratio: T_float counts s ≤ 0.05
+//! s     = (R f_com)_z / g = N_tot / (M g)     the support ratio: T_float is the time with s ≤ 0.05
 //! a_up  = (R f_com)_z − g                     its double integral is the height
 //! ```
 //! f specific force at the sensor [m/s²], r from the centre of mass to the sensor in the body's axes (m), ω angular velocity [rad/s], α its
@@ -16,6 +16,7 @@ use super::bridge::{self, Drawn, bridge};
 use super::budget::Budget;
 use super::orientation::{self, Estimate, Options};
 use super::track::Track;
+use super::turned::{Turned, turned};
 use super::vertical;
 use crate::filter::{Band, butter, sosfiltfilt};
 use crate::inputs::{HOLE, Inputs, Window, interpolate, mean_step_in, stretches};
@@ -168,6 +169,15 @@ impl Motion {
         let up = mean_up(&self.orientation.earth_from_sensor, within);
         let lean = up.angle(&Vector3::z());
         (known && up.norm() > ONE_WAY && lean > CARRIED_RAD).then(|| lean.to_degrees())
+    }
+}
+
+impl Motion {
+    /// Whether the sensor lies otherwise on the load from some moment of [`Settings::level_over`] on.
+    pub fn turned(&self) -> Option<Turned> {
+        let within = self.settings.level_over.range(&self.inputs.t_s);
+        let earth_from = &self.orientation.earth_from_sensor;
+        turned(&self.inputs.t_s[within.clone()], &earth_from[within])
     }
 }
 

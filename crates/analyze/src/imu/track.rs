@@ -118,6 +118,19 @@ impl Track {
         crate::inputs::stretches(&self.t_s, BRIDGED_S)
     }
 
+    /// All samples but these, which ascend.
+    pub fn without(&self, left_out: &[usize]) -> Self {
+        let kept: Vec<usize> = (0..self.len())
+            .filter(|k| left_out.binary_search(k).is_err())
+            .collect();
+        Self {
+            t_s: kept.iter().map(|k| self.t_s[*k]).collect(),
+            gyro_rad_per_s: kept.iter().map(|k| self.gyro_rad_per_s[*k]).collect(),
+            accel_m_per_s2: kept.iter().map(|k| self.accel_m_per_s2[*k]).collect(),
+            dropped: self.dropped,
+        }
+    }
+
     /// Some of the samples.
     pub fn part(&self, range: std::ops::Range<usize>) -> Self {
         Self {

@@ -260,31 +260,6 @@ fn a_bias_moves_the_lean_and_not_the_swing() {
     assert!((3.0 - low - most).abs() < 1e-3 && (high - 3.0 - most).abs() < 1e-3);
 }
 
-/// A support of 0.03 most of the time, through noise of 0.016: what is counted is 11 % too little, what noise takes is taken back to
-/// first order, and both are known by hand.
-#[test]
-fn noise_takes_nothing_from_what_floats_to_first_order() {
-    let mut random = Random(3);
-    let support = |k: usize| match k % 20 {
-        k @ 0..8 => 0.4 + 0.9 * (PI * (k as f64 + 0.5) / 8.0).sin(),
-        _ => 0.03,
-    };
-    let clean: Vec<f64> = (0..200_000).map(support).collect();
-    assert_eq!(floating(&clean), 0.6);
-    let noisy: Vec<f64> = clean.iter().map(|s| s + 0.016 * random.normal()).collect();
-    let normal = |x: f64| 0.5 * libm::erfc(-x / 2f64.sqrt());
-    let known = 0.6 * (2.0 * normal(1.25) - normal(1.25 / 2f64.sqrt()));
-    // Chance: 0.0015; what the choice of small ones takes from σ: 0.002.
-    assert!(
-        (floating(&noisy) - known).abs() < 0.006,
-        "{}",
-        floating(&noisy)
-    );
-    assert!((0.6 * normal(1.25) - known).abs() > 0.04);
-    // A twentieth of the weight floats.
-    assert_eq!(floating(&[1.0, 1.0, 1.0, 0.05]), 0.25);
-}
-
 /// A motion whose height is known, between its unknown ends.
 fn thrown(height_m: impl Fn(f64) -> f64, roll: impl Fn(f64) -> f64) -> Motion {
     let h = 1e-3;
@@ -541,6 +516,7 @@ fn what_rests_on_what_was_lost_has_no_interval() {
         Lost::Peaks(Instrument::Gyroscope),
         Lost::All(Instrument::Accelerometer),
         Lost::Axes,
+        Lost::Turned,
     ] {
         let mut left = whole.clone();
         without(&mut left, lost);

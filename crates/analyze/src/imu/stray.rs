@@ -1,0 +1,131 @@
+//! Single samples that nothing carried could have felt: a bit that fell over on a wire, a message that was filled with zeros, a register that was read half old and
+//! half new. One of them turns the attitude and throws the height for seconds, so they count as lost.
+
+use super::track::{Instrument, Track};
+
+/// So far from both neighbours, in the instrument's unit, on the same side. A fall onto stone is felt by what is carried as up to some 50 m/s² (re-contact after a
+/// float passes 4 g), through a sensor's own low-pass filter, and so over more than one sample: it rises and falls by less than this between them. Nobody turns a
+/// load of two people by 17 rad/s (1000 °/s), let alone up to that and down again within two samples.
+const fn beyond(of: Instrument) -> f64 {
+    match of {
+        Instrument::Gyroscope => 17.0,
+        Instrument::Accelerometer => 100.0,
+    }
+}
+/// The neighbours agree with each other to so much of it: what jumps from one state to another is no stray.
+const AGREE: f64 = 0.25;
+/// Of a message filled with zeros: what its neighbours feel at least, m/s². In free flight a coarse sensor may read zero.
+const FELT_M_PER_S2: f64 = 5.0;
+/// With longer steps, s, a whole blow fits between two neighbours.
+const LONGEST_STEP_S: f64 = 0.05;
+
+/// One line for people.
+pub fn told(count: usize, all: usize) -> String {
+    format!(
+        "{count} of {all} samples lie alone beyond what anything carried feels (more than {:.0} {} or {:.0} {} from both neighbours, or nothing at all between others) and count as lost",
+        beyond(Instrument::Accelerometer),
+        Instrument::Accelerometer.unit(),
+        beyond(Instrument::Gyroscope),
+        Instrument::Gyroscope.unit(),
+    )
+}
+
+/// Which samples are, ascending. None beside another: what comes twice in a row may be a blow.
+pub fn strays(track: &Track) -> Vec<usize> {
+    let usual_s = track.period_s().unwrap_or(f64::INFINITY);
+    // A clock errs.
+    if usual_s > 1.01 * LONGEST_STEP_S {
+        return Vec::new();
+    }
+    let is = |k: usize| {
+        let (a, b) = (k - 1, k + 1);
+        let beside = track.t_s[b] - track.t_s[a] < 3.0 * usual_s;
+        beside
+            && (is_empty(track, k)
+                || Instrument::BOTH
+                    .iter()
+                    .any(|of| leaps(track.readings(*of), *of, k)))
+    };
+    let mut found: Vec<usize> = (1..track.len().saturating_sub(1))
+        .filter(|k| is(*k))
+        .collect();
+    let all = found.clone();
+    found.retain(|k| ![k - 1, k + 1].iter().any(|k| all.binary_search(k).is_ok()));
+    found
+}
+
+/// An accelerometer's reading of nothing at all between others of something.
+fn is_empty(track: &Track, k: usize) -> bool {
+    let felt = |k: usize| nalgebra::Vector3::from(track.accel_m_per_s2[k]).norm();
+    felt(k) == 0.0 && felt(k - 1) > FELT_M_PER_S2 && felt(k + 1) > FELT_M_PER_S2
+}
+
+fn leaps(x: &[[f64; 3]], of: Instrument, k: usize) -> bool {
+    let beyond = beyond(of);
+    (0..3).any(|axis| {
+        let [a, here, b] = [k - 1, k, k + 1].map(|k| x[k][axis]);
+        let [up, down] = [here - a, here - b];
+        up.abs().min(down.abs()) > beyond && up * down > 0.0 && (a - b).abs() < AGREE * beyond
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A sway at so many samples a second.
+    fn swaying(rate_hz: f64) -> Track {
+        let mut track = Track::default();
+        for k in 0..1000 {
+            let t = f64::from(k) / rate_hz;
+            let swing = (6.9 * t).sin();
+            track.t_s.push(t);
+            track.gyro_rad_per_s.push([2.0 * swing, 0.0, 0.1]);
+            track.accel_m_per_s2.push([3.0 * swing, 0.0, 9.8]);
+        }
+        track
+    }
+
+    #[test]
+    fn a_sample_that_nothing_carried_could_feel_is_found() {
+        let mut track = swaying(100.0);
+        assert!(strays(&track).is_empty());
+        track.accel_m_per_s2[100] = [2000.0, -1500.0, 700.0];
+        track.accel_m_per_s2[200] = [0.0, 0.0, -156.9];
+        track.accel_m_per_s2[300] = [0.0; 3];
+        track.gyro_rad_per_s[400] = [0.0, 34.9, 0.0];
+        track.gyro_rad_per_s[404] = [-34.9, 34.9, 0.0];
+        assert_eq!(strays(&track), [100, 200, 300, 400, 404]);
+    }
+
+    /// Blows of one sample and of two, one that leaves the sensor elsewhere, a buzz, free flight, and all that at 10 Hz.
+    #[test]
+    fn a_blow_is_none() {
+        let mut track = swaying(100.0);
+        let up = |track: &mut Track, k: usize, z: f64| track.accel_m_per_s2[k][2] = z;
+        up(&mut track, 100, 100.0);
+        for k in [200, 201] {
+            up(&mut track, k, 150.0);
+        }
+        for (k, z) in [(300, 60.0), (301, 155.0), (302, 20.0)] {
+            up(&mut track, k, z);
+        }
+        for k in 400..420 {
+            up(&mut track, k, 9.8 + if k % 2 == 0 { 60.0 } else { -60.0 });
+        }
+        track.accel_m_per_s2[500..503].fill([0.0; 3]);
+        track.accel_m_per_s2[600] = [0.0, 0.0, 1e-3];
+        track.gyro_rad_per_s[700][0] += 15.0;
+        assert!(strays(&track).is_empty(), "{:?}", strays(&track));
+        let mut slow = swaying(10.0);
+        slow.accel_m_per_s2[100] = [0.0, 0.0, 150.0];
+        assert!(strays(&slow).is_empty());
+    }
+
+    #[test]
+    fn nothing_is_found_in_nothing() {
+        for n in 0..3 {
+            assert!(strays(&swaying(100.0).part(0..n)).is_empty());
+        }
+    }
+}
