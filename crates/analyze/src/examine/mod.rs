@@ -76,10 +76,8 @@ pub fn examine(
             recording,
             &roles,
             inputs.gravity_m_per_s2,
-            request.truth,
-            request.clocks,
+            request,
             !inputs.beat_phase_rad.is_empty(),
-            request.asked(),
             |last_s| until(last_s, &mut Vec::new()),
         )?,
         Err(why) => {

@@ -51,7 +51,7 @@ impl Request {
     }
 
     /// The window that was asked for.
-    pub(super) fn asked(&self) -> Window {
+    pub(crate) fn asked(&self) -> Window {
         Window {
             start_s: self.window.0.unwrap_or(f64::NEG_INFINITY),
             end_s: self.window.1.unwrap_or(f64::INFINITY),

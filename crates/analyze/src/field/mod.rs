@@ -23,6 +23,7 @@ use recording::text::counted;
 
 use crate::beat::lock::Course;
 use crate::events::Event;
+use crate::examine::Request;
 use crate::imu::Track;
 use crate::imu::axes::misfit;
 use crate::imu::bridge;
@@ -103,8 +104,8 @@ struct Filled {
 
 impl Field {
     /// Reads the sensors' topics; nothing when the recording has none. Clocks are put on the rath's by taps, or the carriers' on each other by
-    /// their motion, as `devices` says. Beats are read beside sensors, and where the beat is not known. `window` is asked with the time of the
-    /// sensors' last sample (s); of a log that is too long, what lies about the window that was `asked` for is read.
+    /// their motion, as the request says. Beats are read beside sensors, and where the beat is not known. `window` is asked with the time of the
+    /// sensors' last sample (s); of a log that is too long, what lies about the window of the request is read.
     ///
     /// # Errors
     /// Where the file cannot be read.
@@ -112,12 +113,11 @@ impl Field {
         recording: &Recording,
         roles: &Roles,
         gravity_m_per_s2: f64,
-        truth: bool,
-        devices: DeviceClocks,
+        request: &Request,
         beat_is_known: bool,
-        asked: Window,
         window: impl FnOnce(f64) -> Window,
     ) -> Result<Self, ReadError> {
+        let (truth, devices, asked) = (request.truth, request.clocks, request.asked());
         let others = [Role::Beats, Role::Truth];
         let others = others.iter().flat_map(|r| roles.patterns(*r));
         let topics: Vec<&str> = (roles.inertial().into_iter())

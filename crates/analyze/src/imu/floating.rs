@@ -19,7 +19,7 @@ pub struct Floating {
 /// T + T(0) − T(σ'),    T(σ') = ⟨ (G(u₁) − G(u₀)) / (u₁ − u₀) ⟩,    u = (c − s)/σ',    G(u) = u Φ(u) + φ(u)
 /// σ' = √(2/3) σ,    σ = median |s₋₁ − 2 s₀ + s₊₁| / (0.6745 √6)
 /// ```
-/// T counts time up to the [`Edge`]s, T(σ') is the mean of Φ along the straight line from each sample to the next, T(0) the part of it below c; c = 0.05. The median is of
+/// T counts time up to the edges, T(σ') is the mean of Φ along the straight line from each sample to the next, T(0) the part of it below c; c = 0.05. The median is of
 /// samples up to 2c, where little else bends; σ takes the noise for white, of which a line between two samples has √(2/3) on average. Source: as
 /// [`super::interval`]'s roots of mean squares.
 pub fn floating(stretches: &[&[f64]]) -> Floating {
