@@ -6,7 +6,7 @@ use std::sync::Arc;
 use recording::read::{ReadError, Recording};
 use recording::signal::{Signal, field_of, seconds_since};
 
-use super::dates::{Dated, dated, delay_s, ends_s, twice};
+use super::dates::{Dated, dated, delay_s, ends_s, mixed};
 use crate::imu::Track;
 use crate::imu::stray::strays;
 
@@ -184,7 +184,7 @@ impl Columns {
             columns = sorted.each_ref().map(|x| &x[..]);
         }
         let mut once = columns[0].to_vec();
-        let mixed = twice(&once);
+        let mixed = mixed(&once, &columns[1..]);
         if let Some(first) = mixed.first() {
             let many: usize = mixed.iter().map(|mixed| mixed.len()).sum();
             remarks.push((

@@ -37,6 +37,8 @@ const FEWEST_IN_PART: usize = 8;
 /// Samples that are looked at together for their density; such that come in less than this share of the usual time are dense.
 const AT_ONCE: usize = 20;
 const DENSE: f64 = 0.75;
+/// Neighbours are so much further apart (mean square) than every other sample where two courses come by turns; noise alone makes it 1, a smooth course 1/4.
+const BY_TURNS: f64 = 2.0;
 /// Less (s) is what comes late.
 const LEAST_TWICE_S: f64 = 0.3;
 /// Least delays that leap by more than this (s), and by so many times what they usually change by, are those of a clock that was set anew.
@@ -140,9 +142,25 @@ pub fn dated(log_s: Vec<f64>, stamp_s: Option<Vec<f64>>) -> Dated {
     }
 }
 
-/// Where samples in the order of their times come twice as often as they do before: a clock was set back there, and what lies side by side was not
-/// measured together. A queue that is emptied comes as often, but nothing comes before it.
-pub fn twice(t_s: &[f64]) -> Vec<Range<usize>> {
+/// Where samples in the order of their times come twice as often as they do before, and tell of two courses by turns: a clock was set back there. A queue that
+/// is emptied comes as often, but nothing comes before it; a sensor that doubles its rate tells of one course.
+pub fn mixed(t_s: &[f64], x: &[&[f64]]) -> Vec<Range<usize>> {
+    let by_turns = |within: &Range<usize>| {
+        x.iter().any(|x| {
+            let apart = |by: usize| -> f64 {
+                let pairs = x[within.clone()].windows(by + 1);
+                let apart = pairs.map(|w| (w[by] - w[0]).powi(2));
+                apart.filter(|a| a.is_finite()).sum()
+            };
+            apart(1) > BY_TURNS * apart(2)
+        })
+    };
+    let mut found = twice(t_s);
+    found.retain(by_turns);
+    found
+}
+
+fn twice(t_s: &[f64]) -> Vec<Range<usize>> {
     let steps: Vec<f64> = t_s.windows(2).map(|w| w[1] - w[0]).collect();
     let Some(usual_s) = median(&mut steps.clone()).filter(|s| *s > 0.0) else {
         return Vec::new();
@@ -472,7 +490,7 @@ mod tests {
             let off_s = (from_s - (35.0 - back_s)).abs().max((to_s - 35.0).abs());
             assert!(off_s < 0.06, "{back_s}: {from_s} {to_s}");
         }
-        // A queue that is emptied after a second, and a sensor that changes its rate.
+        // A queue that is emptied after a second.
         let queue = |k: i32| f64::from(k) * 0.01;
         let queue: Vec<f64> = (0..7000)
             .map(|k| match k {
@@ -481,6 +499,29 @@ mod tests {
             })
             .collect();
         assert!(twice(&queue).is_empty());
+    }
+
+    /// A minute at 50 Hz, of which 20 s come twice as often: of two moments, or of one sensor that is faster there.
+    #[test]
+    fn a_sensor_that_doubles_its_rate_is_not_mixed() {
+        let seen = |t: f64| (13.0 * t).sin() + 0.1 * (70.0 * t).cos();
+        let times = |later_s: f64| {
+            let single = (0..3000).map(|k| 0.02 * f64::from(k));
+            let more = (1500..2500).map(|k| 0.02 * f64::from(k) + 0.01);
+            let mut both: Vec<(f64, f64)> = single
+                .map(|t| (t, seen(t)))
+                .chain(more.map(|t| (t, seen(t + later_s))))
+                .collect();
+            both.sort_by(|a, b| a.0.total_cmp(&b.0));
+            both.into_iter().unzip::<f64, f64, Vec<_>, Vec<_>>()
+        };
+        let (t_s, x) = times(0.0);
+        assert_eq!(twice(&t_s).len(), 1);
+        assert!(mixed(&t_s, &[&x]).is_empty());
+        let (t_s, x) = times(20.3);
+        let still = vec![0.0; x.len()];
+        assert_eq!(mixed(&t_s, &[&still, &x]), twice(&t_s));
+        assert!(mixed(&t_s, &[&still]).is_empty());
     }
 
     #[test]

@@ -112,7 +112,8 @@ pub trait Pair {
     /// Coefficients of the dense polynomial needed per state.
     const DENSE_ROWS: usize;
     /// What a step may err, in units of the tolerance asked for: so much less that the error of a whole run stays within ten times
-    /// what was asked, also where a scene adds up the errors of hundreds of steps and then grows them (held by tests/tolerance.rs).
+    /// what was asked, also where a scene adds up the errors of hundreds of steps and then grows them (held for `auto` by tests/tolerance.rs, for
+    /// each by the hard cases).
     const SHARE: f64;
     /// h |λ| from which on the last two stages say that stability limits the step.
     const STABLE: f64;

@@ -3,6 +3,7 @@ use crate::imu::budget::Budget;
 use crate::imu::orientation::Options;
 use crate::imu::rath::{Settings, motion};
 use crate::imu::track::Track;
+use crate::metrics::Need;
 use nalgebra::{UnitQuaternion, Vector3};
 use std::f64::consts::{PI, TAU};
 
@@ -567,5 +568,19 @@ fn noise_is_taken_out_of_a_mean_square() {
         assert!((mean - 1.0).abs() < 0.1 * sd, "{sd}: {mean}");
         let covers = kept as f64 / f64::from(rounds);
         assert!((least..0.98).contains(&covers), "{sd}: {covers}");
+    }
+}
+
+#[test]
+fn every_metric_of_the_motion_is_among_those_with_an_interval() {
+    for metric in crate::metrics::METRICS {
+        let seen =
+            |need: &Need| matches!(need, Need::Roll | Need::Pitch | Need::Yaw | Need::Height);
+        let of_motion = metric.needs.iter().all(seen);
+        assert!(
+            !of_motion || gives(metric.name),
+            "{}: FROM_MOTION lacks it",
+            metric.name
+        );
     }
 }
