@@ -518,7 +518,7 @@ mod tests {
         let (t_s, x) = times(0.0);
         assert_eq!(twice(&t_s).len(), 1);
         assert!(mixed(&t_s, &[&x]).is_empty());
-        let (t_s, x) = times(20.3);
+        let (t_s, x) = times(20.45);
         let still = vec![0.0; x.len()];
         assert_eq!(mixed(&t_s, &[&still, &x]), twice(&t_s));
         assert!(mixed(&t_s, &[&still]).is_empty());
