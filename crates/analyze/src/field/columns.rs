@@ -183,23 +183,24 @@ impl Columns {
             sorted = columns.map(|x| order.iter().map(|k| x[*k]).collect::<Vec<f64>>());
             columns = sorted.each_ref().map(|x| &x[..]);
         }
-        let mut once = columns[0].to_vec();
-        let mixed = mixed(&once, &columns[1..]);
+        let mixed = mixed(columns[0], &columns[1..]);
+        let mut once;
         if let Some(first) = mixed.first() {
             let many: usize = mixed.iter().map(|mixed| mixed.len()).sum();
             remarks.push((
                 "mixed",
                 format!(
                     "{many} samples come twice as often as the others, first from {:.3} to {:.3} s: a clock was set back, and they are left out; what follows stands that much too early",
-                    once[first.start],
-                    once[first.end - 1]
+                    columns[0][first.start],
+                    columns[0][first.end - 1]
                 ),
             ));
+            once = columns[0].to_vec();
+            for k in mixed.into_iter().flatten() {
+                once[k] = f64::NAN;
+            }
+            columns[0] = &once;
         }
-        for k in mixed.into_iter().flatten() {
-            once[k] = f64::NAN;
-        }
-        columns[0] = &once;
         let [t_s, x, y, z, accel @ ..] = columns;
         let track = Track::from_columns(t_s, [x, y, z], accel);
         let dropped = track.dropped - if turns { without } else { 0 };

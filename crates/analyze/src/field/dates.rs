@@ -8,6 +8,7 @@
 //! was set anew, which is put right before: no straight line goes through a leap.
 //! Source: the lower-envelope estimate of one-way delays, Moon, Skelly & Towsley, INFOCOM 1999.
 
+use crate::imu::track::period_s;
 use crate::inputs::{mean_step_in, stretches};
 use crate::median::median;
 use std::fmt::{self, Display, Formatter};
@@ -78,7 +79,7 @@ pub fn dated(log_s: Vec<f64>, stamp_s: Option<Vec<f64>>) -> Dated {
     {
         let mut log_s = log_s.clone();
         let set = put_right(&mut log_s, &mut stamp_s);
-        let back = stamp_s.windows(2).filter(|w| w[1] < w[0]).count();
+        let back = steps_back(&stamp_s);
         let overtaken = back > SET_ANEW;
         let mut ordered = stamp_s.clone();
         if overtaken {
@@ -161,8 +162,7 @@ pub fn mixed(t_s: &[f64], x: &[&[f64]]) -> Vec<Range<usize>> {
 }
 
 fn twice(t_s: &[f64]) -> Vec<Range<usize>> {
-    let steps: Vec<f64> = t_s.windows(2).map(|w| w[1] - w[0]).collect();
-    let Some(usual_s) = median(&mut steps.clone()).filter(|s| *s > 0.0) else {
+    let Some(usual_s) = period_s(t_s) else {
         return Vec::new();
     };
     let dense = |k: usize| t_s[k + AT_ONCE] - t_s[k] < DENSE * AT_ONCE as f64 * usual_s;
@@ -224,7 +224,7 @@ fn put_right(log_s: &mut [f64], stamp_s: &mut [f64]) -> Vec<Set> {
     }
     let mut order: Vec<usize> = (0..n).collect();
     // Where the log was set back its samples come mixed; where the stamps were, they do in the order of the stamps.
-    if stamp_s.windows(2).filter(|w| w[1] < w[0]).count() > SET_ANEW {
+    if steps_back(stamp_s) > SET_ANEW {
         order.sort_by(|a, b| stamp_s[*a].total_cmp(&stamp_s[*b]));
     }
     let late: Vec<f64> = order.iter().map(|k| log_s[*k] - stamp_s[*k]).collect();
@@ -283,6 +283,11 @@ fn put_right(log_s: &mut [f64], stamp_s: &mut [f64]) -> Vec<Set> {
         });
     }
     sets
+}
+
+/// How often times go back.
+fn steps_back(t_s: &[f64]) -> usize {
+    t_s.windows(2).filter(|w| w[1] < w[0]).count()
 }
 
 /// From the earliest to the latest, s.

@@ -721,8 +721,13 @@ mod tests {
     use super::*;
     use crate::write::{RawChannel, RecordingWriter, WriterOptions};
 
-    /// So many channels of one kind, each with the message at each of so many times.
-    fn alike(topics: usize, kind: &RawChannel<'_>, message: &[u8], times: i64) -> Recording {
+    /// So many channels of one kind, each with so many messages.
+    fn alike<'m>(
+        topics: usize,
+        kind: &RawChannel<'_>,
+        message: impl Fn(i64) -> &'m [u8],
+        times: i64,
+    ) -> Recording {
         let path = tempfile::NamedTempFile::new().expect("makes a file");
         let options = WriterOptions::default();
         let mut writer = RecordingWriter::create(path.path(), &options).expect("begins");
@@ -731,7 +736,7 @@ mod tests {
             let id = writer.raw_channel(&RawChannel { topic, ..*kind });
             let id = id.expect("opens");
             for t_ns in 0..times {
-                writer.message(id, t_ns, message).expect("writes");
+                writer.message(id, t_ns, message(t_ns)).expect("writes");
             }
         }
         writer.finish().expect("finishes");
@@ -752,7 +757,7 @@ mod tests {
     fn channels_together_remember_no_more_than_one_may() {
         let line = format!("[{}]", vec!["1"; 64].join(","));
         let message = format!("[{}]", vec![line; 64].join(","));
-        let recording = alike(20, &JSON, message.as_bytes(), 2);
+        let recording = alike(20, &JSON, |_| message.as_bytes(), 2);
         let mut worker = Worker::new(&recording, &|_| true);
         let mut values = 0;
         for block in &recording.container.blocks {
@@ -807,19 +812,8 @@ mod tests {
         };
         // The last field as 1.5; every third one is cut off.
         let given = [&[0x81, 0xfa, 0x01][..], &1.5f64.to_le_bytes()].concat();
-        let path = tempfile::NamedTempFile::new().expect("makes a file");
-        let mut writer =
-            RecordingWriter::create(path.path(), &WriterOptions::default()).expect("begins");
-        for topic in ["/a", "/b"] {
-            let id = writer.raw_channel(&RawChannel { topic, ..kind });
-            let id = id.expect("opens");
-            for k in 0..2250 {
-                let bytes = [&given[..], &[], &given[..5]][k as usize % 3];
-                writer.message(id, k, bytes).expect("writes");
-            }
-        }
-        writer.finish().expect("finishes");
-        let recording = Recording::open(path.path(), &ReadOptions::default()).expect("opens");
+        let kinds = [&given[..], &[], &given[..5]];
+        let recording = alike(2, &kind, |k| kinds[k as usize % 3], 2250);
         let [block] = &recording.container.blocks[..] else {
             panic!("one chunk holds all");
         };
@@ -858,7 +852,7 @@ mod tests {
             schema_data: schema.as_bytes(),
             ..JSON
         };
-        let recording = alike(60, &kind, &[0, 1, 0, 0], 1);
+        let recording = alike(60, &kind, |_| &[0, 1, 0, 0], 1);
         let mut worker = Worker::new(&recording, &|_| true);
         for block in &recording.container.blocks {
             worker.block(block);
