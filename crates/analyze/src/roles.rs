@@ -131,6 +131,9 @@ pub struct RolesFile {
     /// Standard deviation of what is constantly wrong with an accelerometer's axis (m/s²).
     #[serde(default, deserialize_with = "not_negative")]
     pub accel_bias_m_per_s2: Option<f64>,
+    /// Standard deviation of the scale error of a gyroscope's axis (relative).
+    #[serde(default, deserialize_with = "not_negative")]
+    pub gyro_scale_error: Option<f64>,
 }
 
 /// Unit of an angle.
@@ -326,6 +329,8 @@ pub struct Sensors {
     pub accel_age_s: Option<f64>,
     /// Standard deviation of the bias of the load's accelerometer, m/s².
     pub accel_bias_m_per_s2: Option<f64>,
+    /// Standard deviation of the scale error of its gyroscope, relative.
+    pub gyro_scale_error: Option<f64>,
 }
 
 impl Roles {
@@ -424,6 +429,7 @@ impl Roles {
                 gyro_age_s: user.gyro_age_s,
                 accel_age_s: user.accel_age_s,
                 accel_bias_m_per_s2: user.accel_bias_m_per_s2,
+                gyro_scale_error: user.gyro_scale_error,
             };
             for role in Role::ALL {
                 let mut said = user.patterns(role);

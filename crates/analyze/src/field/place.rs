@@ -20,6 +20,8 @@ pub struct Place {
     pub body_from_sensor: Option<UnitQuaternion<f64>>,
     /// Standard deviation of its accelerometer's bias, m/s², where somebody says.
     pub accel_bias_m_per_s2: Option<f64>,
+    /// Standard deviation of its gyroscope's scale error, relative, where somebody says.
+    pub gyro_scale_error: Option<f64>,
 }
 
 impl Place {
@@ -37,6 +39,7 @@ impl Place {
                 .map_or(Mounting::Levelled, Mounting::Known),
             budget: Budget {
                 accel_bias_m_per_s2: said.accel_bias_m_per_s2.or(self.accel_bias_m_per_s2),
+                gyro_scale_error: said.gyro_scale_error.or(self.gyro_scale_error),
                 ..Budget::default()
             },
             ..Settings::default()
@@ -59,7 +62,7 @@ pub fn is_put_together(recording: &Recording) -> bool {
 }
 
 /// Places by topic, from the attachment `scene.toml` (`effects.imu.sensors`: `on`, `name`, `place_m`, `mounting_roll_pitch_yaw_deg`; of all of them
-/// `accel_bias_sd_m_per_s2`).
+/// `accel_bias_sd_m_per_s2`, `scale_error_sd`).
 ///
 /// Empty where there is no such attachment or it cannot be read; sensors then count as levelled and at the centre of mass.
 pub fn places(recording: &Recording) -> HashMap<String, Place> {
@@ -76,8 +79,9 @@ fn from_scene(text: &str) -> HashMap<String, Place> {
     };
     let number = |v: &toml::Value| v.as_float().or_else(|| v.as_integer().map(|i| i as f64));
     let imu = scene.get("effects").and_then(|e| e.get("imu"));
-    let bias = imu.and_then(|i| i.get("accel_bias_sd_m_per_s2"));
-    let accel_bias_m_per_s2 = bias.and_then(number).unwrap_or(0.0);
+    let of_all = |key: &str| imu.and_then(|i| i.get(key)).and_then(number).unwrap_or(0.0);
+    let accel_bias_m_per_s2 = of_all("accel_bias_sd_m_per_s2");
+    let gyro_scale_error = of_all("scale_error_sd");
     let sensors = imu
         .and_then(|i| i.get("sensors"))
         .and_then(|s| s.as_array());
@@ -103,6 +107,7 @@ fn from_scene(text: &str) -> HashMap<String, Place> {
             is_known: true,
             body_from_sensor: Some(UnitQuaternion::from_euler_angles(roll, pitch, yaw)),
             accel_bias_m_per_s2: Some(accel_bias_m_per_s2),
+            gyro_scale_error: Some(gyro_scale_error),
         };
         out.entry(format!("/imu/{name}")).or_insert(place);
     }
@@ -123,18 +128,20 @@ mod tests {
         let settings = |place: Place, said: &Sensors| place.or_as_said(said).lever_is_known;
         let nothing = Sensors::default();
         assert!(settings(found["/imu/rath"], &nothing) && !settings(Place::default(), &nothing));
-        let bias = |text: &str, said: Option<f64>| {
+        let errors = |text: &str, said: Option<f64>| {
             let said = Sensors {
                 accel_bias_m_per_s2: said,
+                gyro_scale_error: said,
                 ..nothing
             };
             let place = from_scene(text).get("/imu/rath").copied();
-            let settings = place.unwrap_or_default().or_as_said(&said);
-            settings.budget.accel_bias_m_per_s2
+            let budget = place.unwrap_or_default().or_as_said(&said).budget;
+            [budget.accel_bias_m_per_s2, budget.gyro_scale_error]
         };
-        let scene = "[effects.imu]\naccel_bias_sd_m_per_s2 = 0.02\n[[effects.imu.sensors]]\n";
-        let biases = [bias(scene, None), bias(scene, Some(0.1)), bias("", None)];
-        assert_eq!(biases, [Some(0.02), Some(0.1), None]);
+        let scene = "[effects.imu]\naccel_bias_sd_m_per_s2 = 0.02\nscale_error_sd = 0.01\n[[effects.imu.sensors]]\n";
+        assert_eq!(errors(scene, None), [Some(0.02), Some(0.01)]);
+        assert_eq!(errors(scene, Some(0.1)), [Some(0.1); 2]);
+        assert_eq!(errors("", None), [None; 2]);
         assert!(from_scene("no toml [").is_empty());
     }
 }

@@ -4,7 +4,7 @@
 //! at the paper's 30 Hz with a random phase; the metric's spread over the draws is its standard error, 1.96 of which are given. Where short holes were
 //! drawn through, what as many holes again would change counts as one more.
 
-use super::budget::UNCALIBRATED_M_PER_S2;
+use super::budget::{Budget, UNCALIBRATED_GYRO_SCALE, UNCALIBRATED_M_PER_S2};
 use super::floating::floating;
 use super::rath::{Motion, Mounting};
 use super::track::Instrument;
@@ -159,16 +159,7 @@ pub fn metrics(motion: &Motion, window: Window) -> Metrics {
             value.datum = Datum::Number(root);
             let ends = tilted(root, ci95, mean_deg, 1.96 * tilt_rad.to_degrees());
             value.ci95 = Some(apart(ends, root, off(name, x)));
-            if matches!(motion.settings.mounting, Mounting::Known(_)) {
-                if motion.settings.budget.accel_bias_m_per_s2.is_none() {
-                    value.reason = Some(format!(
-                        "as if nobody had calibrated the accelerometer (a bias of {:.2} m/s², SD); accel_bias_m_per_s2 in a roles file says otherwise",
-                        accel_bias_m_per_s2(motion)
-                    ));
-                }
-            } else {
-                value.reason = Some("about its mean over the window: how the sensor sits cannot be told from how the load leans; give imu_mounting_roll_pitch_yaw_deg in a roles file".into());
-            }
+            value.reason = uncalibrated(motion);
             continue;
         }
         if *name == "roll_excess_s" {
@@ -337,6 +328,32 @@ fn accel_bias_m_per_s2(motion: &Motion) -> f64 {
     let seen = motion.gravity_off_m_per_s2.abs();
     let said = motion.settings.budget.accel_bias_m_per_s2;
     said.unwrap_or(UNCALIBRATED_M_PER_S2.max(seen))
+}
+
+/// Relative standard deviation of angles: of the gyroscope's scale, as said or of one that nobody calibrated, and of the method.
+fn angle_scale(budget: &Budget) -> f64 {
+    let said = budget.gyro_scale_error;
+    budget
+        .angle_scale
+        .hypot(said.unwrap_or(UNCALIBRATED_GYRO_SCALE))
+}
+
+/// What nobody said of the sensor, and what was taken for it.
+fn uncalibrated(motion: &Motion) -> Option<String> {
+    let budget = &motion.settings.budget;
+    let mounting = match motion.settings.mounting {
+        Mounting::Levelled => Some("about its mean over the window: how the sensor sits cannot be told from how the load leans; give imu_mounting_roll_pitch_yaw_deg in a roles file".into()),
+        Mounting::Known(_) => budget.accel_bias_m_per_s2.is_none().then(|| format!(
+            "as if nobody had calibrated the accelerometer (a bias of {:.2} m/s², SD); accel_bias_m_per_s2 in a roles file says otherwise",
+            accel_bias_m_per_s2(motion)
+        )),
+    };
+    let scale = budget.gyro_scale_error.is_none().then(|| format!(
+        "as if nobody had calibrated the gyroscope (a scale off by {} %, SD); gyro_scale_error in a roles file says otherwise",
+        100.0 * UNCALIBRATED_GYRO_SCALE
+    ));
+    let both: Vec<String> = mounting.into_iter().chain(scale).collect();
+    (!both.is_empty()).then(|| both.join("; "))
 }
 
 /// By how much such a bias tilts up for good, rad (one standard deviation).
@@ -601,7 +618,7 @@ fn varied(motion: &Motion, window: Window, draw: u64, tilt_rad: f64) -> Inputs {
     let mut angle = |x: &[f64], random: &mut Random| -> Vec<f64> {
         let (offset, scale) = (
             budget.tilt_offset_rad * random.normal() + tilt_rad * tilt.normal(),
-            1.0 + budget.angle_scale * random.normal(),
+            1.0 + angle_scale(budget) * random.normal(),
         );
         let wander = random.wander(t_s.len(), step_s, budget.tilt_wander_rad, WANDER_S);
         let walk_rad = budget.tilt_walk_rad_per_sqrt_s;

@@ -39,6 +39,7 @@ fn felt(
         gravity_m_per_s2: G,
         budget: Budget {
             accel_bias_m_per_s2: told,
+            gyro_scale_error: told.map(|_| 0.0),
             ..Budget::default()
         },
         ..Settings::default()
@@ -74,6 +75,31 @@ fn a_bias_is_in_the_intervals_of_a_known_mounting() {
         high - low
     };
     assert!(width(AS_IT_SITS, Some(0.0)) < 0.2 && width(Mounting::Levelled, None) < 0.2);
+}
+
+/// A gyroscope's scale that is 1.8 standard deviations off is in the interval, of one that somebody told of and of one that nobody did.
+#[test]
+fn a_gyroscopes_scale_is_in_the_interval_of_the_roll() {
+    let roll = |t: f64| 0.3 * (TAU * 1.07 * t).sin();
+    let truth = 0.3f64.to_degrees() / 2f64.sqrt();
+    for (sd, told) in [(0.0, Some(0.0)), (0.02, Some(0.02)), (0.005, None)] {
+        for off in [-1.8 * sd, 1.8 * sd] {
+            let mut found = felt(roll, |_| 1.0, 1.0 + off, [0.0; 3], AS_IT_SITS, Some(0.0));
+            found.settings.budget.gyro_scale_error = told;
+            let found = metrics(&found, MOST);
+            let value = found.get("rms_roll_deg").unwrap();
+            let [low, high] = value.ci95.unwrap();
+            assert!((low..=high).contains(&truth), "{sd}: {low} {truth} {high}");
+            let half = 0.5 * (high - low) / 1.96 / truth;
+            let by_hand = sd.hypot(0.003);
+            assert!(
+                (half / by_hand - 1.0).abs() < 0.3,
+                "{half}, by hand {by_hand}"
+            );
+            let said = value.reason.as_deref().unwrap_or("");
+            assert_eq!(said.contains("gyro_scale_error"), told.is_none(), "{said}");
+        }
+    }
 }
 
 /// A constant angle seen with one that is off at random: what is stated holds it 95 times in a hundred.
@@ -178,6 +204,7 @@ fn an_onset_that_others_would_not_find_is_said_to_be_doubtful() {
 
 const SURE: Budget = Budget {
     accel_bias_m_per_s2: Some(0.0),
+    gyro_scale_error: Some(0.0),
     tilt_offset_rad: 0.0,
     tilt_wander_rad: 0.0,
     tilt_walk_rad_per_sqrt_s: 0.0,
