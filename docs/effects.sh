@@ -10,7 +10,7 @@ set -eu
 WHAT=${1:-all}
 TARGET=${CARGO_TARGET_DIR:-target}
 ON_IN_MUSIC="frequency_spread music noise gait lift contact sling pole_friction"
-OFF_IN_MUSIC="coupling hold friction feedback measured flexure imu drum"
+OFF_IN_MUSIC="coupling hold friction feedback measured flexure push imu drum"
 
 cargo build --quiet --release -p sim --bin sim --example cost
 COST=$TARGET/release/examples/cost
@@ -38,7 +38,7 @@ costs() {
     still=$(count "$COST" music $fixed effects.lift=false)
     echo "gait | $(((still - $(count "$COST" music $fixed effects.lift=false effects.gait=false)) / calls))"
     for e in coupling.strength_rad_per_s=0.0 hold.stiffness_n_per_m=0.0 friction.coefficient=0.5 feedback.strength_rad_per_s=0.0 \
-        path.turn_deg=1.0 flexure.frequency_hz=20.0 imu.rate_hz=200.0 drum.level=0.5; do
+        path.turn_deg=1.0 flexure.frequency_hz=20.0 push.pushes=[{start_s=2.0}] imu.rate_hz=200.0 drum.level=0.5; do
         echo "${e%%.*} | $((($(count "$COST" music $fixed effects.$e) - base) / calls))"
     done
     bare=$(count "$COST" music $fixed effects.sling=false)

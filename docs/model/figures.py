@@ -241,6 +241,30 @@ def flexure(axis):
     axis.set(xlabel="time (s)", ylabel="height (m)")
 
 
+def push(axis):
+    text = "duration_s = 3.0\nlog_rate_hz = 200.0\n[body]\nmass_kg = 60.0\n[start]\nheight_m = 50.0\n[effects.push]\npushes = [{ start_s = 1.0, time_s = 0.5 }]\n"
+    t, v = state(text, of=lambda m: m.velocity_m_per_s.y)
+    u = np.clip((t - 1) / 0.5, 0, 1)
+    axis.plot(t, v, color=BLUE, lw=2, label="200 N on 60 kg, half a second")
+    axis.plot(t, 200 * 0.5 / 60 * (u / 2 - np.sin(TAU * u) / (4 * np.pi)), color=RED, lw=0.8, label="$F_0$T/M (u/2 − sin 2πu / 4π)")
+    axis.set(xlabel="time (s)", ylabel="sideways (m/s)")
+
+
+def pushed_in_baseline(axis):
+    pushes = "effects.push.pushes=[{start_s=20.0, time_s=0.3, force_n=[0.0, 40.0, 0.0], place_m=[0.0, 0.0, -0.3]}]"
+    t, roll = state("baseline", pushes, of=lambda m: m.roll_rad)
+    axis.plot(t, np.degrees(roll), color=BLUE, lw=1, label="pushed at 20 s")
+    axis.set(xlabel="time (s)", ylabel="roll (°)", xlim=(15, 30))
+
+
+def pushed_in_music(axis):
+    pushes = "effects.push.pushes=[{start_s=8.0, time_s=0.3, force_n=[0.0, 40.0, 0.0], place_m=[0.0, 0.0, -0.3]}]"
+    for label, colour, settings in (("music", GREY, []), ("pushed at 8 s", BLUE, [pushes])):
+        t, roll = state("music", *settings, of=lambda m: m.roll_rad)
+        axis.semilogy(t, np.degrees(np.abs(roll)), color=colour, lw=0.8, label=label)
+    axis.set(xlabel="time (s)", ylabel="|roll| (°)", xlim=(5, 40), ylim=(1e-2, 60))
+
+
 def allan(x, rate, sizes):
     """Overlapping Allan deviation (IEEE Std 952-1997, annex C)."""
     total = np.concatenate(([0.0], np.cumsum(x))) / rate
@@ -289,4 +313,5 @@ def drum(axis):
 sheet(2, 3, "phases", [frequency_spread, coupling, music, noise, feedback])
 sheet(1, 3, "shoulders", [gait, lift, path])
 sheet(2, 3, "handles", [contact, hold, sling, friction, pole_friction, flexure])
+sheet(1, 3, "push", [push, pushed_in_baseline, pushed_in_music])
 sheet(1, 3, "instruments", [imu_noise, imu, drum])

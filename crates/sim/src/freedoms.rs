@@ -96,8 +96,8 @@ pub trait Freedoms: FreedomsOnEight + Send + Sync {
     fn gaps(&self, y: &[f64], w: &mut Workspace);
     /// The same for the handles of a block alone.
     fn gaps_of(&self, y: &[f64], w: &mut Workspace, block: Block);
-    /// Fills `rotation` of the workspace where [`Self::gaps`] did not.
-    fn orient(&self, _y: &[f64], _w: &mut Workspace) {}
+    /// Fills `velocity` of the workspace, and `rotation` where [`Self::gaps`] did not.
+    fn orient(&self, y: &[f64], w: &mut Workspace);
     /// Writes the derivatives of the body's states from the forces in the workspace.
     fn accelerate(&self, y: &[f64], w: &mut Workspace, dy: &mut [f64]);
     /// Which of the positions are angles or a quaternion.
@@ -133,7 +133,7 @@ pub(crate) trait Coordinates: Send + Sync {
     /// As [`Freedoms::gaps`], of some of the handles.
     fn gaps_at<N: Moments>(&self, y: &[N::Each], w: &mut Workspace<N>, part: impl Part);
     /// As [`Freedoms::orient`].
-    fn orient_at<N: Moments>(&self, _y: &[N::Each], _w: &mut Workspace<N>) {}
+    fn orient_at<N: Moments>(&self, y: &[N::Each], w: &mut Workspace<N>);
     /// As [`Freedoms::accelerate`].
     fn rates_at<N: Moments>(&self, y: &[N::Each], w: &Workspace<N>, dy: &mut [N::Each]);
 }
@@ -161,6 +161,7 @@ pub trait FreedomsOnEight {
     fn orient_slopes(&self, y: &[Slope], w: &mut Workspace<Slopes>);
     fn rates_slopes(&self, y: &[Slope], w: &Workspace<Slopes>, dy: &mut [Slope]);
     fn gaps_plain(&self, y: &[Plain8], w: &mut Workspace<Eight<Plain8>>);
+    fn orient_plain(&self, y: &[Plain8], w: &mut Workspace<Eight<Plain8>>);
     fn rates_plain(&self, y: &[Plain8], w: &Workspace<Eight<Plain8>>, dy: &mut [Plain8]);
     /// # Safety
     /// The processor has AVX2 and FMA.
@@ -171,12 +172,22 @@ pub trait FreedomsOnEight {
     /// The processor has AVX2 and FMA.
     #[cfg(target_arch = "x86_64")]
     #[allow(unsafe_code)]
+    unsafe fn orient_avx2(&self, y: &[Avx2], w: &mut Workspace<Eight<Avx2>>);
+    /// # Safety
+    /// The processor has AVX2 and FMA.
+    #[cfg(target_arch = "x86_64")]
+    #[allow(unsafe_code)]
     unsafe fn rates_avx2(&self, y: &[Avx2], w: &Workspace<Eight<Avx2>>, dy: &mut [Avx2]);
     /// # Safety
     /// The processor has AVX-512 F and DQ.
     #[cfg(target_arch = "x86_64")]
     #[allow(unsafe_code)]
     unsafe fn gaps_avx512(&self, y: &[Avx512], w: &mut Workspace<Eight<Avx512>>);
+    /// # Safety
+    /// The processor has AVX-512 F and DQ.
+    #[cfg(target_arch = "x86_64")]
+    #[allow(unsafe_code)]
+    unsafe fn orient_avx512(&self, y: &[Avx512], w: &mut Workspace<Eight<Avx512>>);
     /// # Safety
     /// The processor has AVX-512 F and DQ.
     #[cfg(target_arch = "x86_64")]
@@ -215,6 +226,9 @@ impl<T: Coordinates> FreedomsOnEight for T {
     fn gaps_plain(&self, y: &[Plain8], w: &mut Workspace<Eight<Plain8>>) {
         self.gaps_at(y, w, All);
     }
+    fn orient_plain(&self, y: &[Plain8], w: &mut Workspace<Eight<Plain8>>) {
+        self.orient_at(y, w);
+    }
     fn rates_plain(&self, y: &[Plain8], w: &Workspace<Eight<Plain8>>, dy: &mut [Plain8]) {
         self.rates_at(y, w, dy);
     }
@@ -227,6 +241,12 @@ impl<T: Coordinates> FreedomsOnEight for T {
     #[cfg(target_arch = "x86_64")]
     #[target_feature(enable = "avx2,fma")]
     #[allow(unsafe_code)]
+    unsafe fn orient_avx2(&self, y: &[Avx2], w: &mut Workspace<Eight<Avx2>>) {
+        self.orient_at(y, w);
+    }
+    #[cfg(target_arch = "x86_64")]
+    #[target_feature(enable = "avx2,fma")]
+    #[allow(unsafe_code)]
     unsafe fn rates_avx2(&self, y: &[Avx2], w: &Workspace<Eight<Avx2>>, dy: &mut [Avx2]) {
         self.rates_at(y, w, dy);
     }
@@ -235,6 +255,12 @@ impl<T: Coordinates> FreedomsOnEight for T {
     #[allow(unsafe_code)]
     unsafe fn gaps_avx512(&self, y: &[Avx512], w: &mut Workspace<Eight<Avx512>>) {
         self.gaps_at(y, w, All);
+    }
+    #[cfg(target_arch = "x86_64")]
+    #[target_feature(enable = "avx512f,avx512dq")]
+    #[allow(unsafe_code)]
+    unsafe fn orient_avx512(&self, y: &[Avx512], w: &mut Workspace<Eight<Avx512>>) {
+        self.orient_at(y, w);
     }
     #[cfg(target_arch = "x86_64")]
     #[target_feature(enable = "avx512f,avx512dq")]
@@ -330,6 +356,11 @@ impl Coordinates for Six {
     }
 
     #[inline(always)]
+    fn orient_at<N: Moments>(&self, y: &[N::Each], w: &mut Workspace<N>) {
+        w.velocity = [y[7], y[8], y[9]];
+    }
+
+    #[inline(always)]
     fn rates_at<N: Moments>(&self, y: &[N::Each], w: &Workspace<N>, dy: &mut [N::Each]) {
         let y: &[N::Each; 13] = y.first_chunk().expect("thirteen states");
         let dy: &mut [N::Each; 13] = dy.first_chunk_mut().expect("thirteen states");
@@ -349,8 +380,7 @@ impl Coordinates for Six {
         let [qx, qy, qz, qw] = turn([y[3], y[4], y[5], y[6]], w.spin);
         dy[..7].copy_from_slice(&[y[7], y[8], y[9], qx, qy, qz, qw]);
         for a in 0..3 {
-            let gravity = N::Each::splat(self.gravity[a]);
-            dy[7 + a] = force[a].madd(N::Each::splat(self.inverse_mass), gravity);
+            dy[7 + a] = force[a].madd(N::Each::splat(self.inverse_mass), w.free_fall[a]);
             dy[10 + a] = angular[a];
         }
     }
@@ -598,6 +628,10 @@ impl Freedoms for Six {
 
     fn gaps_of(&self, y: &[f64], w: &mut Workspace, block: Block) {
         self.gaps_at(y, w, block);
+    }
+
+    fn orient(&self, y: &[f64], w: &mut Workspace) {
+        self.orient_at(y, w);
     }
 
     fn accelerate(&self, y: &[f64], w: &mut Workspace, dy: &mut [f64]) {

@@ -100,6 +100,8 @@ pub struct Model {
     has_phases: bool,
     /// Whether anything looks at the carriers or acts on the handles.
     carried: bool,
+    /// Whether an effect asks where the body is and how it moves.
+    looks_at_body: bool,
     terms: Staged<Box<dyn Term>>,
     /// Whose each term is, in the same order.
     owners: Staged<&'static str>,
@@ -168,6 +170,7 @@ impl Model {
                 .collect(),
             has_phases: false,
             carried: true,
+            looks_at_body: false,
             terms: Default::default(),
             owners: Default::default(),
             building: "",
@@ -222,11 +225,12 @@ impl Model {
         model.layout.ledger = 2 * model.accounts.len();
         model.carried =
             model.has_phases || !model.accounts.is_empty() || model.terms.all().next().is_some();
-        // What bends a pole or moves the party is not the affair of one pair.
+        // What bends a pole, moves the party or looks at the body is not the affair of one pair.
         let stage = |stage: Stage| model.terms.of(stage).iter();
         model.in_blocks = model.carried
             && pairs(n) > BLOCK
-            && stage(Stage::Party).chain(stage(Stage::Bends)).count() == 0
+            && !model.looks_at_body
+            && stage(Stage::Party).count() == 0
             && stage(Stage::Shoulders)
                 .chain(stage(Stage::Handles))
                 .all(|term| term.on_block().is_some());
@@ -438,6 +442,9 @@ impl Model {
             spin: [0.0; 3],
             least_load_n: 0.0,
             beat: [0.0; 2],
+            free_fall: self.body.gravity_m_per_s2.into(),
+            t_s: 0.0,
+            velocity: [0.0; 3],
             body_torque: [0.0; 3],
             extra: self.extra.iter().map(|(_, first)| *first).collect(),
             extra_rate: vec![0.0; self.extra.len()].into(),

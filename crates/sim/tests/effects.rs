@@ -248,6 +248,89 @@ fn val_flexure_at_rest_carries_the_load() {
     }
 }
 
+/// A push at the centre of mass gives the impulse F₀T/2 and, by its end, the way F₀T²/(4M); two that overlap add up.
+#[test]
+fn val_a_push_gives_its_impulse() {
+    let [mass, force, time] = [50.0, 120.0, 0.7];
+    let s = scene(&format!(
+        r#"
+        name = "pushed"
+        duration_s = 4.0
+        log_rate_hz = 10.0
+        [body]
+        mass_kg = {mass:?}
+        [start]
+        height_m = 100.0
+        [effects.push]
+        pushes = [
+            {{ start_s = 1.0, time_s = {time:?}, force_n = [0.0, {force:?}, 0.0] }},
+            {{ start_s = 1.2, time_s = 0.2, force_n = [{force:?}, 0.0, 0.0] }},
+        ]
+        "#
+    ));
+    let all = samples(&s);
+    let at = |t: f64| &all[(10.0 * t).round() as usize];
+    assert_eq!(at(1.0).pose.position_m[..2], [0.0; 2]);
+    let near = |found: f64, expected: f64| {
+        assert!((found - expected).abs() < 1e-9, "{found} {expected}");
+    };
+    near(
+        at(1.7).pose.position_m[1],
+        force * time * time / (4.0 * mass),
+    );
+    for t in [1.7, 4.0] {
+        near(at(t).pose.velocity_m_per_s[1], force * time / (2.0 * mass));
+        near(at(t).pose.velocity_m_per_s[0], force * 0.2 / (2.0 * mass));
+    }
+    // It fell as ever.
+    near(at(4.0).pose.position_m[2], 100.0 - 0.5 * 9.81 * 16.0);
+}
+
+/// Off the centre it turns the body too: what it worked is in the motion, of a free body and of one that is carried.
+#[test]
+fn val_the_work_of_a_push_is_in_the_motion() {
+    let push = "[effects.push]\npushes = [{ start_s = 1.0, time_s = 0.5, force_n = [40.0, 300.0, -60.0], place_m = [1.2, 0.1, 0.4] }]";
+    for (more, carried) in [
+        ("[start]\nheight_m = 100.0\n", false),
+        ("[effects.contact]\n[effects.sling]\n", true),
+    ] {
+        let text = format!("name = \"pushed\"\nduration_s = 5.0\n{more}{push}");
+        let all = samples(&scene(&text));
+        let last = all.last().unwrap();
+        let turned = last.pose.spin_rad_per_s;
+        assert!(
+            carried || turned.iter().all(|w| w.abs() > 0.01),
+            "{turned:?}"
+        );
+        let swing = all
+            .iter()
+            .map(|s| s.pose.roll_rad().abs())
+            .fold(0.0, f64::max);
+        assert!(swing > 0.01, "{swing}");
+        // Eight moments at once and one after the other.
+        let by_another = samples(&scene(&format!(
+            "{text}\n[solver]\nmethod = \"dop853\"\ntolerance = 1e-9"
+        )));
+        let other = by_another.last().unwrap().pose.orientation;
+        for (a, b) in last.pose.orientation.into_iter().zip(other) {
+            assert!((a - b).abs() < 1e-6, "{a} {b}");
+        }
+        for s in &all {
+            let energy = s.energy.unwrap();
+            assert!(
+                energy.unexplained_j.abs() < 1e-6,
+                "{:e}",
+                energy.unexplained_j
+            );
+            assert!(
+                s.t_s < 1.5 || energy.work_in_j > 1.0,
+                "{:e}",
+                energy.work_in_j
+            );
+        }
+    }
+}
+
 /// A party that turns on level ground leads the body round: it ends up turned by Δχ, and on the arc it feels v²/r.
 #[test]
 fn val_a_turn_takes_the_body_round() {

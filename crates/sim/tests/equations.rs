@@ -456,7 +456,17 @@ fn check(text: &str, t_s: f64) {
     let spin = axial(turn.transpose() * slope(|s| state.after(s).rotation()));
     let push: Vector3<f64> = handles.iter().map(force).sum();
     let mut torque: Vector3<f64> = handles.iter().map(|h| h.arm.cross(&force(h))).sum();
-    torque = turn.transpose() * torque;
+    // Who pushes takes hold at a point of the body: half of one minus a cosine.
+    let mut pushed = [Vector3::zeros(); 2];
+    for p in e.push.iter().flat_map(|e| &e.pushes) {
+        let u = (t_s - p.start_s) / p.time_s;
+        if (0.0..1.0).contains(&u) {
+            let pulse = Vector3::from(p.force_n) * (0.5 - 0.5 * (TAU * u).cos());
+            let arm = turn * Vector3::from(p.place_m);
+            pushed = [pushed[0] + pulse, pushed[1] + arm.cross(&pulse)];
+        }
+    }
+    torque = turn.transpose() * (torque + pushed[1]);
     let mut rubbed_w = 0.0;
     if let Some(f) = &e.pole_friction {
         let load_n: f64 = handles.iter().map(|h| h.normal_n.abs()).sum();
@@ -470,7 +480,7 @@ fn check(text: &str, t_s: f64) {
     for a in 0..3 {
         if let Some(found) = rate_of(MOVES[a][1]) {
             let free = scene.freedom.contains(&Freedom::ALL[a]);
-            let expected = push[a] / body.mass_kg + state.gravity()[a];
+            let expected = (push[a] + pushed[0][a]) / body.mass_kg + state.gravity()[a];
             near(MOVES[a][1], found, if free { expected } else { 0.0 });
         }
     }
@@ -523,6 +533,7 @@ fn check(text: &str, t_s: f64) {
         near("velocity", pose.velocity_m_per_s[a], state.of(MOVES[a][1]));
     }
     let velocity = Vector3::from_fn(|a, _| state.of(MOVES[a][1]));
+    let pushed_w = pushed[0].dot(&velocity) + pushed[1].dot(&(turn * spin));
     let kinetic_j = 0.5 * (body.mass_kg * velocity.norm_squared() + spin.dot(&(inertia * spin)));
     let fall_j = -body.mass_kg * state.gravity().dot(&state.centre());
     for (found, expected) in model
@@ -632,6 +643,7 @@ fn check(text: &str, t_s: f64) {
             "hold" | "sling" | "friction" => [side_work_w, side_lost_w],
             "pole_friction" => [0.0, rubbed_w],
             "flexure" => [0.0, bent_w],
+            "push" => [pushed_w, 0.0],
             other => panic!("nothing is known of {other}"),
         };
         for (what, expected) in [("work_j", work_w), ("dissipated_j", lost_w)] {
@@ -669,6 +681,11 @@ const TURN: &str = "[effects.path]\nslope_deg = 7.0\nbank_deg = -4.0\nturn_deg =
 const BENDS: &str =
     "[effects.flexure]\nfrequency_hz = 6.0\ndamping_ratio = 0.05\nmodal_mass_kg = 7.0\n";
 
+/// Two at once, one that is over and one that is still to come.
+const PUSH: &str = "[[effects.push.pushes]]\nstart_s = 0.6\ntime_s = 1.5\nforce_n = [30.0, 120.0, -50.0]\nplace_m = [0.5, 0.1, 0.4]\n\
+    [[effects.push.pushes]]\nstart_s = 0.5\ntime_s = 3.0\nforce_n = [-10.0, 20.0, 90.0]\nplace_m = [-1.0, 0.2, 0.0]\n\
+    [[effects.push.pushes]]\nstart_s = 0.1\ntime_s = 0.2\n[[effects.push.pushes]]\nstart_s = 5.0\ntime_s = 0.2\n";
+
 #[test]
 fn every_rate_is_that_of_the_equations() {
     let rubs = "[effects.pole_friction]\narm_m = 0.004\nregularising_rate_rad_per_s = 0.5\n";
@@ -693,6 +710,7 @@ fn every_rate_is_that_of_the_equations() {
                 &format!("{FIVE}{law}{side}{GAIT}{rubs}{TURN}{BENDS}{feels}"),
                 1.7,
             );
+            check(&format!("{FIVE}{law}{side}{GAIT}{rubs}{PUSH}"), 1.7);
         }
     }
     for exponent in ["1.0", "1.5"] {
@@ -760,7 +778,7 @@ fn every_choice_of_freedoms_obeys_the_same_equations() {
             .collect();
         let rubs = "[effects.pole_friction]\narm_m = 0.02\n";
         let free = format!("freedom = [{}]\n", free.join(", "));
-        for bends in ["", BENDS] {
+        for bends in ["", BENDS, PUSH] {
             check(
                 &format!("{free}{FIVE}{CONTACT}{HOLD}{GAIT}{rubs}{bends}"),
                 0.7,

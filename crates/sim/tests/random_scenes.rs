@@ -205,6 +205,16 @@ fn valid(seed: u64) -> String {
     if d.chance(0.3) {
         t += "[effects.imu]\nsensors = [{ on = \"rath\", place_m = [0.3, 0.1, 0.2] }, { on = \"carrier_1\", clock_drift_ppm = 30.0 }]\n";
     }
+    if d.chance(0.3) {
+        t += &format!(
+            "[effects.push]\npushes = [{{ start_s = {:?}, time_s = {:?}, force_n = [{:?}, {:?}, {:?}], place_m = [0.3, 0.1, 0.2] }}]\n",
+            d.from(0.0, 2.0),
+            d.from(0.01, 2.0),
+            d.from(-300.0, 300.0),
+            d.from(-300.0, 300.0),
+            d.from(-300.0, 300.0)
+        );
+    }
     t
 }
 

@@ -85,6 +85,7 @@ impl Flexure {
             });
         }
         model.set_bends(bends);
+        model.look_at_body();
         let law = Bending {
             poles,
             mass: self.modal_mass_kg,

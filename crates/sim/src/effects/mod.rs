@@ -1,7 +1,7 @@
 //! The effects a scene can call for: one file each, and one line each in [`TABLE`].
 //!
 //! An effect's `build` adds terms to a [`Model`]: to the phase rates, to the motion of the shoulders, to the forces at
-//! the handles, to the torque on the body; moments at which the right-hand side jumps; states; an account of energy.
+//! the handles, to the fall of the body and the torque on it; moments at which the right-hand side jumps; states; an account of energy.
 //! An effect that the scene does not name adds nothing, so it has no branch, no state and no cost.
 
 pub mod contact;
@@ -20,6 +20,7 @@ pub mod music;
 pub mod noise;
 pub mod path;
 pub mod pole_friction;
+pub mod push;
 pub mod sling;
 
 use crate::model::Model;
@@ -47,6 +48,7 @@ pub struct Effects {
     pub measured: Option<measured::Measured>,
     pub path: Option<path::Path>,
     pub flexure: Option<flexure::Flexure>,
+    pub push: Option<push::Push>,
     pub imu: Option<imu::Imu>,
     pub drum: Option<drum::Drum>,
 }
@@ -173,6 +175,14 @@ pub const TABLE: &[Entry] = &[
         "poles bend: their first mode",
         // A grip bends them too, as long as nothing limits it by the load.
         |e: &Effects| without_contact(e).filter(|_| e.hold.is_none() || e.friction.is_some())
+    ),
+    entry!(
+        push,
+        "somebody beside the party pushes the load",
+        |e: &Effects| {
+            let nobody = e.push.as_ref().filter(|p| p.pushes.is_empty());
+            nobody.map(|_| "`effects.push.pushes` is empty")
+        }
     ),
     entry!(imu, "virtual inertial sensors on body and carriers"),
     entry!(drum, "the sound of the drum, as a microphone hears it"),

@@ -92,6 +92,7 @@ impl<const AXIS: usize> Turning for Hinge<AXIS> {
         place_handles(&mut w.pair, &self.handles, part, motion, &swung);
     }
 
+    #[inline(always)]
     fn orient<N: Moments>(&self, y: &[N::Each], w: &mut Workspace<N>) {
         let number = N::Each::splat;
         let upright = (number(0.0), number(1.0));

@@ -33,6 +33,10 @@ impl Coordinates for Pinned {
         self.six.gaps_at(y, w, part);
     }
     #[inline(always)]
+    fn orient_at<N: Moments>(&self, y: &[N::Each], w: &mut Workspace<N>) {
+        self.six.orient_at(y, w);
+    }
+    #[inline(always)]
     fn rates_at<N: Moments>(&self, y: &[N::Each], w: &Workspace<N>, dy: &mut [N::Each]) {
         self.six.rates_at(y, w, dy);
         for (dy, free) in dy[7..10].iter_mut().zip(self.free) {
@@ -62,6 +66,9 @@ impl Freedoms for Pinned {
     }
     fn gaps_of(&self, y: &[f64], w: &mut Workspace, block: Block) {
         self.six.gaps_of(y, w, block);
+    }
+    fn orient(&self, y: &[f64], w: &mut Workspace) {
+        self.six.orient(y, w);
     }
     fn accelerate(&self, y: &[f64], w: &mut Workspace, dy: &mut [f64]) {
         self.rates_at(y, w, dy);

@@ -175,7 +175,9 @@ impl<T: Turning> Coordinates for Reduced<T> {
         self.turning.gaps(rails, y, motion, w, part);
     }
 
+    #[inline(always)]
     fn orient_at<N: Moments>(&self, y: &[N::Each], w: &mut Workspace<N>) {
+        w.velocity = [0, 1, 2].map(|c| self.rails.rate(c, y));
         self.turning.orient(y, w);
     }
 
@@ -191,7 +193,7 @@ impl<T: Turning> Coordinates for Reduced<T> {
         }
         for c in 0..3 {
             if let Some(p) = rails.place[c] {
-                dy[n + p] = force[c] * rails.inverse_mass + rails.gravity[c];
+                dy[n + p] = force[c] * rails.inverse_mass + w.free_fall[c];
             }
         }
         self.turning.accelerate(rails, torque, y, w, dy);

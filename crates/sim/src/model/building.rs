@@ -20,6 +20,11 @@ impl Model {
         first
     }
 
+    /// Asks for [`Workspace::rotation`], [`Workspace::velocity`] and [`Workspace::t_s`] from [`Stage::Bends`] on.
+    pub(crate) fn look_at_body(&mut self) {
+        self.looks_at_body = true;
+    }
+
     /// Gives gravity another direction, m/s².
     pub(crate) fn lean(&mut self, gravity_m_per_s2: [f64; 3]) {
         self.body.gravity_m_per_s2 = gravity_m_per_s2.into();

@@ -16,6 +16,8 @@ pub trait Registers: Wide {
     fn apply(term: &dyn OnEight, t_s: Self, w: &mut Workspace<Eight<Self>>);
     /// Places the handles.
     fn gaps(freedoms: &dyn FreedomsOnEight, y: &[Self], w: &mut Workspace<Eight<Self>>);
+    /// Says where the body is and how it moves.
+    fn orient(freedoms: &dyn FreedomsOnEight, y: &[Self], w: &mut Workspace<Eight<Self>>);
     /// Writes the rates of the body's states.
     fn rates(
         freedoms: &dyn FreedomsOnEight,
@@ -28,7 +30,7 @@ pub trait Registers: Wide {
 }
 
 macro_rules! registers {
-    ($type:ident, $apply:ident, $gaps:ident, $rates:ident) => {
+    ($type:ident, $apply:ident, $gaps:ident, $orient:ident, $rates:ident) => {
         // SAFETY: numbers of these types exist only where the processor has the features (see `Registers::apply`).
         #[allow(unsafe_code, unused_unsafe)]
         impl Registers for $type {
@@ -39,6 +41,10 @@ macro_rules! registers {
             #[inline(always)]
             fn gaps(freedoms: &dyn FreedomsOnEight, y: &[Self], w: &mut Workspace<Eight<Self>>) {
                 unsafe { freedoms.$gaps(y, w) }
+            }
+            #[inline(always)]
+            fn orient(freedoms: &dyn FreedomsOnEight, y: &[Self], w: &mut Workspace<Eight<Self>>) {
+                unsafe { freedoms.$orient(y, w) }
             }
             #[inline(always)]
             fn rates(
@@ -56,11 +62,11 @@ macro_rules! registers {
         }
     };
 }
-registers!(Plain8, plain, gaps_plain, rates_plain);
+registers!(Plain8, plain, gaps_plain, orient_plain, rates_plain);
 #[cfg(target_arch = "x86_64")]
-registers!(Avx2, avx2, gaps_avx2, rates_avx2);
+registers!(Avx2, avx2, gaps_avx2, orient_avx2, rates_avx2);
 #[cfg(target_arch = "x86_64")]
-registers!(Avx512, avx512, gaps_avx512, rates_avx512);
+registers!(Avx512, avx512, gaps_avx512, orient_avx512, rates_avx512);
 
 impl Model {
     /// Whether the right-hand side can be evaluated at eight moments side by side: few carriers, and nothing that moves them after their phases
@@ -81,6 +87,7 @@ impl Model {
         SideBySide {
             layout: &self.layout,
             freedoms: &*self.freedoms,
+            look: (self.looks_at_body).then(|| self.body.gravity_m_per_s2.into()),
             terms: self.terms.map(|t| t.on_eight()),
             accounts: self.accounts.iter().map(|(_, a)| a.on_eight()).collect(),
         }
@@ -91,6 +98,8 @@ impl Model {
 pub(crate) struct SideBySide<'m> {
     pub layout: &'m Layout,
     freedoms: &'m dyn FreedomsOnEight,
+    /// Gravity, m/s², where an effect looks at the body.
+    look: Option<[f64; 3]>,
     terms: Staged<&'m dyn OnEight>,
     accounts: Vec<&'m dyn PowerOnEight>,
 }
@@ -163,6 +172,11 @@ impl SideBySide<'_> {
     pub fn load<E: Registers>(&self, octets: &mut [Octet<'_, E>]) {
         for at in octets.iter_mut() {
             E::gaps(self.freedoms, at.y, at.w);
+            if let Some(gravity) = self.look {
+                E::orient(self.freedoms, at.y, at.w);
+                at.w.t_s = at.t_s;
+                at.w.free_fall = gravity.map(E::splat);
+            }
             at.w.body_torque = [E::splat(0.0); 3];
         }
         Self::apply(self.terms.with(Stage::Handles), octets);

@@ -197,14 +197,21 @@ impl Model {
             self.party(t_s, w);
         }
         self.place::<FUSED>(y, w);
-        let bends = self.terms.with(Stage::Bends);
-        if !bends.is_empty() {
-            self.freedoms.orient(y, w);
-            for term in bends {
-                term.apply(t_s, w);
-            }
+        if self.looks_at_body {
+            self.look(t_s, y, w);
         }
         Self::apply::<FUSED>(self.terms.with(Stage::Handles), t_s, w);
+    }
+
+    /// What few effects ask for.
+    #[cold]
+    fn look(&self, t_s: f64, y: &[f64], w: &mut Workspace) {
+        self.freedoms.orient(y, w);
+        w.t_s = t_s;
+        w.free_fall = self.body.gravity_m_per_s2.into();
+        for term in self.terms.with(Stage::Bends) {
+            term.apply(t_s, w);
+        }
     }
 
     #[inline(always)]

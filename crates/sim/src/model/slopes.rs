@@ -82,8 +82,10 @@ impl<'m> Differentiator<'m> {
         w.body_torque = [Slope::splat(0.0); 3];
         apply(Stage::Party, w);
         freedoms.gaps_slopes(&self.y, w);
-        if !self.terms.of(Stage::Bends).is_empty() {
+        if self.model.looks_at_body {
             freedoms.orient_slopes(&self.y, w);
+            w.t_s = t_s;
+            w.free_fall = <[f64; 3]>::from(self.model.body.gravity_m_per_s2).map(Slope::splat);
             apply(Stage::Bends, w);
         }
         apply(Stage::Handles, w);

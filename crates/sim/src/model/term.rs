@@ -166,7 +166,7 @@ pub enum Stage {
     Bends,
     /// Sets forces at the handles.
     Handles,
-    /// Adds torque on the body.
+    /// Adds to the fall of the body and to the torque on it.
     Body,
 }
 
@@ -257,7 +257,7 @@ pub trait Switch: Send + Sync {
 /// What an effect does with energy.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Power<T = f64> {
-    /// Fed in by the carriers, W.
+    /// Fed in by the carriers and by who else pushes, W.
     pub work_w: T,
     /// Taken out for good, W.
     pub dissipated_w: T,

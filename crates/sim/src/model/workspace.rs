@@ -70,7 +70,7 @@ pub struct Workspace<N: Moments = Now> {
     pub segment_s: N::Each,
     /// The carriers, two by two: carrier i is lane i mod 2 of pair i / 2.
     pub pair: Box<[Pair<N>]>,
-    /// Rows of the rotation body → world; where the freedoms do not need it, set only if something bends.
+    /// Rows of the rotation body → world; where the freedoms do not need it, set only if something looks at the body.
     pub rotation: [[N::Each; 3]; 3],
     /// Angular velocity in the body, rad/s.
     pub spin: [N::Each; 3],
@@ -80,6 +80,12 @@ pub struct Workspace<N: Moments = Now> {
     pub least_load_n: f64,
     /// Sine and cosine of the beat's phase, times how far its pull has grown; 0 in silence.
     pub beat: [N::Each; 2],
+    /// Acceleration of the centre of mass beside that by the handle forces, in the world, m/s²: gravity, and what else pulls.
+    pub free_fall: [N::Each; 3],
+    /// When this is evaluated, s; set only where something looks at the body.
+    pub t_s: N::Each,
+    /// Velocity of the centre of mass in the world, m/s; set likewise.
+    pub velocity: [N::Each; 3],
     /// Torque on the body beside that of the handle forces, body axes, N·m.
     pub body_torque: [N::Each; 3],
     /// States of the effects' own.
@@ -100,6 +106,9 @@ impl<N: Moments> Workspace<N> {
             spin: [zero; 3],
             least_load_n: 0.0,
             beat: [zero; 2],
+            free_fall: [zero; 3],
+            t_s: zero,
+            velocity: [zero; 3],
             body_torque: [zero; 3],
             extra: Box::default(),
             extra_rate: Box::default(),
@@ -167,6 +176,7 @@ impl Workspace {
     pub fn spread<M: Moments>(&self, to: &mut Workspace<M>) {
         let zero = M::Each::splat(0.0);
         to.segment_s = M::Each::splat(self.segment_s);
+        to.free_fall = self.free_fall.map(M::Each::splat);
         to.least_load_n = self.least_load_n;
         to.extra = vec![zero; self.extra.len()].into();
         to.extra_rate = to.extra.clone();
@@ -223,8 +233,11 @@ impl<E: Wide> Workspace<Eight<E>> {
             }
             to.spin[axis] = one(&self.spin[axis]);
             to.body_torque[axis] = one(&self.body_torque[axis]);
+            to.free_fall[axis] = one(&self.free_fall[axis]);
+            to.velocity[axis] = one(&self.velocity[axis]);
         }
         to.beat = [one(&self.beat[0]), one(&self.beat[1])];
+        to.t_s = one(&self.t_s);
         for (to, from) in to.extra.iter_mut().zip(&self.extra) {
             *to = one(from);
         }
