@@ -10,6 +10,8 @@ use std::f64::consts::TAU;
 
 /// Step of the equation, s: short for any pull that is looked for.
 const STEP_S: f64 = 0.2;
+/// Who slips past the beat does not slip further in a step, rad, where phases come as often.
+const SLIP_RAD: f64 = 0.25;
 /// A measured phase is of so many steps: a mean over 0.6 s passes half of what modulates it at 1 Hz, and so does the band of a step detector,
 /// which reaches from 0.6 to 1.5 of a cadence about 2 Hz.
 pub const WINDOW: usize = 3;
@@ -129,7 +131,11 @@ impl Walk {
     ) -> Result<Self, &'static str> {
         let onset = onset(t_s, &beat_rad)?;
         let step_s = period_s(t_s).ok_or(TOO_LITTLE)?;
-        let hop = (STEP_S / step_s).round().max(1.0) as usize;
+        let longest_s = match measured {
+            true => STEP_S,
+            false => STEP_S.min(SLIP_RAD / fastest_slip_rad_per_s(t_s, phase_rad, &beat_rad)),
+        };
+        let hop = (longest_s / step_s).round().max(1.0) as usize;
         let first = onset % hop;
         let pick = |x: &[f64]| -> Vec<f64> { x.iter().step_by(hop).copied().collect() };
         let t: Vec<f64> = pick(&t_s[first..]).iter().map(|t| t - t_s[onset]).collect();
@@ -300,6 +306,27 @@ fn onset(t_s: &[f64], beat_rad: &[f64]) -> Result<usize, &'static str> {
         }
     }
     Err("no beat that lasts for 4 s")
+}
+
+/// How fast a carrier slips past the beat on average, whoever does it fastest, rad/s.
+fn fastest_slip_rad_per_s(t_s: &[f64], phase_rad: &[Vec<f64>], beat_rad: &[f64]) -> f64 {
+    let of = |phase: &Vec<f64>| {
+        let behind = phase.iter().zip(beat_rad).map(|(y, b)| b - y);
+        let (mut turned, mut seen_s) = (0.0, 0.0);
+        let behind: Vec<f64> = behind.collect();
+        for (t, d) in t_s.windows(2).zip(behind.windows(2)) {
+            if d[0].is_finite() && d[1].is_finite() {
+                turned += d[1] - d[0];
+                seen_s += t[1] - t[0];
+            }
+        }
+        if seen_s > 0.0 {
+            turned.abs() / seen_s
+        } else {
+            0.0
+        }
+    };
+    phase_rad.iter().map(of).fold(0.0, f64::max)
 }
 
 /// Whether a beat sounds at all samples or at none; `None` if only at some.
