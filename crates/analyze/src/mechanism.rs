@@ -54,6 +54,9 @@ pub struct RollFit {
     pub b_per_s: f64,
     /// R² of the pendulum alone.
     pub r2: f64,
+    /// −a⟨(N_tot − N̄) sin θ·θ̇⟩/⟨θ̇²⟩, N̄ the mean [1/s]: what the support's modulation gives, as damping takes b. A roll that it keeps up has b, one that
+    /// grows more; of one that dies away, or that something else keeps up, it is less.
+    pub fed_per_s: f64,
     /// R² gained by the force differences; `None` with one handle.
     pub delta_n_gain: Option<f64>,
 }
@@ -80,10 +83,12 @@ impl Evidence {
     ///
     /// ```text
     /// quiet        RMS roll < 1°
-    /// parametric   share near f/2 ≥ 0.5, and, where there are forces, a > 0 and R² ≥ 0.8
+    /// parametric   share near f/2 ≥ 0.5, and, where there are forces, a > 0, R² ≥ 0.8 and fed ≥ b/2
     /// direct       share near f ≥ 0.5
     /// mixed        everything else
     /// ```
+    /// Shoulders that sway at f/2, as the stride of people in step does, drive a roll that looks the same: roll and summed support of one line cannot tell
+    /// a force from a modulation. A roll that grew from nothing can ([`crate::metrics()`], `growth_ratio`, `onset_time_s`).
     ///
     /// # Errors
     /// Without a line in the height there is no f to compare with: the reason is returned.
@@ -97,7 +102,8 @@ impl Evidence {
                 Some(hz) => format!("the window is shorter than {FEWEST_PERIODS:.0} periods of {hz:.2} Hz, too short to tell a line at half of it from one at it"),
             });
         };
-        let pendulum = self.fit.is_none_or(|fit| fit.a > 0.0 && fit.r2 >= EXPLAINS);
+        let pendulum =
+            (self.fit).is_none_or(|fit| fit.a > 0.0 && fit.r2 >= EXPLAINS && !fit.starves());
         Ok(match () {
             () if half >= LINE_SHARE && pendulum => Verdict::Parametric,
             () if at_f >= LINE_SHARE => Verdict::Direct,
@@ -137,8 +143,31 @@ impl fmt::Display for Evidence {
             if let Some(gain) = fit.delta_n_gain {
                 write!(f, "; force differences (ΔN) add {gain:.4} to R²")?;
             }
+            if fit.starves() {
+                let fed = fit.fed_per_s;
+                write!(
+                    f,
+                    "; the support's modulation gives it {fed:.3} 1/s, too little to keep it up"
+                )?;
+            }
+        }
+        if self.verdict() == Ok(Verdict::Parametric) {
+            write!(
+                f,
+                "; shoulders that sway at f/2 would drive a roll that looks the same"
+            )?;
         }
         Ok(())
+    }
+}
+
+/// Less than this of what damping takes does not keep a roll up.
+const KEEPS_UP: f64 = 0.5;
+
+impl RollFit {
+    /// Whether the support's modulation gives the roll too little to keep it up: it dies away, or something else does.
+    pub fn starves(&self) -> bool {
+        self.fed_per_s < KEEPS_UP * self.b_per_s.max(0.0)
     }
 }
 
@@ -180,14 +209,22 @@ pub fn fit_roll(
         }
     };
     let plain = least_squares(&rows, 2, &acceleration, |k, out| row(k, out))?;
+    // The mean support is a spring, which gives back what it takes.
+    let total = |k: usize| normal_n.iter().map(|h| h[k]).sum::<f64>();
+    let usual = rows.iter().map(|k| total(*k)).sum::<f64>() / rows.len() as f64;
+    let a = plain.x[0];
+    let given = |k: &usize| -a * (total(*k) - usual) * roll_rad[*k].sin() * rate[*k];
+    let squares: f64 = rows.iter().map(|k| rate[*k] * rate[*k]).sum();
+    let fed_per_s = rows.iter().map(given).sum::<f64>() / squares;
     let delta_n_gain = (handles > 1)
         .then(|| least_squares(&rows, handles + 1, &acceleration, |k, out| row(k, out)))
         .flatten()
         .map(|full| (full.r2 - plain.r2).max(0.0));
     Some(RollFit {
-        a: plain.x[0],
+        a,
         b_per_s: plain.x[1],
         r2: plain.r2,
+        fed_per_s,
         delta_n_gain,
     })
 }
@@ -319,12 +356,49 @@ mod tests {
         );
     }
 
+    /// A support that swings by `depth` at twice the pendulum's own pace, or a little beside it, feeds the roll; one that is steady does not.
+    #[test]
+    fn a_swing_that_dies_away_is_not_fed() {
+        let [a, b, dt, weight] = [0.03, 0.06, 1e-3, 588.0];
+        let own = (a * weight * 0.99_f64).sqrt();
+        let run = |depth: f64| {
+            let support = |t: f64| weight * (1.0 + depth * (2.0 * own * t).sin());
+            let rate = |t: f64, [x, v]: [f64; 2]| [v, -a * support(t) * x.sin() - b * v];
+            let (mut y, mut out) = ([0.14, 0.0], (Vec::new(), Vec::new(), Vec::new()));
+            for k in 0..40_000 {
+                let t = dt * f64::from(k);
+                if k % 33 == 0 {
+                    out.0.push(t);
+                    out.1.push(y[0]);
+                    out.2.push(support(t));
+                }
+                // Midpoint.
+                let first = rate(t, y);
+                let half = [0, 1].map(|i| y[i] + 0.5 * dt * first[i]);
+                let middle = rate(t + 0.5 * dt, half);
+                y = [0, 1].map(|i| y[i] + dt * middle[i]);
+            }
+            let all = 0..out.0.len();
+            fit_roll(&out.0, &out.1, &[out.2], std::slice::from_ref(&all)).unwrap()
+        };
+        let dies = run(0.0);
+        assert!(dies.starves() && dies.fed_per_s.abs() < 1e-9, "{dies:?}");
+        assert!((dies.b_per_s / b - 1.0).abs() < 0.01 && dies.r2 > 0.999);
+        // Its rate of growth, a N depth/(4 ω) − b/2, is a third of b/2 above and half of it below zero.
+        let even = 2.0 * b * own / (a * weight);
+        assert!(!run(4.0 / 3.0 * even).starves());
+        let half = run(0.5 * even);
+        let fed = half.fed_per_s / half.b_per_s;
+        assert!((0.3..0.6).contains(&fed), "{fed}");
+    }
+
     #[test]
     fn words_follow_the_evidence() {
         let fit = RollFit {
             a: 0.05,
             b_per_s: 0.4,
             r2: 0.99,
+            fed_per_s: 0.4,
             delta_n_gain: Some(0.0),
         };
         let e = Evidence {
@@ -347,6 +421,17 @@ mod tests {
         assert_eq!(
             Evidence {
                 fit: Some(RollFit { r2: 0.3, ..fit }),
+                ..e.clone()
+            }
+            .verdict(),
+            Ok(Verdict::Mixed)
+        );
+        assert_eq!(
+            Evidence {
+                fit: Some(RollFit {
+                    fed_per_s: 0.1,
+                    ..fit
+                }),
                 ..e.clone()
             }
             .verdict(),
