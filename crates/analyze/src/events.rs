@@ -51,8 +51,11 @@ pub fn events(inputs: &Inputs, window: Window) -> Vec<Event> {
     out
 }
 
-/// A handle's force falls to 0, or rises above it again. The first sample is no event.
+/// A handle's force falls to 0, or rises above it again. The first sample is no event, and a tied handle never lets go.
 fn contact(inputs: &Inputs, out: &mut Vec<Event>) {
+    if inputs.pulled_n().is_some() {
+        return;
+    }
     let t_s = inputs.force_times();
     for (handle, force) in inputs.normal_n.iter().enumerate() {
         let mut held: Option<bool> = None;

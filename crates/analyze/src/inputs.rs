@@ -33,6 +33,20 @@ impl Window {
         (self.start_s..=self.end_s).contains(&t_s)
     }
 
+    /// How long it is, s.
+    pub fn length_s(&self) -> f64 {
+        self.end_s - self.start_s
+    }
+
+    /// How much of another lies in it, s.
+    pub fn overlap_s(&self, other: Window) -> f64 {
+        let both = Window {
+            start_s: self.start_s.max(other.start_s),
+            end_s: self.end_s.min(other.end_s),
+        };
+        both.length_s().max(0.0)
+    }
+
     /// The indices of an ascending time axis that lie in the window.
     pub fn range(&self, t_s: &[f64]) -> Range<usize> {
         let start = t_s.partition_point(|t| *t < self.start_s);
@@ -151,7 +165,18 @@ impl Default for Inputs {
     }
 }
 
+/// A force sensor's zero is right to so much of its mean reading.
+const ZERO_SHARE: f64 = 0.2;
+
 impl Inputs {
+    /// The strongest pull on a handle, N, below zero, where one is pulled beyond what a force sensor's zero may be off: handles are tied then.
+    pub fn pulled_n(&self) -> Option<f64> {
+        let finite = || self.normal_n.iter().flatten().filter(|n| n.is_finite());
+        let mean = finite().sum::<f64>() / finite().count().max(1) as f64;
+        let least = finite().copied().fold(f64::INFINITY, f64::min);
+        (least < -ZERO_SHARE * mean.abs()).then_some(least)
+    }
+
     /// The height on its own clock: times (s) and heights (m).
     pub fn height(&self) -> (&[f64], &[f64]) {
         match &self.height_alone {

@@ -46,8 +46,22 @@ pub fn detuning_rad_per_s(c: &Context) -> Value {
         );
     }
     Value {
-        reason: Some(format!("each carrier's: {}", with_intervals(found))),
+        reason: Some(format!(
+            "each carrier's: {}{}",
+            with_intervals(found),
+            among(found.detuning_rad_per_s.len())
+        )),
         ..Value::number(mean(each)).per(each.clone())
+    }
+}
+
+/// What pull and detuning of several rest on.
+fn among(carriers: usize) -> &'static str {
+    match carriers {
+        0 | 1 => "",
+        _ => {
+            "; if nobody minds the others: what they take from each other is counted as the beat's and as their own, beyond the interval (`study fit` tells both apart)"
+        }
     }
 }
 
@@ -77,8 +91,10 @@ pub fn pull_rad_per_s(c: &Context) -> Value {
     }
     Value {
         reason: Some(format!(
-            "grows in τ = {:.1} s; phase noise {:.4} rad/√s",
-            found.build_up_s, found.noise_rad_per_sqrt_s
+            "grows in τ = {:.1} s; phase noise {:.4} rad/√s{}",
+            found.build_up_s,
+            found.noise_rad_per_sqrt_s,
+            among(found.detuning_rad_per_s.len())
         )),
         ..Value::number(found.pull_rad_per_s).ci95(low, high)
     }

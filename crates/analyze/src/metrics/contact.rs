@@ -17,7 +17,10 @@ pub fn contact_loss(c: &Context) -> Value {
     let slack = (0..forces.len())
         .filter(|k| forces.columns.iter().any(|n| n[*k] <= 0.0))
         .count();
-    Value::number(share(slack, forces.len()))
+    Value {
+        reason: tied(c),
+        ..Value::number(share(slack, forces.len()))
+    }
 }
 
 pub fn contact_loss_mean(c: &Context) -> Value {
@@ -27,7 +30,19 @@ pub fn contact_loss_mean(c: &Context) -> Value {
         .iter()
         .map(|n| share(n.iter().filter(|n| **n <= 0.0).count(), n.len()))
         .collect();
-    Value::number(mean(&per)).per(per)
+    Value {
+        reason: tied(c),
+        ..Value::number(mean(&per)).per(per)
+    }
+}
+
+/// Said where a handle is pulled down, which one that only rests never is.
+fn tied(c: &Context) -> Option<String> {
+    let least_n = c.inputs.pulled_n()?;
+    Some(format!(
+        "handles are pulled, with up to {:.0} N: they are tied, and where N ≤ 0 they are not slack",
+        -least_n
+    ))
 }
 
 pub fn t_float(c: &Context) -> Value {
