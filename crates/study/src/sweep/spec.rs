@@ -188,6 +188,10 @@ fn check(spec: &mut Spec) -> Result<(), String> {
             "design.points: found {}, expected 1 to 2^30",
             d.points
         )),
+        Some(d) if d.seed != 0 && d.kind != DesignKind::LatinHypercube => Err(format!(
+            "design.seed: found {}, but only a Latin hypercube is drawn by a seed: Sobol's points are the same every time; another `first_seed` gives other runs",
+            d.seed
+        )),
         Some(d) if d.kind == DesignKind::Sensitivity && sampled < spec.axes.len() => {
             Err("a sensitivity study samples all its axes; take `values` and `count` away".into())
         }
