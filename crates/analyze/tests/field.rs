@@ -419,7 +419,7 @@ fn val_broad_holes() {
     for name in BROAD {
         let track = track_of(name);
         let whole = motion(&track, &Settings::default()).unwrap().inputs;
-        for row in [3, 10, 25] {
+        for row in [3, 10, 25, 57, 80] {
             // Three of a hundred, in rows, every so many but not evenly.
             let lost = |k: usize| {
                 let place = k % (33 * row);
@@ -447,7 +447,12 @@ fn val_broad_holes() {
                 1e3 * height_said_m
             );
             for (found, said) in [(roll, said), (height_m, height_said_m)] {
-                assert!(found < 3.0 * said && said < 3.0 * found, "{found} {said}");
+                // Of some six long holes in a minute the root mean square says little.
+                let many = row <= 25;
+                assert!(
+                    found < 3.0 * said && (!many || said < 3.0 * found),
+                    "{found} {said}"
+                );
             }
         }
     }

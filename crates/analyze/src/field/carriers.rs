@@ -11,7 +11,7 @@ use crate::imu::vertical::height;
 use crate::inputs::{Clocks, Window, interpolate, mean_step_s, stretches};
 use crate::median::median;
 use crate::metrics::{Datum, Metrics};
-use crate::phase::hilbert;
+use crate::phase::{hilbert, order_parameter};
 use crate::quality::Quality;
 use crate::spectrum::Complex64;
 use crate::steps::{StepError, Steps, steps_in};
@@ -303,19 +303,19 @@ impl Carriers {
 
     /// 95 % intervals of the synchrony and the pull: the phases' own error, what had to be put back into them (`detected`: the same metrics
     /// without), and, of the synchrony, the clocks: those that were put on each other by motion, as twins show them, or otherwise (`synchrony_else`), and what
-    /// the errors of those that were set make of it (`by_clocks`): the more, the further apart the steps are.
+    /// the errors of those that were set and holes make of it (`by_others`): the more, the further apart the steps are.
     pub fn interval(
         &self,
         metrics: &mut Metrics,
         detected: &Metrics,
         synchrony_else: &[f64],
-        by_clocks: f64,
+        by_others: f64,
     ) {
         let moved = self.worn.iter().any(|worn| worn.ahead_s != 0.0);
         let clocks = if moved {
-            MOVED_ERROR.hypot(by_clocks)
+            MOVED_ERROR.hypot(by_others)
         } else {
-            by_clocks
+            by_others
         };
         let put_back = |name: &str, x: f64| x - detected.number(name).unwrap_or(x);
         let ends = metrics.number("synchrony").map(|x| {
@@ -479,6 +479,30 @@ fn judged((all, as_they_are): Matches, step_s: f64) -> Result<Option<Offsets>, &
     Ok(Some((first, all.collect())))
 }
 
+/// Half of what the moments of a window at which not everybody's phase is known may make of the synchrony, 95 %: they are to the others as parts of their
+/// length are to each other.
+pub fn by_holes(t_s: &[f64], phases: &[Vec<f64>], window: Window) -> f64 {
+    let range = window.range(t_s);
+    let known = |k: &usize| phases.iter().all(|p| p[*k].is_finite());
+    let whole = range.len();
+    let seen: Vec<usize> = range.filter(known).collect();
+    let lost = whole - seen.len();
+    if lost == 0 || seen.is_empty() || phases.len() < 2 {
+        return 0.0;
+    }
+    let of: Vec<Vec<f64>> = phases
+        .iter()
+        .map(|p| seen.iter().map(|k| p[*k]).collect())
+        .collect();
+    let of: Vec<&[f64]> = of.iter().map(|p| &p[..]).collect();
+    let together = order_parameter(&of);
+    let mean = |x: &[f64]| x.iter().sum::<f64>() / x.len() as f64;
+    let all = mean(&together);
+    let parts: Vec<f64> = together.chunks(lost).map(|part| mean(part) - all).collect();
+    let spread = (parts.iter().map(|d| d * d).sum::<f64>() / parts.len() as f64).sqrt();
+    1.96 * lost as f64 / whole as f64 * spread
+}
+
 /// Half the 95 % interval of a synchrony from gait phases, 1: by simulated twins (docs/field.md).
 const PHASE_ERROR: f64 = 0.0020;
 /// What a detector leaves in a pull of carriers who slip past the beat, half the 95 % interval, of the pull: by twins.
@@ -539,6 +563,40 @@ mod tests {
                     .contains("clocks agree")
             );
         }
+    }
+
+    /// Two who part by a turn in 7 s, unseen for 2 s in every 11: what is left has another synchrony than the whole, within what is said.
+    #[test]
+    fn what_holes_hide_of_the_synchrony_is_said() {
+        let t_s: Vec<f64> = (0..6000).map(|k| 0.01 * f64::from(k)).collect();
+        let phases = |apart_hz: f64, hidden: bool| -> Vec<Vec<f64>> {
+            let of = |hz: f64| {
+                let at = |t: &f64| match hidden && t % 11.0 > 9.0 {
+                    true => f64::NAN,
+                    false => TAU * hz * t,
+                };
+                t_s.iter().map(at).collect()
+            };
+            vec![of(2.0), of(2.0 + apart_hz)]
+        };
+        let synchrony = |phases: Vec<Vec<f64>>| {
+            let inputs = crate::inputs::Inputs {
+                phase_t_s: t_s.clone(),
+                phase_rad: phases,
+                ..Default::default()
+            };
+            metrics_of(&inputs, Window::ALL, |name| name == "synchrony").number("synchrony")
+        };
+        let half = |apart_hz, hidden| by_holes(&t_s, &phases(apart_hz, hidden), Window::ALL);
+        assert_eq!(half(1.0 / 7.0, false), 0.0);
+        assert!(half(0.0, true) < 1e-9);
+        let [whole, left] =
+            [false, true].map(|hidden| synchrony(phases(1.0 / 7.0, hidden)).unwrap());
+        let half = half(1.0 / 7.0, true);
+        assert!(
+            (whole - left).abs() < half && half < 0.12,
+            "{whole} {left} ± {half}"
+        );
     }
 
     /// What matches tell of clocks that are right, 0.2 s off, and further off than is looked for (music, one clock 8.3, 6.2 and 13.1 s off).

@@ -415,14 +415,15 @@ impl Field {
                         ),
                     ));
                 }
-                if motion.left_out_s > 0.0 {
+                let [left_out_s, _] = motion.left_out_s(Window::ALL);
+                if left_out_s > 0.0 {
                     self.quality.push(Quality::remark(
                         topic,
                         "holes",
                         format!(
                             "motion is estimated in {} without a hole, {:.2} s are left out; within {:.1} s of a hole there is no height",
                             counted(motion.stretches.len() as u64, "stretch", "stretches"),
-                            motion.left_out_s,
+                            left_out_s,
                             rath::BESIDE_HOLES / settings.height_corner_hz
                         ),
                     ));
@@ -576,6 +577,7 @@ impl Field {
                 self.fill_phases(&mut inputs, t_s, phases);
                 metrics_of(&inputs, window, wanted)
             };
+            let by_holes = carriers::by_holes(&phases.0, &phases.1, window);
             let mut together = as_of(phases, carriers::gives);
             let detected = self.carriers.detected();
             let detected =
@@ -595,7 +597,7 @@ impl Field {
                 &mut together,
                 &detected.unwrap_or_default(),
                 &others,
-                by_clocks,
+                by_clocks.hypot(by_holes),
             );
             for lost in &self.carriers_lost {
                 interval::without_those(&mut together, *lost, carriers::gives);

@@ -10,7 +10,7 @@ use crate::holes::{fill, memory};
 use std::ops::Range;
 
 /// The longest hole that is drawn through, s.
-pub const LONGEST_S: f64 = 0.1;
+pub const LONGEST_S: f64 = 0.3;
 /// A prediction rests on so much beside a hole, s, and on no more samples.
 const MEMORY_S: f64 = 0.4;
 const MEMORY: usize = 128;

@@ -103,6 +103,9 @@ pub fn metrics(motion: &Motion, window: Window) -> Metrics {
         floating(&parts)
     };
     let rate_hz = rate_hz(&motion.inputs);
+    let [left_out_s, sampled_s] = motion.left_out_s(window);
+    let unseen = left_out_s / sampled_s.max(f64::MIN_POSITIVE);
+    let lost = (left_out_s * rate_hz) as usize;
     for (name, value) in &mut out.0 {
         if let Some((_, why)) = BEYOND.iter().find(|(n, _)| n == name) {
             value.withhold(*why);
@@ -158,13 +161,18 @@ pub fn metrics(motion: &Motion, window: Window) -> Metrics {
             let mean_deg = angle.iter().sum::<f64>().to_degrees() / angle.len() as f64;
             value.datum = Datum::Number(root);
             let ends = tilted(root, ci95, mean_deg, 1.96 * tilt_rad.to_degrees());
-            value.ci95 = Some(apart(ends, root, off(name, x)));
+            // Of what is left out nothing is known but how the rest varies.
+            let square = root.to_radians().powi(2);
+            let rest = (square + unseen * spread_of_parts(angle, lost)).sqrt() - square.sqrt();
+            let off = off(name, x).hypot(rest.to_degrees());
+            value.ci95 = Some(apart(ends, root, off));
             value.reason = uncalibrated(motion);
             continue;
         }
         if *name == "roll_excess_s" {
             // Swings that keep step with the samples are all counted in one way or all in the other: no standard deviation tells of that.
-            value.ci95 = Some(apart(extremes(x, &drawn), x, off(name, x)));
+            let [low, high] = apart(extremes(x, &drawn), x, off(name, x));
+            value.ci95 = Some([low, high + left_out_s]);
             continue;
         }
         let floats = (*name == "t_float").then(|| t_float(&motion.inputs));
@@ -203,6 +211,12 @@ pub fn metrics(motion: &Motion, window: Window) -> Metrics {
             .collect();
         value.reason = (!reasons.is_empty()).then(|| reasons.join("; "));
     }
+    if unseen > MOST_UNSEEN {
+        let why = format!(
+            "without an interval: {left_out_s:.1} of {sampled_s:.1} s are not known, and nothing tells how the load moved then"
+        );
+        without_an_interval(&mut out, &why, |_| true);
+    }
     let budget = &motion.settings.budget;
     let below = |name: &str, least: f64| out.number(name).is_some_and(|x| x < least);
     let unseen = [
@@ -223,6 +237,9 @@ pub fn metrics(motion: &Motion, window: Window) -> Metrics {
     }
     out
 }
+
+/// Where more than this of a window is left out, its metrics have no interval: what a rath did meanwhile is as much a part of them.
+const MOST_UNSEEN: f64 = 0.1;
 
 /// What a sensor did not tell of the motion.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -265,12 +282,16 @@ pub fn without_those(metrics: &mut Metrics, lost: Lost, rests_on: impl Fn(&str) 
             "shows gravity elsewhere in the sensor's axes from a moment of the window on",
         ),
     };
+    let why = format!("without an interval: the {} {why}", instrument.name());
+    without_an_interval(metrics, &why, rests_on);
+}
+
+fn without_an_interval(metrics: &mut Metrics, why: &str, rests_on: impl Fn(&str) -> bool) {
     for (name, value) in &mut metrics.0 {
         if rests_on(name) && value.ci95.take().is_some() {
-            let why = format!("without an interval: the {} {why}", instrument.name());
             value.reason = Some(match value.reason.take() {
                 Some(reason) => format!("{why}; {reason}"),
-                None => why,
+                None => why.to_owned(),
             });
         }
     }
@@ -507,20 +528,12 @@ fn beyond_the_budget(name: &str, motion: &Motion, window: Window) -> f64 {
             let course_m = lost_course_m(motion, range.clone());
             let lost = range.len() - seen.len();
             let mean = seen.iter().sum::<f64>() / seen.len().max(1) as f64;
-            let power = |z: &[f64]| {
-                z.iter().map(|z| (z - mean).powi(2)).sum::<f64>() / z.len().max(1) as f64
-            };
-            let whole = power(&seen);
+            let about: Vec<f64> = seen.iter().map(|z| z - mean).collect();
+            let whole = power(&about);
             if whole <= 0.0 {
                 return 0.0;
             }
-            let parts: Vec<f64> = seen
-                .chunks_exact(lost.clamp(2, seen.len()))
-                .map(power)
-                .collect();
-            let spread = (parts.iter().map(|p| (p - whole).powi(2)).sum::<f64>()
-                / parts.len().max(1) as f64)
-                .sqrt();
+            let spread = spread_of_parts(&about, lost);
             let ends = lost as f64 / range.len() as f64 * spread / (2.0 * whole.sqrt());
             ends.hypot((whole + course_m.powi(2)).sqrt() - whole.sqrt())
         }
@@ -543,6 +556,23 @@ fn lost_course_m(motion: &Motion, range: Range<usize>) -> f64 {
     let course_m = slow_course_m(motion, range, quarter_hz.max(2.0 * corner_hz));
     let excess = course_m.powi(2) - of_budget.powi(2);
     RANGE_OF_WANDER * excess.max(0.0).sqrt()
+}
+
+/// Mean square.
+fn power(x: &[f64]) -> f64 {
+    x.iter().map(|x| x * x).sum::<f64>() / x.len().max(1) as f64
+}
+
+/// By how much the mean square of parts of so many samples differs from that of the whole, RMS; none lost differs by nothing.
+fn spread_of_parts(x: &[f64], lost: usize) -> f64 {
+    if lost == 0 || x.len() < 2 {
+        return 0.0;
+    }
+    let whole = power(x);
+    let parts = x.chunks_exact(lost.clamp(2, x.len()));
+    let count = parts.len().max(1) as f64;
+    let squares: f64 = parts.map(|part| (power(part) - whole).powi(2)).sum();
+    (squares / count).sqrt()
 }
 
 /// SD of the height between its corner and `to_hz`, m: of what the window knows of it.

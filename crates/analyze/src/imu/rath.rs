@@ -120,8 +120,10 @@ pub struct Motion {
     pub gravity_off_m_per_s2: f64,
     /// The parts between holes, as ranges of samples.
     pub stretches: Vec<Range<usize>>,
-    /// What of the recording is in none of them, s.
-    pub left_out_s: f64,
+    /// From when to when each of them was measured.
+    pub seen: Vec<Window>,
+    /// From the first sample to the last.
+    pub sampled: Window,
     /// How far each acceleration may be off, m/s²: 0 but where a short hole was drawn through.
     pub unsure_m_per_s2: Vec<f64>,
     /// Where one was, the columns once more, with as many holes again.
@@ -148,6 +150,14 @@ impl Motion {
 }
 
 impl Motion {
+    /// What of a window was sampled and is in no stretch, and how much was sampled, s.
+    pub fn left_out_s(&self, window: Window) -> [f64; 2] {
+        let within = |w: &Window| window.overlap_s(*w);
+        let sampled_s = within(&self.sampled);
+        let seen_s: f64 = self.seen.iter().map(within).sum();
+        [(sampled_s - seen_s).max(0.0), sampled_s]
+    }
+
     /// How much was drawn through in short holes, s.
     pub fn drawn_s(&self) -> f64 {
         let drawn = self.unsure_m_per_s2.iter().filter(|u| **u > 0.0).count();
@@ -219,12 +229,13 @@ pub fn motion(track: &Track, settings: &Settings) -> Result<Motion, MotionError>
     if even.stretches.is_empty() {
         return Err(too_short());
     }
-    let left_out_s = track.t_s[track.len() - 1] - track.t_s[0] - even.seen_s;
+    let seen = even.seen;
     let again = even
         .again
         .and_then(|drawn| of_even(drawn, even.stretches.clone(), period_s, settings).ok());
     let mut found = of_even(even.drawn, even.stretches, period_s, settings)?;
-    found.left_out_s = left_out_s;
+    found.seen = seen;
+    found.sampled = span(&track.t_s);
     found.again = again.map(|again| Box::new(again.inputs));
     Ok(found)
 }
@@ -338,7 +349,8 @@ fn of_even(
         accel_up_m_per_s2: accel_up,
         gravity_off_m_per_s2: mean,
         stretches,
-        left_out_s: 0.0,
+        seen: Vec::new(),
+        sampled: Window::ALL,
         unsure_m_per_s2,
         again: None,
         orientation: estimate,
@@ -355,8 +367,16 @@ struct Evened {
     again: Option<Drawn>,
     /// Where the stretches are now.
     stretches: Vec<Range<usize>>,
-    /// How long they are together, s.
-    seen_s: f64,
+    /// From when to when they were measured.
+    seen: Vec<Window>,
+}
+
+/// From the first of some moments, of which there is one at least, to the last.
+fn span(t_s: &[f64]) -> Window {
+    Window {
+        start_s: t_s[0],
+        end_s: t_s[t_s.len() - 1],
+    }
 }
 
 fn even(track: &Track, whole: &[Range<usize>], period_s: f64) -> Evened {
@@ -368,9 +388,9 @@ fn even(track: &Track, whole: &[Range<usize>], period_s: f64) -> Evened {
         drawn: Drawn::measured(dropped),
         again: None,
         stretches: Vec::with_capacity(whole.len()),
-        seen_s: 0.0,
+        seen: Vec::with_capacity(whole.len()),
     };
-    let mut add = |drawn: Drawn, again: Option<Drawn>, span_s: f64| {
+    let mut add = |drawn: Drawn, again: Option<Drawn>, seen: Window| {
         if again.is_some() && out.again.is_none() {
             out.again = Some(out.drawn.clone());
         }
@@ -380,26 +400,21 @@ fn even(track: &Track, whole: &[Range<usize>], period_s: f64) -> Evened {
         let first = out.drawn.track.len();
         out.drawn.append(drawn);
         out.stretches.push(first..out.drawn.track.len());
-        out.seen_s += span_s;
+        out.seen.push(seen);
     };
     for range in whole {
         let part = track.part(range.clone());
-        let span_s = |r: Range<usize>| part.t_s[r.end - 1] - part.t_s[r.start];
         let even = evened(&part, period_s);
         let holes = holes(&part.t_s, &even.t_s, period_s);
         if holes.is_empty() {
-            add(Drawn::measured(even), None, span_s(0..part.len()));
+            add(Drawn::measured(even), None, span(&part.t_s));
         } else if let Some([drawn, again]) = bridge(&even, &holes, period_s) {
-            add(drawn, Some(again), span_s(0..part.len()));
+            add(drawn, Some(again), span(&part.t_s));
         } else {
             for r in part.stretches() {
-                let span_s = span_s(r.clone());
-                if span_s >= SHORTEST_S {
-                    add(
-                        Drawn::measured(evened(&part.part(r), period_s)),
-                        None,
-                        span_s,
-                    );
+                let seen = span(&part.t_s[r.clone()]);
+                if seen.length_s() >= SHORTEST_S {
+                    add(Drawn::measured(evened(&part.part(r), period_s)), None, seen);
                 }
             }
         }

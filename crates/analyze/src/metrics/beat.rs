@@ -59,9 +59,7 @@ pub fn detuning_rad_per_s(c: &Context) -> Value {
 fn among(carriers: usize) -> &'static str {
     match carriers {
         0 | 1 => "",
-        _ => {
-            "; if nobody minds the others: what they take from each other is counted as the beat's and as their own, beyond the interval (`study fit` tells both apart)"
-        }
+        _ => "; if they mind the beat alone, and not each other (`study fit` tells)",
     }
 }
 

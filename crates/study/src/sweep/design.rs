@@ -214,6 +214,21 @@ mod tests {
         );
     }
 
+    /// Two seeds that give the same points would look like a study without a scatter.
+    #[test]
+    fn a_seed_that_draws_nothing_is_refused() {
+        let with = |kind: &str| {
+            let axes = "axes = [{ key = \"a\", from = 0, to = 1 }]";
+            let design = format!("design = {{ kind = \"{kind}\", points = 8, seed = 3 }}");
+            parse("test", &format!("scene = \"music\"\n{axes}\n{design}"))
+        };
+        for kind in ["sobol", "sensitivity"] {
+            let problem = with(kind).unwrap_err();
+            assert!(problem.contains("first_seed"), "{problem}");
+        }
+        assert!(with("latin-hypercube").is_ok());
+    }
+
     #[test]
     fn sensitivity_swaps_one_coordinate_at_a_time() {
         let p = points(
