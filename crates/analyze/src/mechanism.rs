@@ -167,7 +167,7 @@ const KEEPS_UP: f64 = 0.5;
 impl RollFit {
     /// Whether the support's modulation gives the roll too little to keep it up: it dies away, or something else does.
     pub fn starves(&self) -> bool {
-        self.fed_per_s < KEEPS_UP * self.b_per_s.max(0.0)
+        self.fed_per_s <= KEEPS_UP * self.b_per_s.max(0.0)
     }
 }
 

@@ -3,7 +3,7 @@
 
 mod noise;
 
-use analyze::metrics::{Context, METRICS, mechanism_evidence};
+use analyze::metrics::{Context, Datum, METRICS, mechanism_evidence};
 use analyze::{Inputs, Window, metrics};
 use noise::noise;
 use serde_json::Value;
@@ -232,7 +232,11 @@ fn lost_and_uneven_samples_change_no_line() {
         roll_rad: (t_s.iter())
             .map(|t| 0.2 * (TAU * 1.075 * t).sin() + 0.02 * (TAU * 2.15 * t).cos())
             .collect(),
-        normal_n: vec![vec![590.0; t_s.len()]],
+        normal_n: vec![
+            (t_s.iter())
+                .map(|t| 590.0 - 60.0 * (TAU * 2.15 * t).sin())
+                .collect(),
+        ],
         mass_kg: Some(60.0),
         gravity_m_per_s2: 9.81,
         t_s,
@@ -262,6 +266,7 @@ fn lost_and_uneven_samples_change_no_line() {
         (numbers, word)
     };
     let (truth, word) = found(&at(even().collect()));
+    assert_eq!(word, Datum::Word("parametric"));
     for (sampled, what) in [
         (uneven.collect::<Vec<_>>(), "uneven"),
         (lost.collect(), "lost"),
