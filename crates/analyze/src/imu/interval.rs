@@ -1,6 +1,6 @@
 //! The paper's metrics of a [`Motion`], each number with its 95 % interval.
 //!
-//! The estimated columns are varied within the [`Budget`](super::budget::Budget) of what the sensor and the method leave uncertain, and sampled
+//! The estimated columns are varied within the [`Budget`] of what the sensor and the method leave uncertain, and sampled
 //! at the paper's 30 Hz with a random phase; the metric's spread over the draws is its standard error, 1.96 of which are given. Where short holes were
 //! drawn through, what as many holes again would change counts as one more.
 
