@@ -199,9 +199,10 @@ pub fn fit_roll(
         return None;
     }
     let handles = normal_n.len();
+    let total = |k: usize| normal_n.iter().map(|h| h[k]).sum::<f64>();
     // Columns: −N_tot sin θ, −θ̇, then N_i − N̄ for all handles but the last (they sum to zero).
     let row = |k: usize, out: &mut [f64]| {
-        let total: f64 = normal_n.iter().map(|h| h[k]).sum();
+        let total = total(k);
         out[0] = -total * roll_rad[k].sin();
         out[1] = -rate[k];
         for (o, h) in out[2..].iter_mut().zip(normal_n) {
@@ -210,7 +211,6 @@ pub fn fit_roll(
     };
     let plain = least_squares(&rows, 2, &acceleration, |k, out| row(k, out))?;
     // The mean support is a spring, which gives back what it takes.
-    let total = |k: usize| normal_n.iter().map(|h| h[k]).sum::<f64>();
     let usual = rows.iter().map(|k| total(*k)).sum::<f64>() / rows.len() as f64;
     let a = plain.x[0];
     let given = |k: &usize| -a * (total(*k) - usual) * roll_rad[*k].sin() * rate[*k];

@@ -162,14 +162,7 @@ impl Walk {
         if !measured {
             dated_by_the_beat(&t, &mut beat, &mut phase);
         }
-        let (mut sounds_s, mut turned) = (0.0, 0.0);
-        for (t, b) in t.windows(2).zip(beat.windows(2)) {
-            if b[0].is_finite() && b[1].is_finite() {
-                sounds_s += t[1] - t[0];
-                turned += b[1] - b[0];
-            }
-        }
-        let omega_rad_per_s = turned / sounds_s;
+        let omega_rad_per_s = mean_rate(&t, &beat);
         let latest = phase
             .iter()
             .map(|p| p.iter().position(|y| y.is_finite()).map_or(0.0, |k| t[k]))
@@ -311,22 +304,23 @@ fn onset(t_s: &[f64], beat_rad: &[f64]) -> Result<usize, &'static str> {
 /// How fast a carrier slips past the beat on average, whoever does it fastest, rad/s.
 fn fastest_slip_rad_per_s(t_s: &[f64], phase_rad: &[Vec<f64>], beat_rad: &[f64]) -> f64 {
     let of = |phase: &Vec<f64>| {
-        let behind = phase.iter().zip(beat_rad).map(|(y, b)| b - y);
-        let (mut turned, mut seen_s) = (0.0, 0.0);
-        let behind: Vec<f64> = behind.collect();
-        for (t, d) in t_s.windows(2).zip(behind.windows(2)) {
-            if d[0].is_finite() && d[1].is_finite() {
-                turned += d[1] - d[0];
-                seen_s += t[1] - t[0];
-            }
-        }
-        if seen_s > 0.0 {
-            turned.abs() / seen_s
-        } else {
-            0.0
-        }
+        let behind: Vec<f64> = phase.iter().zip(beat_rad).map(|(y, b)| b - y).collect();
+        mean_rate(t_s, &behind).abs()
     };
+    // What is never seen has no rate, and is not the fastest.
     phase_rad.iter().map(of).fold(0.0, f64::max)
+}
+
+/// Mean rate of a phase over the steps at both ends of which it is known, rad/s; NaN without one.
+fn mean_rate(t_s: &[f64], phase_rad: &[f64]) -> f64 {
+    let (mut seen_s, mut turned) = (0.0, 0.0);
+    for (t, phase) in t_s.windows(2).zip(phase_rad.windows(2)) {
+        if phase[0].is_finite() && phase[1].is_finite() {
+            seen_s += t[1] - t[0];
+            turned += phase[1] - phase[0];
+        }
+    }
+    turned / seen_s
 }
 
 /// Whether a beat sounds at all samples or at none; `None` if only at some.
