@@ -304,6 +304,58 @@ fn a_load_that_is_left_behind_is_said() {
     }
 }
 
+/// A unit that slipped runs well, and carries nothing.
+#[test]
+fn a_motion_that_nobody_carries_is_said() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let said = |scene: &str, set: &str| {
+        let args = [
+            "record",
+            scene,
+            "--out",
+            "x.mcap",
+            "--set",
+            set,
+            "--duration",
+            "20",
+        ];
+        let out = good(run_in(folder.path(), "sim", &args));
+        String::from_utf8_lossy(&out.stderr).into_owned()
+    };
+    for (set, remark) in [
+        (
+            "effects.gait.amplitude_m=64",
+            "times the weight of the load",
+        ),
+        (
+            "effects.contact.stiffness_n_per_m=3",
+            "shoulder 2 gave way by ",
+        ),
+        (
+            "body.gravity_m_per_s2=[0,0,9.81]",
+            "no handle ever met its shoulder",
+        ),
+        ("body.mass_kg=60000", "m below its shoulders"),
+        (
+            "effects.contact=false",
+            "without effects.contact nobody carries it",
+        ),
+    ] {
+        let said = said("music", set);
+        assert!(said.contains(remark), "{set}: {said}");
+    }
+    let listed = good(run_in(folder.path(), "sim", &["scenes"])).stdout;
+    let listed = String::from_utf8(listed).expect("text");
+    let names: Vec<&str> = (listed.lines())
+        .filter_map(|l| l.split_whitespace().next())
+        .collect();
+    assert!(names.contains(&"tumble"));
+    for name in names {
+        let said = said(name, "seed=2");
+        assert_eq!(said.lines().count(), 1, "{name}: {said}");
+    }
+}
+
 #[test]
 fn what_is_no_recording_is_refused_in_one_sentence() {
     let folder = tempfile::tempdir().expect("a folder");

@@ -4,6 +4,7 @@ mod accuracy;
 mod drum;
 mod explain;
 mod record;
+mod remarks;
 mod replay;
 mod scenes;
 

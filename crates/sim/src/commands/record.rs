@@ -1,5 +1,6 @@
 //! `sim record`: a scene becomes a recording.
 
+use super::remarks::Remarks;
 use super::{patient_bar, real, setting};
 use anyhow::{Context, Result, anyhow, bail};
 use indicatif::ProgressBar;
@@ -141,7 +142,7 @@ fn record(args: &Args) -> Result<()> {
             "{wide_bar} {percent}% of the scene, {eta} left",
         ),
         samples: 0,
-        astray: None,
+        remarks: Remarks::of(&scene),
     };
     let (stats, outcome) = run_model(&model, method_of(&scene), &settings(&scene), &mut watch);
     watch.progress.finish_and_clear();
@@ -195,19 +196,8 @@ fn record(args: &Args) -> Result<()> {
     for (name, why) in sim::effects::idle(&scene.effects) {
         recording::note!("effects.{name} does nothing: {why}");
     }
-    if let Some((handle, beside_m, t_s)) = watch.astray {
-        let advice = match &scene.effects.sling {
-            Some(sling) if beside_m > sling.length_m => {
-                "farther than its strap is long; `effects.sling` holds for small swings: give it more damping_s, or the contact more damping"
-            }
-            Some(_) => "the straps of `effects.sling` let it",
-            None => {
-                "contact asks for height alone; `effects.hold`, `friction` or `sling` keep a load with its carriers"
-            }
-        };
-        recording::note!(
-            "handle {handle} was carried from {beside_m:.1} m beside its shoulder at {t_s:.1} s: {advice}"
-        );
+    for remark in watch.remarks.said(&scene) {
+        recording::note!("{remark}");
     }
     Ok(())
 }
@@ -242,23 +232,7 @@ struct Watch<'m> {
     interrupted: &'static AtomicBool,
     progress: ProgressBar,
     samples: u64,
-    /// The handle farthest beside its shoulder, counted from 1: how far (m), and when (s).
-    astray: Option<(usize, f64, f64)>,
-}
-
-/// Beside a shoulder by more than a shoulder's breadth nobody carries, m: the law of contact asks for height alone.
-const BREADTH_M: f64 = 0.5;
-
-impl Watch<'_> {
-    fn look_beside(&mut self, sample: &Sample) {
-        for (i, (handle, shoulder)) in sample.handle_m.iter().zip(&sample.shoulder_m).enumerate() {
-            let beside_m = (handle[0] - shoulder[0]).hypot(handle[1] - shoulder[1]);
-            let farthest_m = self.astray.map_or(BREADTH_M, |(_, m, _)| m);
-            if sample.normal_n[i] > 0.0 && beside_m > farthest_m {
-                self.astray = Some((i + 1, beside_m, sample.t_s));
-            }
-        }
-    }
+    remarks: Remarks,
 }
 
 impl Listener for Watch<'_> {
@@ -268,7 +242,7 @@ impl Listener for Watch<'_> {
 
     fn sample(&mut self, sample: &Sample) -> bool {
         self.samples += 1;
-        self.look_beside(sample);
+        self.remarks.look(sample);
         self.progress.set_position((sample.t_s * 1e3) as u64);
         !self.interrupted.load(Ordering::Relaxed) && self.recorder.sample(sample)
     }
