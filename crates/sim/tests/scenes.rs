@@ -369,6 +369,23 @@ fn settings_are_checked_like_the_scene() {
     assert!(with("effects.music=false").unwrap().effects.music.is_none());
     // What is not there can be taken away too, but not what cannot be.
     assert!(with("effects.hold=false").unwrap().effects.hold.is_none());
+    // What was taken away is not brought back by a part of it, but it can be given anew.
+    let set = |settings: &[&str]| {
+        let settings: Vec<String> = settings.iter().map(|&s| s.to_owned()).collect();
+        load("music", &settings)
+    };
+    let back = set(&["effects.music=false", "effects.music.beat_hz=2"]).unwrap_err();
+    assert!(
+        back.to_string()
+            .contains("effects.music=false took it away"),
+        "{back}"
+    );
+    let anew = [
+        "effects.music=false",
+        "effects.music={beat_hz=3}",
+        "effects.music.beat_hz=2",
+    ];
+    assert_eq!(set(&anew).unwrap().effects.music.unwrap().beat_hz, 2.0);
     assert!(
         with("effects.gait.amplitude_m=0.07")
             .unwrap()

@@ -240,9 +240,10 @@ impl Template {
         };
         let mut table = self.table.clone();
         let (mut keys, mut lists): (Vec<&str>, bool) = (Vec::new(), false);
+        let mut gone = Vec::new();
         for (key, value) in values {
             lists |= holds_list(&value);
-            set_key(&mut table, key, value).map_err(|m| fail(format!("{key}: {m}")))?;
+            set_key(&mut table, key, value, &mut gone).map_err(|m| fail(format!("{key}: {m}")))?;
             keys.push(key);
         }
         if let Some(message) = overruled(&table, keys.iter().copied()) {
@@ -282,6 +283,7 @@ fn apply(scene: Scene, settings: &[String]) -> Result<Scene, SceneError> {
     };
     let mut table: toml::Table =
         toml::from_str(&to_toml(&scene)).map_err(|e| fail(e.message().into()))?;
+    let mut gone = Vec::new();
     for setting in settings {
         let Some((key, value)) = setting.split_once('=') else {
             return Err(fail(format!(
@@ -289,7 +291,8 @@ fn apply(scene: Scene, settings: &[String]) -> Result<Scene, SceneError> {
             )));
         };
         let (key, value) = (key.trim(), value.trim());
-        set_key(&mut table, key, setting_value(value)).map_err(|m| fail(format!("{key}: {m}")))?;
+        set_key(&mut table, key, setting_value(value), &mut gone)
+            .map_err(|m| fail(format!("{key}: {m}")))?;
         // One setting at a time, so that the message names the setting at fault.
         match toml::Table::try_into::<Scene>(table.clone()) {
             Ok(scene) => {
@@ -326,10 +329,26 @@ fn may_be_absent(path: &[&str]) -> bool {
     }
 }
 
-/// Puts a value at a dotted key, or takes away what is there, if anything is.
-fn set_key(table: &mut toml::Table, key: &str, value: toml::Value) -> Result<(), String> {
+/// Puts a value at a dotted key, or takes away what is there, if anything is. `gone` are the keys taken away so far: a part of one of them would
+/// bring it back with every other value a default, which nobody means.
+fn set_key<'a>(
+    table: &mut toml::Table,
+    key: &'a str,
+    value: toml::Value,
+    gone: &mut Vec<&'a str>,
+) -> Result<(), String> {
     let path: Vec<&str> = key.split('.').collect();
+    let within = |whole: &str| key.strip_prefix(whole)?.strip_prefix('.');
+    if let Some((whole, part)) = gone.iter().find_map(|w| Some((w, within(w)?))) {
+        return Err(format!(
+            "{whole}=false took it away before; leave one of the two out, or give it anew with {whole}={{ {part} = … }}"
+        ));
+    }
     let takes_away = value == toml::Value::Boolean(false) && may_be_absent(&path);
+    gone.retain(|whole| *whole != key);
+    if takes_away {
+        gone.push(key);
+    }
     put(table, &path, value, takes_away)
 }
 
