@@ -117,6 +117,21 @@ fn a_run_that_fails_is_a_row_with_its_reason() {
     }
 }
 
+/// A script that goes on with the table of a study where nothing ran must hear of it; the table says why.
+#[test]
+fn a_study_without_any_result_is_no_success() {
+    // The scene's window of analysis begins later.
+    let text = "scene = \"music\"\nset.duration_s = 1.0\nseeds = 2\n";
+    let folder = folder_with("none.toml", text);
+    let out = run_in(folder.path(), "study", &["none.toml"]);
+    let said = String::from_utf8_lossy(&out.stderr);
+    assert_eq!(out.status.code(), Some(1), "{said}");
+    assert!(said.contains("none of the 2 runs has a result"), "{said}");
+    let printed = String::from_utf8_lossy(&out.stdout);
+    assert!(printed.contains("failed 2 times"), "{printed}");
+    assert!(folder.path().join("none/runs.parquet").is_file());
+}
+
 #[test]
 fn what_a_kill_leaves_is_gone_on_with() {
     let folder = folder_with("long.toml", LONG);
@@ -262,15 +277,15 @@ fn slips_get_one_sentence() {
 fn parts_of_another_study_are_not_mixed_in() {
     let folder = folder_with(
         "a.toml",
-        "scene = \"music\"\nset.duration_s = 1.0\nseeds = 2\n",
+        "scene = \"music\"\nset.duration_s = 1.0\nset.analysis_start_s = 0.0\nseeds = 2\n",
     );
     let at = folder.path();
     study(at, &["a.toml", "--out", "x"]);
     let table = std::fs::read(at.join("x/runs.parquet")).expect("a table");
     // With other runs its parts have other names, but the folder is still the first one's.
     for other in [
-        "scene = \"music\"\nset.duration_s = 2.0\nseeds = 2\n",
-        "scene = \"music\"\nset.duration_s = 1.0\nseeds = 3\n",
+        "scene = \"music\"\nset.duration_s = 2.0\nset.analysis_start_s = 0.0\nseeds = 2\n",
+        "scene = \"music\"\nset.duration_s = 1.0\nset.analysis_start_s = 0.0\nseeds = 3\n",
     ] {
         std::fs::write(at.join("b.toml"), other).expect("written");
         for resume in [None, Some("--resume")] {
@@ -349,7 +364,7 @@ points = 16
 
     std::fs::write(
         folder.path().join("kept.toml"),
-        "scene = \"music\"\nset.duration_s = 1.0\nseeds = 2\nrecordings = true\n",
+        "scene = \"music\"\nset.duration_s = 1.0\nset.analysis_start_s = 0.0\nseeds = 2\nrecordings = true\n",
     )
     .expect("written");
     study(folder.path(), &["kept.toml"]);
@@ -362,6 +377,8 @@ points = 16
             "record",
             "--duration",
             "1",
+            "--set",
+            "analysis_start_s=0",
             "--seed",
             "1002",
             "--out",

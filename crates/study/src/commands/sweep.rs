@@ -195,7 +195,13 @@ pub fn report(plan: &Plan, store: &Store, out: &Path, figures: bool, format: For
             text
         }
         Format::Json => format!("{:#}\n", json(plan, &summary, &table, indices.as_ref())),
-    })
+    })?;
+    // Tables of nothing are no success to a script.
+    match summary.runs {
+        0 => Ok(()),
+        n if n == summary.failures => bail!("none of the {n} runs has a result"),
+        _ => Ok(()),
+    }
 }
 
 fn json(
