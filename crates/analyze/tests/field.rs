@@ -294,6 +294,7 @@ fn a_sound_that_nothing_dates_gives_no_lead() {
         "beat_lead_deg",
         "detuning_rad_per_s",
         "pull_rad_per_s",
+        "coupling_rad_per_s",
         "captured",
     ] {
         let value = found.metrics.get(name).unwrap();

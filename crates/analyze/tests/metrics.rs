@@ -16,6 +16,7 @@ const AGREEMENT: f64 = 1e-10;
 const OTHERWISE: &[&str] = &[
     "detuning_rad_per_s",
     "pull_rad_per_s",
+    "coupling_rad_per_s",
     "captured",
     "unstable",
 ];

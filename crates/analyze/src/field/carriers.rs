@@ -74,6 +74,7 @@ pub fn gives(name: &str) -> bool {
         "beat_lead_deg",
         "detuning_rad_per_s",
         "pull_rad_per_s",
+        "coupling_rad_per_s",
         "captured",
     ]
     .contains(&name)
@@ -329,7 +330,7 @@ impl Carriers {
                 continue;
             };
             match (*name, ends) {
-                ("synchrony" | "plv" | "beat_lead_deg", _) if self.apart => {
+                ("synchrony" | "plv" | "beat_lead_deg" | "coupling_rad_per_s", _) if self.apart => {
                     value.reason =
                         Some("if the carriers' clocks agree, which nothing tells".into());
                 }

@@ -37,6 +37,7 @@ const ERRORS: &[(&str, &str)] = &[
     ("beat_lead_deg", "beat_lead_deg_error"),
     ("detuning_rad_per_s", "detuning_rad_per_s_error"),
     ("pull_rad_per_s", "pull_rad_per_s_error"),
+    ("coupling_rad_per_s", "coupling_rad_per_s_error"),
     ("captured", "captured_error"),
     ("roll_lock", "roll_lock_error"),
     ("onset_time_s", "onset_time_s_error"),

@@ -87,10 +87,11 @@ pub struct Field {
 const ABOUT_S: f64 = 60.0;
 
 /// What hangs on when a beat is heard beside a step, or on when the beat began.
-const BY_SOUNDS_CLOCK: [&str; 4] = [
+const BY_SOUNDS_CLOCK: [&str; 5] = [
     "beat_lead_deg",
     "detuning_rad_per_s",
     "pull_rad_per_s",
+    "coupling_rad_per_s",
     "captured",
 ];
 

@@ -46,20 +46,8 @@ pub fn detuning_rad_per_s(c: &Context) -> Value {
         );
     }
     Value {
-        reason: Some(format!(
-            "each carrier's: {}{}",
-            with_intervals(found),
-            among(found.detuning_rad_per_s.len())
-        )),
+        reason: Some(format!("each carrier's: {}", with_intervals(found))),
         ..Value::number(mean(each)).per(each.clone())
-    }
-}
-
-/// What pull and detuning of several rest on.
-fn among(carriers: usize) -> &'static str {
-    match carriers {
-        0 | 1 => "",
-        _ => "; if they mind the beat alone, and not each other (`study fit` tells)",
     }
 }
 
@@ -89,12 +77,31 @@ pub fn pull_rad_per_s(c: &Context) -> Value {
     }
     Value {
         reason: Some(format!(
-            "grows in τ = {:.1} s; phase noise {:.4} rad/√s{}",
-            found.build_up_s,
-            found.noise_rad_per_sqrt_s,
-            among(found.detuning_rad_per_s.len())
+            "grows in τ = {:.1} s; phase noise {:.4} rad/√s",
+            found.build_up_s, found.noise_rad_per_sqrt_s,
         )),
         ..Value::number(found.pull_rad_per_s).ci95(low, high)
+    }
+}
+
+pub fn coupling_rad_per_s(c: &Context) -> Value {
+    let found = match c.adler() {
+        Ok(found) => found,
+        Err(why) => return Value::missing(*why),
+    };
+    let Some([strength, half]) = found.coupling_rad_per_s else {
+        return Value::missing("one carrier alone minds no other");
+    };
+    let [low, high] = [strength - half, strength + half];
+    if half > VAGUE_RAD_PER_S {
+        return Value::missing(format!(
+            "anything from {low:.1} to {high:.1} rad/s goes with the phases (95 %)"
+        ));
+    }
+    let none = low <= 0.0 && high >= 0.0;
+    Value {
+        reason: none.then(|| "none is seen: 0 is within".to_owned()),
+        ..Value::number(strength).ci95(low, high)
     }
 }
 

@@ -324,7 +324,16 @@ pub const METRICS: &[Metric] = &[
         needs: &[Need::Phases, Need::Beat],
         compute: beat::pull_rad_per_s,
         origin: "Adler 1946",
-        definition: "K of Adler's equation φ̇_j = ω_j + K m(t) sin(ψ + Δ_j − φ_j) + noise, m(t) = 1 − exp(−(t − t₀)/τ) from the first beat t₀ on: as implied by how carriers come to the beat or slip past it, from the same phases as the detuning. What carriers do to each other is in it. No value where any stronger pull explains them too; the reason gives the bound.",
+        definition: "K of Adler's equation φ̇_j = ω_j + K m(t) sin(ψ + Δ_j − φ_j) + noise, m(t) = 1 − exp(−(t − t₀)/τ) from the first beat t₀ on: as implied by how carriers come to the beat or slip past it, from the same phases as the detuning, with what carriers do to each other beside it. No value where any stronger pull explains them too; the reason gives the bound.",
+    },
+    Metric {
+        name: "coupling_rad_per_s",
+        unit: "rad/s",
+        label: "coupling of carriers",
+        needs: &[Need::Phases, Need::Beat],
+        compute: beat::coupling_rad_per_s,
+        origin: "Kuramoto 1975",
+        definition: "K_c of φ̇_j = … + (K_c/N) Σ_k sin(φ_k − φ_j): how strongly carriers mind each other, everybody everybody alike, found together with the pull. No value where its 95 % interval reaches farther than 1 rad/s to either side; the reason gives it.",
     },
     Metric {
         name: "captured",

@@ -1,9 +1,10 @@
 //! How likely phases are under Adler's equation, and what makes them most likely.
 
+use super::company::Field;
 use super::dual;
 use super::information::Information;
 use super::unknowns::{
-    BEGUN, BUILD_UP, ERROR, LEAST, MOST, N, NOISE, OFFSET, OWN, PULL, SHARED, place,
+    BEGUN, BUILD_UP, COUPLING, ERROR, LEAST, MOST, N, NOISE, OFFSET, OWN, PULL, SHARED, place,
 };
 use super::walk::{WINDOW, Walk};
 use crate::phase::wrap;
@@ -95,6 +96,7 @@ struct Drive {
     own: Dual,
     offset: Dual,
     noise: Dual,
+    coupling: Dual,
 }
 
 impl Drive {
@@ -124,14 +126,55 @@ impl Drive {
         (rate, back)
     }
 
-    /// One step of h seconds (Runge and Kutta), the pull at its beginning, middle and end; and −∂μ̇/∂μ in its middle.
+    /// What K_c times the field of everybody else adds to them.
     #[inline(always)]
-    fn step(&self, at: State, pull: &[Dual; 3], psi: [f64; 2], h: f64) -> (State, Dual) {
-        let middle = 0.5 * (psi[0] + psi[1]);
-        let (a, _) = self.rate(&at, &pull[0], psi[0]);
-        let (b, back) = self.rate(&at.after(a, 0.5 * h), &pull[1], middle);
-        let (c, _) = self.rate(&at.after(b, 0.5 * h), &pull[1], middle);
-        let (d, _) = self.rate(&at.after(c, h), &pull[2], psi[1]);
+    fn add_company(&self, (rate, back): &mut (State, Dual), at: &State, field: [f64; 2]) {
+        let p = at.variance.value;
+        let (sin, cos) = at.mean.value.sin_cos();
+        let share = (-0.5 * p).exp();
+        let across = share * (field[1] * cos - field[0] * sin);
+        let along = share * (field[0] * cos + field[1] * sin);
+        let (strength, coupling) = (self.coupling.value, &self.coupling);
+        let (forward, backward) = (strength * across, strength * along);
+        let by = |of_coupling: f64, of_variance: f64, of_mean: f64| {
+            [
+                (of_coupling, coupling),
+                (of_variance, &at.variance),
+                (of_mean, &at.mean),
+            ]
+        };
+        rate.mean = rate
+            .mean
+            .with(forward, by(across, -0.5 * forward, -backward));
+        rate.variance = rate.variance.with(
+            -2.0 * backward * p,
+            by(-2.0 * p * along, (p - 2.0) * backward, -2.0 * p * forward),
+        );
+        *back = back.with(backward, by(along, -0.5 * backward, forward));
+    }
+
+    /// One step of h seconds (Runge and Kutta), the pull and the field at its beginning, middle and end; and −∂μ̇/∂μ in its middle.
+    #[inline(always)]
+    fn step(
+        &self,
+        at: State,
+        pull: &[Dual; 3],
+        psi: [f64; 2],
+        field: Option<&Field>,
+        h: f64,
+    ) -> (State, Dual) {
+        let psi = [psi[0], 0.5 * (psi[0] + psi[1]), psi[1]];
+        let rate = |at: State, m: usize| {
+            let mut found = self.rate(&at, &pull[m], psi[m]);
+            if let Some(field) = field {
+                self.add_company(&mut found, &at, field[m]);
+            }
+            found
+        };
+        let (a, _) = rate(at, 0);
+        let (b, back) = rate(at.after(a, 0.5 * h), 1);
+        let (c, _) = rate(at.after(b, 0.5 * h), 1);
+        let (d, _) = rate(at.after(c, h), 2);
         let end = at
             .after(a, h / 6.0)
             .after(b, h / 3.0)
@@ -180,7 +223,9 @@ impl Walk {
                 own: own(OWN),
                 offset: own(OFFSET),
                 noise,
+                coupling: shared(COUPLING),
             };
+            let company = self.company.get(c);
             let Some(first) = phase.iter().position(|y| y.is_finite()) else {
                 continue;
             };
@@ -196,16 +241,21 @@ impl Walk {
                 let psi = [self.beat[k], self.beat[k + 1]];
                 let from = state;
                 let mut kept = Dual::constant(1.0);
-                match self.sounds[k] {
-                    Some(true) => {
+                let field = company.map(|fields| &fields[k]);
+                match (self.sounds[k], field) {
+                    (Some(sounds), field) if sounds || field.is_some() => {
+                        let (pull, psi) = match sounds {
+                            true => (&grown[k], psi),
+                            false => (&[Dual::ZERO; 3], [0.0; 2]),
+                        };
                         let back;
-                        (state, back) = drive.step(state, &grown[k], psi, h);
+                        (state, back) = drive.step(state, pull, psi, field, h);
                         if self.measured {
                             kept = (back * -h).exp();
                         }
                         state.variance.value = state.variance.value.max(1e-12);
                     }
-                    sounds => {
+                    (sounds, _) => {
                         state.mean = state.mean + drive.own * h;
                         state.variance = state.variance + noise * h;
                         if sounds.is_none() {
@@ -242,8 +292,8 @@ impl Walk {
         out
     }
 
-    /// Middle and SD of the normal priors: τ 5 s within a factor 20, σ 0.05 rad/√s and ε 0.03 rad within 50, a carrier's own
-    /// frequency within 1.6 Hz of the beat; Δ anything. None on K.
+    /// Middle and SD of the normal priors: τ 5 s within a factor 20, σ 0.05 rad/√s and ε 0.03 rad within 50, K_c
+    /// within 10 rad/s of none, a carrier's own frequency within 1.6 Hz of the beat; Δ anything. None on K.
     fn add_priors(&self, x: &DVector<f64>, out: &mut Score) {
         for k in BUILD_UP..x.len() {
             let (middle, sd) = match k {
@@ -252,6 +302,7 @@ impl Walk {
                 ERROR => (-7.0, 4.0),
                 BEGUN if self.fresh => (0.0, 1.0),
                 BEGUN => (-1.0, 2.0),
+                COUPLING => (0.0, 3.0),
                 _ if (k - SHARED).is_multiple_of(2) => (self.omega_rad_per_s, 5.0),
                 _ => (0.0, 10.0),
             };

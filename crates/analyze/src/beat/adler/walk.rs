@@ -1,5 +1,6 @@
 //! Phases and beat about the first beat, on the grid of Adler's equation.
 
+use super::company::Field;
 use super::turns::{FOLDED, Turns};
 use super::unknowns::{BUILD_UP, ERROR, NOISE, OFFSET, OWN, PULL, SHARED, place};
 use crate::beat::smooth::smooth;
@@ -51,6 +52,8 @@ pub struct Walk {
     pub phase: Vec<Vec<f64>>,
     /// Whether a beat sounds over each step; `None` where nobody knows how much it pulled: it begins or ends there, or is a tap or a trial.
     pub sounds: Vec<Option<bool>>,
+    /// What each carrier sees of the others, step by step; empty where that does not count.
+    pub company: Vec<Vec<Field>>,
     /// Whether phases were measured.
     pub measured: bool,
     /// Whether the beginning of the beat is in the recording.
@@ -181,6 +184,7 @@ impl Walk {
             least_noise: noise * noise,
             least_error: error * error,
             measured,
+            company: Vec::new(),
             t_s: t,
             beat,
             sounds,
