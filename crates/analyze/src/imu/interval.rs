@@ -191,7 +191,12 @@ pub fn metrics(motion: &Motion, window: Window) -> Metrics {
         value.datum = Datum::Number(x);
         // None of them is below nothing, and a share is one at most.
         let most = if floats.is_some() { 1.0 } else { f64::INFINITY };
-        value.ci95 = Some([(x - half).max(0.0), (x + half).min(most)]);
+        // Noise adds to a largest minus a smallest, the more the longer it is looked for, and never takes from it.
+        let added = match *name {
+            "dz_pp_m" => (drawn.iter().sum::<f64>() / drawn.len() as f64 - x).max(0.0),
+            _ => 0.0,
+        };
+        value.ci95 = Some([(x - half.hypot(added)).max(0.0), (x + half).min(most)]);
         let of_height = OF_COURSE.contains(name).then(|| {
             let corner_hz = motion.settings.height_corner_hz;
             format!("of what heaves faster than {corner_hz} Hz: an inertial sensor loses a slower course of the height")

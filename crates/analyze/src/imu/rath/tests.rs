@@ -225,6 +225,36 @@ fn a_height_that_wanders_slowly_is_less_sure() {
     );
 }
 
+/// The longer noise is looked at, the more it adds to the largest and takes from the smallest: ten minutes of a small heave held the truth never.
+#[test]
+fn what_noise_adds_to_a_largest_minus_a_smallest_is_in_its_interval() {
+    let (swing_m, dt, hz) = (0.02, 0.005, 2.1);
+    for seed in 1..=6 {
+        let mut random = Random(seed);
+        let mut track = Track::default();
+        for k in 0..120_000 {
+            let t = f64::from(k) * dt;
+            let up = -swing_m * (TAU * hz).powi(2) * (TAU * hz * t).sin();
+            let mut noise = |sd: f64| sd * random.normal();
+            track.gyro_rad_per_s.push([0; 3].map(|_| noise(2e-3)));
+            track
+                .accel_m_per_s2
+                .push([noise(0.04), noise(0.04), 9.80665 + up + noise(0.04)]);
+            track.t_s.push(t);
+        }
+        let found = metrics(
+            &motion(&track, &Settings::default()).unwrap(),
+            Window::from(5.0),
+        );
+        let dz = found.get("dz_pp_m").unwrap();
+        let [low, high] = dz.ci95.unwrap();
+        assert!(
+            (low..=high).contains(&(2.0 * swing_m)) && high - low < 0.02,
+            "{dz:?}"
+        );
+    }
+}
+
 /// A roll that begins three quarters into the window, seen at 26 Hz.
 #[test]
 fn what_a_slow_sensor_feels_late_counts_too() {
