@@ -93,7 +93,10 @@ fn jumps(c: &Context, out: &mut Vec<Event>) {
     let (t_s, ratio) = if inputs.normal_n.is_empty() {
         (&inputs.t_s[..], inputs.support_ratio.clone())
     } else {
-        let (total_n, weight_n) = (inputs.total_force_n(), c.weight_n());
+        // What tells no weight tells no jump.
+        let (total_n, Ok(weight_n)) = (inputs.total_force_n(), c.weight_n()) else {
+            return;
+        };
         let ratio = total_n.iter().map(|n| n / weight_n).collect();
         (inputs.force_times(), ratio)
     };

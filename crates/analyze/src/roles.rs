@@ -405,6 +405,7 @@ impl Roles {
                 .patterns
                 .insert(Role::Carriers, natural_order(carriers));
         }
+        let states = !of_type(&["rath.State"]).is_empty();
         let beats = of_type(&["rath.Beat"]).into_iter();
         // Whatever its messages hold: one is a beat.
         let named = channels.iter().filter(|(t, _)| *t == "/beat");
@@ -431,6 +432,13 @@ impl Roles {
                 accel_bias_m_per_s2: user.accel_bias_m_per_s2,
                 gyro_scale_error: user.gyro_scale_error,
             };
+            let motion = [Role::Height, Role::Roll, Role::Pitch, Role::Yaw];
+            let says = |role: &Role| !user.patterns(*role).is_empty();
+            let there = |p: &String| channels.iter().any(|(t, _)| matches(p, t));
+            let sensed = user.imu.iter().any(there);
+            if sensed && !motion.iter().any(says) && !states {
+                roles.leave_poses_out(motion);
+            }
             for role in Role::ALL {
                 let mut said = user.patterns(role);
                 if said.is_empty() {
@@ -496,6 +504,19 @@ impl Roles {
             }
         }
         out
+    }
+
+    /// Who names the load's sensor, and no pose, wants its motion from there. A model's own state stays, which is no other body's.
+    fn leave_poses_out(&mut self, motion: [Role; 4]) {
+        let poses: Vec<String> = (motion.iter())
+            .filter_map(|role| self.patterns.remove(role))
+            .flatten()
+            .collect();
+        self.chosen.clear();
+        if let Some(pose) = poses.first() {
+            let text = "is not looked at for the motion, which the sensor of imu = … tells; name it as roll and height in the file for --roles if it is wanted";
+            self.chosen.push((pose.clone(), text.to_owned()));
+        }
     }
 
     /// Leaves topics out of a role.
@@ -850,6 +871,33 @@ mod tests {
         // Beats are heard in a sound; its messages are none.
         assert_eq!(roles("").topic(Role::Beats), Some("/beat"));
         assert_eq!(roles("beats = \"/audio/drum\"").topic(Role::Beats), None);
+    }
+
+    /// The odometry of who carries stands beside the load's sensor.
+    #[test]
+    fn who_names_the_sensor_wants_the_motion_from_there() {
+        let channels = [
+            ("/robot1/odom", "nav_msgs/msg/Odometry"),
+            ("/payload/imu", "sensor_msgs/msg/Imu"),
+        ];
+        let with = |text: &str| {
+            let user: RolesFile = toml::from_str(text).unwrap();
+            Roles::infer(channels.into_iter(), Some(&user))
+        };
+        let moves = |roles: &Roles| !roles.patterns(Role::Roll).is_empty();
+        assert!(moves(&with("")));
+        let sensed = with("imu = \"/payload/*\"");
+        assert!(!moves(&sensed));
+        let [(topic, why)] = &sensed.chosen[..] else {
+            panic!("{:?}", sensed.chosen)
+        };
+        assert!(
+            topic.starts_with("/robot1/odom") && why.contains("imu = "),
+            "{why}"
+        );
+        assert!(moves(&with("imu = \"/none\"")));
+        let said = "imu = \"/payload/imu\"\nroll = \"/robot1/odom.pose.pose.orientation.roll\"";
+        assert!(moves(&with(said)));
     }
 
     #[test]

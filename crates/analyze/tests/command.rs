@@ -1108,6 +1108,90 @@ fn height_is_judged_on_its_own_clock() {
     assert_eq!(slow_height["metrics"]["mechanism"]["value"], "parametric");
 }
 
+/// The pose of a robot that hardly rolls was taken for the motion of the load that it carries, and a pose with z down for a load on its back.
+#[test]
+fn a_pose_that_is_not_the_loads_is_said() {
+    let folder = tempfile::tempdir().unwrap();
+    let roll = |t: f64| 0.14 * tone(1.1, t);
+    let times = || (0..4000).map(|k| f64::from(k) / 100.0);
+    let of = |share: f64, offset: f64| {
+        let pose = |t: f64| {
+            let (sin, cos) = (0.5 * (share * roll(t) + offset)).sin_cos();
+            let orientation = format!("{{\"x\":{sin},\"y\":0.0,\"z\":0.0,\"w\":{cos}}}");
+            (t, format!("{{\"orientation\":{orientation}}}"))
+        };
+        let sensor = |t: f64| {
+            let (turns, (sin, cos)) = ((roll(t + 1e-4) - roll(t - 1e-4)) / 2e-4, roll(t).sin_cos());
+            let gyro = format!("{{\"x\":{turns},\"y\":0.0,\"z\":0.0}}");
+            let felt = [9.81 * sin, 9.81 * cos];
+            let felt = format!("{{\"x\":0.0,\"y\":{},\"z\":{}}}", felt[0], felt[1]);
+            let text = format!("{{\"angular_velocity\":{gyro},\"linear_acceleration\":{felt}}}");
+            (t, text)
+        };
+        let channels = [
+            ("/robot", times().map(pose).collect()),
+            ("/load/imu", times().map(sensor).collect()),
+        ];
+        let file = told(folder.path(), &channels);
+        let roles = "imu = \"/load/imu\"\nroll = \"/robot.orientation.roll\"\npitch = \"/robot.orientation.pitch\"\n";
+        with_roles(folder.path(), &file, roles)
+    };
+    for (share, offset, kind) in [
+        (1.0, 0.0, None),
+        (0.1, 0.0, Some("two_bodies")),
+        (1.0, std::f64::consts::PI, Some("upside_down")),
+    ] {
+        let kinds = kinds(&of(share, offset));
+        for said in ["two_bodies", "upside_down"] {
+            if kind.is_none_or(|kind| kind == said) {
+                assert_eq!(kinds.iter().any(|k| k == said), kind.is_some(), "{kinds:?}");
+            }
+        }
+    }
+}
+
+/// Forces as they act on the sensor, or along another axis, gave an unloaded time and jumps of what stood on its feet; those that are there twice
+/// weighed twice the load.
+#[test]
+fn forces_that_weigh_nothing_tell_no_jump() {
+    let folder = tempfile::tempdir().unwrap();
+    let of = |sign: f64, mean_n: f64, mass: &str| {
+        let force = |t: f64| {
+            (
+                t,
+                format!("{{\"z\":{}}}", sign * (mean_n + 100.0 * tone(2.2, t))),
+            )
+        };
+        let messages: Vec<(f64, String)> = (0..4000).map(|k| force(f64::from(k) / 100.0)).collect();
+        let file = told(folder.path(), &[("/a", messages.clone()), ("/b", messages)]);
+        let roles = format!("forces = [\"/a.z\", \"/b.z\"]\n{mass}");
+        let found = with_roles(folder.path(), &file, &roles);
+        let jumps = found["events"].as_array().unwrap().iter();
+        let jumps = jumps.filter(|e| e["kind"] == "jump").count();
+        (found["metrics"]["t_float"].clone(), jumps)
+    };
+    let (right, jumps) = of(1.0, 80.0, "");
+    assert!(
+        right["value"].as_f64().unwrap() > 0.1 && jumps > 80,
+        "{right}"
+    );
+    for (sign, mean_n, mass, why) in [
+        (-1.0, 80.0, "", "-160 N"),
+        (-1.0, 80.0, "mass_kg = 16.3", "-160 N"),
+        (1.0, 0.5, "", "no load's weight"),
+    ] {
+        let (none, jumps) = of(sign, mean_n, mass);
+        assert!(none["value"].is_null() && jumps == 0, "{none}");
+        assert!(none["reason"].as_str().unwrap().contains(why), "{none}");
+    }
+    let (twice, _) = of(1.0, 80.0, "mass_kg = 8.15");
+    assert!(twice["value"].is_number());
+    assert!(
+        twice["reason"].as_str().unwrap().contains("M·g is 80 N"),
+        "{twice}"
+    );
+}
+
 /// Channels of one topic that differ in length, that alternate, and messages that are shuffled: one line, no jitter.
 #[test]
 fn a_signal_is_the_same_in_whatever_order_it_comes() {

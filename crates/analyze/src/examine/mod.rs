@@ -90,6 +90,7 @@ pub fn examine(
     }
     let window = until(field.last_s(), &mut warnings);
     field.fill(&mut inputs);
+    field.hold_against_pose(&inputs, &roles, window);
     quality.extend(remarks);
     quality.extend(pass.coverage(window, &field.own_s));
     quality.extend(pass.unknown_movers());

@@ -15,6 +15,9 @@ const LEAST_ABSENT: f64 = 0.02;
 const LEAST_ABSENT_S: f64 = 1.0;
 /// No attitude that is wrapped goes beyond half a turn (rad); a little more for what rounds.
 const LARGEST_ANGLE_RAD: f64 = 3.15;
+/// A load that rolls farther than this, so often, does not hang on shoulders: cosine and share.
+const UPSIDE_DOWN_COS: f64 = -0.5;
+const MOSTLY: f64 = 0.9;
 /// Where transforms of ROS and of Foxglove hold a place and an orientation.
 const TRANSFORMS: [(&str, &str); 3] = [
     (
@@ -61,6 +64,19 @@ impl Pass<'_> {
                 let (topic, field) = self.names(entry);
                 out.push(Quality::remark(topic, "large_angle", format!(
                     "{field} reaches {most:.1}, taken as radians: where these are degrees, write angle_unit = \"deg\" in a roles file"
+                )));
+            }
+        }
+        for entry in self.players(Role::Roll) {
+            let upside = |x: f64| match self.in_degrees(entry) {
+                true => x.to_radians().cos() < UPSIDE_DOWN_COS,
+                false => x.cos() < UPSIDE_DOWN_COS,
+            };
+            let down = entry.kept.iter().filter(|(_, x)| upside(*x)).count();
+            if down as f64 > MOSTLY * entry.kept.len() as f64 {
+                let (topic, field) = self.names(entry);
+                out.push(Quality::remark(topic, "upside_down", format!(
+                    "{field} is beyond 120 deg nearly all the time: z points down there, or the quaternion stands in the order w, x, y, z; roll, and what rests on it, is of a load on its back"
                 )));
             }
         }

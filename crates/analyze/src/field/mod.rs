@@ -86,6 +86,10 @@ pub struct Field {
 /// Of a log that is too long for memory so much is read before and behind the window, s.
 const ABOUT_S: f64 = 60.0;
 
+/// A pose and a sensor that lean by so different an amount are not on one body: by this factor and as many degrees more.
+const OTHER_BODY: f64 = 1.5;
+const OTHER_BODY_DEG: f64 = 1.0;
+
 /// What hangs on when a beat is heard beside a step, or on when the beat began.
 const BY_SOUNDS_CLOCK: [&str; 5] = [
     "beat_lead_deg",
@@ -493,6 +497,42 @@ impl Field {
             self.filled.beat = true;
             inputs.beat_phase_rad = self.course().phase(&inputs.t_s);
             inputs.sources.beat = self.beat_source.into();
+        }
+    }
+
+    /// Holds the pose that the motion is taken from against the load's sensor, and tells where they cannot be of one body.
+    pub fn hold_against_pose(&mut self, inputs: &Inputs, roles: &Roles, window: Window) {
+        let (Some(motion), Some(topic)) = (&self.motion, &self.topic) else {
+            return;
+        };
+        if self.filled.motion {
+            return;
+        }
+        // Together roll and pitch lean alike however the sensor is turned about the vertical.
+        let lean_deg = |i: &Inputs| -> Option<f64> {
+            let range = window.range(&i.t_s);
+            let variance = |x: &[f64]| -> Option<f64> {
+                let x = x.get(range.clone())?;
+                let seen: Vec<f64> = x.iter().copied().filter(|x| x.is_finite()).collect();
+                let mean = seen.iter().sum::<f64>() / seen.len() as f64;
+                let squares = seen.iter().map(|x| (x - mean).powi(2)).sum::<f64>();
+                (seen.len() > 1).then(|| squares / seen.len() as f64)
+            };
+            let both = variance(&i.roll_rad)? + variance(&i.pitch_rad)?;
+            Some(both.sqrt().to_degrees())
+        };
+        let (Some(pose_deg), Some(sensor_deg)) = (lean_deg(inputs), lean_deg(&motion.inputs))
+        else {
+            return;
+        };
+        let [less, more] = [pose_deg.min(sensor_deg), pose_deg.max(sensor_deg)];
+        if more > OTHER_BODY * less + OTHER_BODY_DEG {
+            let pose = roles.topic(Role::Roll).unwrap_or("the pose");
+            let text = format!(
+                "roll and pitch together vary by {sensor_deg:.1} deg (RMS) here, by {pose_deg:.1} deg in {pose}, from where the motion is taken: they are not of one body; imu = \"{topic}\" in a file for --roles takes it from here"
+            );
+            let remark = Quality::remark(topic, "two_bodies", text);
+            self.quality.push(remark);
         }
     }
 

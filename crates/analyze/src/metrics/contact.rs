@@ -8,11 +8,17 @@ use nalgebra::DMatrix;
 /// The share ε of the weight below which the support counts as gone (paper: 0.05).
 pub const FLOAT_SHARE: f64 = 0.05;
 
+/// A mean support that differs from M·g by more than this factor, a quarter (ln), is another load's, or forces are missing or there twice.
+const ANOTHER_WEIGHT: f64 = 0.25;
+
 fn share(count: usize, of: usize) -> f64 {
     count as f64 / of as f64
 }
 
 pub fn contact_loss(c: &Context) -> Value {
+    if let Err(why) = c.upright() {
+        return Value::missing(why);
+    }
     let forces = c.forces();
     let slack = (0..forces.len())
         .filter(|k| forces.columns.iter().any(|n| n[*k] <= 0.0))
@@ -24,6 +30,9 @@ pub fn contact_loss(c: &Context) -> Value {
 }
 
 pub fn contact_loss_mean(c: &Context) -> Value {
+    if let Err(why) = c.upright() {
+        return Value::missing(why);
+    }
     let forces = c.forces();
     let per: Vec<f64> = forces
         .columns
@@ -53,19 +62,23 @@ pub fn t_float(c: &Context) -> Value {
             ratio.x.len(),
         ));
     }
-    let (total, weight_n) = (c.total_force_n(), c.weight_n());
+    let (total, weight_n) = match c.weight_n() {
+        Ok(weight_n) => (c.total_force_n(), weight_n),
+        Err(why) => return Value::missing(why),
+    };
     let source = match c.inputs.mass_kg {
         Some(_) => String::new(),
         None => "forces; M·g taken as the mean support".to_owned(),
     };
-    Value::number(share(
-        total
-            .iter()
-            .filter(|n| **n <= FLOAT_SHARE * weight_n)
-            .count(),
-        total.len(),
-    ))
-    .source(source)
+    let mean_n = mean(&total);
+    let other = ((mean_n / weight_n).ln().abs() > ANOTHER_WEIGHT).then(|| {
+        format!("the mean support is {mean_n:.0} N, but M·g is {weight_n:.0} N: is mass_kg right, and is every handle there once?")
+    });
+    let held = |n: &&f64| **n <= FLOAT_SHARE * weight_n;
+    Value {
+        reason: other,
+        ..Value::number(share(total.iter().filter(held).count(), total.len())).source(source)
+    }
 }
 
 pub fn force_mean_n(c: &Context) -> Value {

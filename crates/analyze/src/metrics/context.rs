@@ -107,6 +107,9 @@ pub struct Context<'a> {
     adler: OnceCell<Result<Adler, &'static str>>,
 }
 
+/// A mean support below this share of its root mean square is none. On shoulders that leave the load alone half the time it is 0.7.
+const LEAST_SUPPORT: f64 = 0.1;
+
 impl<'a> Context<'a> {
     /// Nothing is computed yet.
     pub fn new(inputs: &'a Inputs, window: Window) -> Self {
@@ -180,11 +183,43 @@ impl<'a> Context<'a> {
     }
 
     /// M·g (N). Where no mass is known the mean support over the window: over many strides what is carried neither rises nor falls.
-    pub fn weight_n(&self) -> f64 {
+    ///
+    /// # Errors
+    /// As [`Self::upright`]; without a mass also forces whose mean is next to nothing beside them.
+    pub fn weight_n(&self) -> Result<f64, String> {
+        self.upright()?;
         match self.inputs.mass_kg {
-            Some(mass_kg) => mass_kg * self.inputs.gravity_m_per_s2,
-            None => super::contact::mean(&self.total_force_n()),
+            Some(mass_kg) => Ok(mass_kg * self.inputs.gravity_m_per_s2),
+            None => {
+                let (mean_n, rms_n) = self.support_n();
+                let tells = mean_n > LEAST_SUPPORT * rms_n;
+                tells.then_some(mean_n).ok_or_else(|| format!(
+                    "the mean support is {mean_n:.1} N, which is no load's weight: does it stand on another axis of the sensor? mass_kg in a roles file, or forces = [\"TOPIC.FIELD\", …], says it"
+                ))
+            }
         }
+    }
+
+    /// That carriers push what is carried up on the whole, as N says.
+    ///
+    /// # Errors
+    /// A mean support that is negative: a sentence.
+    pub fn upright(&self) -> Result<(), String> {
+        let (mean_n, rms_n) = self.support_n();
+        match mean_n < -LEAST_SUPPORT * rms_n {
+            true => Err(format!(
+                "the mean support is {mean_n:.0} N, as if the load hung from the sky: these are forces on the carriers, or of a sensor that counts down; they are wanted with the other sign"
+            )),
+            false => Ok(()),
+        }
+    }
+
+    /// Mean and root mean square of the support, N.
+    fn support_n(&self) -> (f64, f64) {
+        let total = self.total_force_n();
+        let squares: Vec<f64> = total.iter().map(|n| n * n).collect();
+        let mean = super::contact::mean;
+        (mean(&total), mean(&squares).sqrt())
     }
 
     /// The carriers' phases (rad).

@@ -424,13 +424,16 @@ pub(super) fn thousands(n: u64) -> String {
     out
 }
 
-/// The end of a path says more than its beginning.
+/// The end of a path says what it is, and its beginning whose: the middle is left out.
 pub(super) fn shortened(path: &str, width: usize) -> String {
     let n = path.chars().count();
-    match n > width {
-        true => format!("…{}", path.chars().skip(n - width + 1).collect::<String>()),
-        false => path.to_owned(),
+    if n <= width {
+        return path.to_owned();
     }
+    let head = width / 3;
+    let [begins, ends] = [(0, head), (n + head + 1 - width, n)]
+        .map(|(from, to)| path.chars().skip(from).take(to - from).collect::<String>());
+    format!("{begins}…{ends}")
 }
 
 #[cfg(test)]
@@ -446,6 +449,7 @@ mod tests {
         assert_eq!(short(1234567.0), "1.2e6");
         assert_eq!(plain(15.0, 3), "15");
         assert_eq!(thousands(1840000), "1,840,000");
-        assert_eq!(shortened("/imu/rath.angular_velocity.x", 10), "…elocity.x");
+        assert_eq!(shortened("/imu/rath.angular_velocity.x", 10), "/im…city.x");
+        assert_eq!(shortened("/imu/rath.x", 11), "/imu/rath.x");
     }
 }

@@ -641,20 +641,36 @@ impl<'a> Taker<'a> {
                     text,
                 })
             };
+            let mut odd: BTreeMap<String, Odd> = BTreeMap::new();
             for (path, count, time) in &watch.odd {
-                let t_s = seconds(*time, start_ns);
                 let field = path
                     .strip_prefix(topic.as_str())
                     .unwrap_or(path)
                     .trim_start_matches(['.', ':']);
+                let items = odd.entry(list_of(field)).or_insert_with(|| Odd {
+                    field: field.to_owned(),
+                    items: 0,
+                    count: 0,
+                    first: *time,
+                });
+                items.items += 1;
+                items.count += count;
+                items.first = items.first.min(*time);
+            }
+            for (list, odd) in &odd {
+                let t_s = seconds(odd.first, start_ns);
+                let of = match odd.items {
+                    1 => odd.field.clone(),
+                    n => format!("{n} items of {list}"),
+                };
                 say(
                     Kind::Nan,
-                    *count,
+                    odd.count,
                     Some(t_s),
                     format!(
-                        "{} of {field} {} NaN or infinite, first at {t_s:.3} s",
-                        counted(*count, "value", "values"),
-                        if *count == 1 { "is" } else { "are" }
+                        "{} of {of} {} NaN or infinite, first at {t_s:.3} s",
+                        counted(odd.count, "value", "values"),
+                        if odd.count == 1 { "is" } else { "are" }
                     ),
                 );
             }
@@ -792,4 +808,38 @@ pub(super) fn raw(
         );
     }
     Ok(())
+}
+
+/// Items of one list, or one field, with values that are no numbers.
+struct Odd {
+    field: String,
+    items: usize,
+    count: u64,
+    first: i64,
+}
+
+/// A field's name with its items' numbers left out: a covariance of 36 is told of once.
+fn list_of(field: &str) -> String {
+    let parts = field.split('[').enumerate();
+    let kept = parts.map(|(k, part)| match (k, part.split_once(']')) {
+        (1.., Some((number, rest))) if number.bytes().all(|b| b.is_ascii_digit()) => {
+            format!("[]{rest}")
+        }
+        (0, _) => part.to_owned(),
+        _ => format!("[{part}"),
+    });
+    kept.collect()
+}
+
+#[test]
+fn items_of_a_list_are_one() {
+    for (field, list) in [
+        ("pose.covariance[35]", "pose.covariance[]"),
+        ("effort[3]", "effort[]"),
+        ("a[0].b[12].c", "a[].b[].c"),
+        ("keyed[left].x", "keyed[left].x"),
+        ("plain.x", "plain.x"),
+    ] {
+        assert_eq!(list_of(field), list);
+    }
 }

@@ -99,6 +99,8 @@ const NARROW: f64 = 0.1;
 const SAME: f64 = 0.1;
 /// What a step detector bends the phase by within the stretch before the first beat, SD by twins, rad.
 const BENT_RAD: f64 = 0.01;
+/// What its band takes from a coupling or adds to it, SD by twenty twins of 0.5 rad/s, rad/s.
+const COUPLING_LOST_RAD_PER_S: f64 = 0.03;
 
 /// Adler's test on gait phases and a beat's phase (rad, wrapped or not; NaN where there is none) at ascending times (s).
 ///
@@ -120,6 +122,10 @@ pub fn adler(
     let carriers = walk.phase.len();
     let bent = match walk.before_s > 0.0 && measured {
         true => BENT_RAD / walk.before_s,
+        false => 0.0,
+    };
+    let lost = match walk.measured {
+        true => COUPLING_LOST_RAD_PER_S,
         false => 0.0,
     };
     let own: Vec<usize> = (0..carriers).map(|c| place(OWN, c)).collect();
@@ -144,7 +150,8 @@ pub fn adler(
         noise_rad_per_sqrt_s: walk.noise(&x),
         detuning_rad_per_s: own.iter().map(|k| x[*k] - walk.omega_rad_per_s).collect(),
         detuning_half_rad_per_s: own.iter().map(|k| half(cover[*k])).collect(),
-        coupling_rad_per_s: (carriers > 1).then(|| [x[COUPLING], half_of(cover[COUPLING])]),
+        coupling_rad_per_s: (carriers > 1)
+            .then(|| [x[COUPLING], half_of(cover[COUPLING]).hypot(1.96 * lost)]),
         offset_rad: (0..carriers).map(|c| wrap(x[place(OFFSET, c)])).collect(),
         beat_rad_per_s: walk.omega_rad_per_s,
     };
