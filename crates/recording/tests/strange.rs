@@ -647,8 +647,7 @@ fn json_with_bare_words() {
         lines(&found),
         [
             "nan /j: 1 value of x is NaN or infinite, first at 0.000 s",
-            "nan /j: 1 value of y[0] is NaN or infinite, first at 0.000 s",
-            "nan /j: 1 value of y[1] is NaN or infinite, first at 0.000 s",
+            "nan /j: 2 values of y[] (2 items) are NaN or infinite, first at 0.000 s",
         ]
     );
 }

@@ -430,7 +430,7 @@ pub(super) fn shortened(path: &str, width: usize) -> String {
     if n <= width {
         return path.to_owned();
     }
-    let head = width / 3;
+    let head = width / 2;
     let [begins, ends] = [(0, head), (n + head + 1 - width, n)]
         .map(|(from, to)| path.chars().skip(from).take(to - from).collect::<String>());
     format!("{begins}…{ends}")
@@ -449,7 +449,7 @@ mod tests {
         assert_eq!(short(1234567.0), "1.2e6");
         assert_eq!(plain(15.0, 3), "15");
         assert_eq!(thousands(1840000), "1,840,000");
-        assert_eq!(shortened("/imu/rath.angular_velocity.x", 10), "/im…city.x");
+        assert_eq!(shortened("/imu/rath.angular_velocity.x", 10), "/imu/…ty.x");
         assert_eq!(shortened("/imu/rath.x", 11), "/imu/rath.x");
     }
 }

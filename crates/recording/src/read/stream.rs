@@ -661,7 +661,7 @@ impl<'a> Taker<'a> {
                 let t_s = seconds(odd.first, start_ns);
                 let of = match odd.items {
                     1 => odd.field.clone(),
-                    n => format!("{n} items of {list}"),
+                    n => format!("{list} ({n} items)"),
                 };
                 say(
                     Kind::Nan,

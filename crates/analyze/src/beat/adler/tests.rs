@@ -161,18 +161,18 @@ fn what_carriers_do_to_each_other_is_told_from_the_beat() {
         error: 0.06,
         ..people
     };
-    for (case, coupling) in [
-        (MUSIC, 0.5),
-        (MUSIC, 2.0),
-        (SLIPPING, 0.5),
-        (people, 0.5),
-        (measured, 0.5),
+    // Of noisy measured carriers the Fisher information makes too much of how Δω and K_c go together: docs/metrics.md says so.
+    for (case, coupling, least) in [
+        (MUSIC, 0.5, 0.85),
+        (MUSIC, 2.0, 0.85),
+        (SLIPPING, 0.5, 0.85),
+        (people, 0.5, 0.8),
+        (measured, 0.5, 0.7),
     ] {
         let case = Case { coupling, ..case };
         let [pull, detuning, open, among] = all_coverage(case, 40);
-        assert!(among >= 0.8, "{case:?}");
-        assert!(pull >= 0.8 && detuning >= 0.8, "{case:?}");
-        assert!(open <= 0.3, "{open} {case:?}");
+        assert!(pull >= 0.9 && detuning >= least, "{case:?}");
+        assert!(among >= 0.8 && open <= 0.4, "{case:?}");
     }
 }
 
