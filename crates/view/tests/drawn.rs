@@ -317,6 +317,34 @@ fn values_that_are_none_are_counted() {
     assert_eq!(take.remarks, [expected]);
 }
 
+/// A robot's transforms alone, which our own recordings repeat and others do not.
+#[test]
+fn transforms_without_a_state_are_curves() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("tf.mcap");
+    let mut writer = RecordingWriter::create(&path, &WriterOptions::default()).unwrap();
+    let channel = writer
+        .raw_channel(&RawChannel {
+            topic: "/tf",
+            message_encoding: "json",
+            schema_name: "foxglove.FrameTransform",
+            schema_encoding: "jsonschema",
+            schema_data: b"{\"type\":\"object\"}",
+            metadata: &Default::default(),
+        })
+        .unwrap();
+    for k in 0..100 {
+        let message = format!("{{\"translation\":{{\"z\":{}}}}}", k % 7);
+        writer
+            .message(channel, k * 10_000_000, message.as_bytes())
+            .unwrap();
+    }
+    writer.finish().unwrap();
+    let (sent, _) = taken(&path);
+    let curves = sent.rows().into_keys();
+    assert!(curves.into_iter().any(|entity| entity.contains("/tf")));
+}
+
 /// Names that the viewer's tree cannot tell apart, and one that is called as another's second plot.
 #[test]
 fn topics_of_like_names_are_all_drawn() {

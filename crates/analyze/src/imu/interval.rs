@@ -201,6 +201,11 @@ pub fn metrics(motion: &Motion, window: Window) -> Metrics {
             let corner_hz = motion.settings.height_corner_hz;
             format!("of what heaves faster than {corner_hz} Hz: an inertial sensor loses a slower course of the height")
         });
+        // What is so much smaller than the line at f/2 is the sensor's noise as much as the load's motion.
+        let of_noise = (*name == "subharmonic_ratio" && x > BEYOND_SENSORS).then(|| {
+            value.ci95 = None;
+            "without an interval: so little roll at f is the sensor's noise as much as the load's motion, and the ratio this much or more".to_owned()
+        });
         let of_place = (!placed)
             .then(|| format!("{UNPLACED}, and the interval knows no better, for {PLACE_IT}"));
         let of_rate = (OF_EDGES.contains(name) && rate_hz < ENOUGH_HZ).then(|| {
@@ -211,6 +216,7 @@ pub fn metrics(motion: &Motion, window: Window) -> Metrics {
             .take()
             .into_iter()
             .chain(of_height)
+            .chain(of_noise)
             .chain(of_place)
             .chain(of_rate)
             .collect();
@@ -456,6 +462,8 @@ fn variance(x: &[f64]) -> f64 {
 
 /// Metrics of the roll's lines.
 const OF_ROLL: &[&str] = &["roll_peak_hz", "subharmonic_ratio"];
+/// Ratio of the roll's power at f/2 to that at f beyond which no gyroscope tells the latter: 10° to 0.01°.
+const BEYOND_SENSORS: f64 = 1e6;
 /// Metrics of the heave's lines and growth: none where its RMS is below the budget's wandering.
 const OF_HEAVE: &[&str] = &[
     "peak_hz",

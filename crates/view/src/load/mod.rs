@@ -176,14 +176,18 @@ impl<'a> Plan<'a> {
             "rath.Energy",
             "rath.Beat",
             "foxglove.SceneUpdate",
-            "tf2_msgs/TFMessage",
-            "foxglove.FrameTransform",
-            "foxglove.FrameTransforms",
             // Sound has no curve but the one that nobody sees at this scale.
             "foxglove.RawAudio",
         ];
         let mut ours = of(&schemas);
-        // The state says the same.
+        // The state says the same; without one transforms are curves like any other numbers.
+        if !of(&["rath.State"]).is_empty() {
+            ours.extend(of(&[
+                "tf2_msgs/TFMessage",
+                "foxglove.FrameTransform",
+                "foxglove.FrameTransforms",
+            ]));
+        }
         ours.extend(
             info.channels
                 .iter()

@@ -51,6 +51,25 @@ const AS_IT_SITS: Mounting = Mounting::Known(UnitQuaternion::new_unchecked(
     nalgebra::Quaternion::new(1.0, 0.0, 0.0, 0.0),
 ));
 
+/// Where a load does not roll at f, a ratio to that is one to the sensor's noise: eight of these differed by far more than their intervals.
+#[test]
+fn a_ratio_to_nothing_has_no_interval() {
+    for (at_f_rad, told) in [(0.0, false), (0.01, true)] {
+        let motion = felt(
+            |t| 0.15 * (TAU * 1.05 * t).sin() + at_f_rad * (TAU * 2.1 * t).sin(),
+            |t| 1.0 + 0.3 * (TAU * 2.1 * t).sin(),
+            1.0,
+            [0.0; 3],
+            AS_IT_SITS,
+            None,
+        );
+        let found = metrics(&motion, MOST);
+        let ratio = found.get("subharmonic_ratio").unwrap();
+        assert_eq!(ratio.ci95.is_some(), told, "{ratio:?}");
+        assert_eq!(ratio.as_f64().unwrap() < 1e6, told, "{ratio:?}");
+    }
+}
+
 /// A bias of 1.8 standard deviations is within every interval, and without one that of a calibrated sensor is narrow.
 #[test]
 fn a_bias_is_in_the_intervals_of_a_known_mounting() {
