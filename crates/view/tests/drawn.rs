@@ -6,7 +6,7 @@ use common::{ROWS, imus, imus_logged, run, run_logged, taken};
 use recording::cdr::Imu;
 use recording::read::Recording;
 use recording::topics::MessageKind;
-use recording::write::{RawChannel, RecordingWriter, WriterOptions};
+use recording::write::{ChannelId, RawChannel, RecordingWriter, WriterOptions};
 use view::load::{Detail, load, options};
 
 #[test]
@@ -281,21 +281,29 @@ fn a_sensor_without_a_rate_is_named_too() {
     assert!(titles.iter().any(named), "{titles:?}");
 }
 
+/// A channel of JSON messages without a schema, or with an empty one of this name.
+fn json_channel(writer: &mut RecordingWriter, topic: &str, schema_name: &str) -> ChannelId {
+    let schema: (&str, &[u8]) = match schema_name {
+        "" => ("", b""),
+        _ => ("jsonschema", b"{\"type\":\"object\"}"),
+    };
+    let channel = RawChannel {
+        topic,
+        message_encoding: "json",
+        schema_name,
+        schema_encoding: schema.0,
+        schema_data: schema.1,
+        metadata: &Default::default(),
+    };
+    writer.raw_channel(&channel).unwrap()
+}
+
 #[test]
 fn values_that_are_none_are_counted() {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("arm.mcap");
     let mut writer = RecordingWriter::create(&path, &WriterOptions::default()).unwrap();
-    let channel = writer
-        .raw_channel(&RawChannel {
-            topic: "/arm",
-            message_encoding: "json",
-            schema_name: "",
-            schema_encoding: "",
-            schema_data: b"",
-            metadata: &Default::default(),
-        })
-        .unwrap();
+    let channel = json_channel(&mut writer, "/arm", "");
     for k in 0..1000 {
         let x = if (300..340).contains(&k) {
             "NaN"
@@ -323,16 +331,7 @@ fn transforms_without_a_state_are_curves() {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("tf.mcap");
     let mut writer = RecordingWriter::create(&path, &WriterOptions::default()).unwrap();
-    let channel = writer
-        .raw_channel(&RawChannel {
-            topic: "/tf",
-            message_encoding: "json",
-            schema_name: "foxglove.FrameTransform",
-            schema_encoding: "jsonschema",
-            schema_data: b"{\"type\":\"object\"}",
-            metadata: &Default::default(),
-        })
-        .unwrap();
+    let channel = json_channel(&mut writer, "/tf", "foxglove.FrameTransform");
     for k in 0..100 {
         let message = format!("{{\"translation\":{{\"z\":{}}}}}", k % 7);
         writer
@@ -355,16 +354,7 @@ fn topics_of_like_names_are_all_drawn() {
         "/motor", "/motor/2", "a_b", "/a_b", "/a.b", "a.b", "/a//b", "a/b",
     ];
     for (i, topic) in topics.into_iter().enumerate() {
-        let channel = writer
-            .raw_channel(&RawChannel {
-                topic,
-                message_encoding: "json",
-                schema_name: "",
-                schema_encoding: "",
-                schema_data: b"",
-                metadata: &Default::default(),
-            })
-            .unwrap();
+        let channel = json_channel(&mut writer, topic, "");
         for k in 0..20 {
             let message = format!("{{\"x\":{},\"y\":{k}}}", 1000 * (i + 1));
             writer

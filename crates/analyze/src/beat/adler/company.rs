@@ -1,10 +1,7 @@
 //! What carriers see of each other: the mean field of everybody else, along the way.
 
-use super::walk::Walk;
+use super::walk::{Field, Walk};
 use std::f64::consts::PI;
-
-/// (1/N) Σ_{j≠i} e^{iφ_j}, real and imaginary, at the beginning, in the middle and at the end of a step. Who is not seen is not in it.
-pub type Field = [[f64; 2]; 3];
 
 /// The field that each carrier is in, step by step; empty where there is only one.
 pub fn company(walk: &Walk) -> Vec<Vec<Field>> {

@@ -1,12 +1,11 @@
 //! How likely phases are under Adler's equation, and what makes them most likely.
 
-use super::company::Field;
 use super::dual;
 use super::information::Information;
 use super::unknowns::{
     BEGUN, BUILD_UP, COUPLING, ERROR, LEAST, MOST, N, NOISE, OFFSET, OWN, PULL, SHARED, place,
 };
-use super::walk::{WINDOW, Walk};
+use super::walk::{Field, WINDOW, Walk};
 use crate::phase::wrap;
 use nalgebra::DVector;
 

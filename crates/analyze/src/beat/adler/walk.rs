@@ -1,6 +1,5 @@
 //! Phases and beat about the first beat, on the grid of Adler's equation.
 
-use super::company::Field;
 use super::turns::{FOLDED, Turns};
 use super::unknowns::{BUILD_UP, ERROR, NOISE, OFFSET, OWN, PULL, SHARED, place};
 use crate::beat::smooth::smooth;
@@ -41,6 +40,10 @@ const ROUNDING: f64 = 1e-6;
 const FEWEST: usize = 20;
 
 pub const TOO_LITTLE: &str = "too little is walked about the first beat";
+
+/// What a carrier sees of the others, (1/N) Σ_{j≠i} e^{iφ_j}, real and imaginary, at the beginning, in the middle and at the end of a step. Who is
+/// not seen is not in it.
+pub type Field = [[f64; 2]; 3];
 
 /// Phases and beat on the grid.
 pub struct Walk {
