@@ -68,10 +68,11 @@ impl Pass<'_> {
             }
         }
         for entry in self.players(Role::Roll) {
-            let upside = |x: f64| match self.in_degrees(entry) {
-                true => x.to_radians().cos() < UPSIDE_DOWN_COS,
-                false => x.cos() < UPSIDE_DOWN_COS,
+            let unit_rad = match self.in_degrees(entry) {
+                true => 1f64.to_radians(),
+                false => 1.0,
             };
+            let upside = |x: f64| (unit_rad * x).cos() < UPSIDE_DOWN_COS;
             let down = entry.kept.iter().filter(|(_, x)| upside(*x)).count();
             if down as f64 > MOSTLY * entry.kept.len() as f64 {
                 let (topic, field) = self.names(entry);

@@ -202,8 +202,9 @@ pub fn metrics(motion: &Motion, window: Window) -> Metrics {
             format!("of what heaves faster than {corner_hz} Hz: an inertial sensor loses a slower course of the height")
         });
         // What is so much smaller than the line at f/2 is the sensor's noise as much as the load's motion.
-        let of_noise = (*name == "subharmonic_ratio" && x > BEYOND_SENSORS).then(|| {
-            value.ci95 = None;
+        let drowned = *name == "subharmonic_ratio" && x > BEYOND_SENSORS;
+        value.ci95 = value.ci95.filter(|_| !drowned);
+        let of_noise = drowned.then(|| {
             "without an interval: so little roll at f is the sensor's noise as much as the load's motion, and the ratio this much or more".to_owned()
         });
         let of_place = (!placed)

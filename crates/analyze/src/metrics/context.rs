@@ -187,11 +187,10 @@ impl<'a> Context<'a> {
     /// # Errors
     /// As [`Self::upright`]; without a mass also forces whose mean is next to nothing beside them.
     pub fn weight_n(&self) -> Result<f64, String> {
-        self.upright()?;
+        let (mean_n, rms_n) = self.upright()?;
         match self.inputs.mass_kg {
             Some(mass_kg) => Ok(mass_kg * self.inputs.gravity_m_per_s2),
             None => {
-                let (mean_n, rms_n) = self.support_n();
                 let tells = mean_n > LEAST_SUPPORT * rms_n;
                 tells.then_some(mean_n).ok_or_else(|| format!(
                     "the mean support is {mean_n:.1} N, which is no load's weight: does it stand on another axis of the sensor? mass_kg in a roles file, or forces = [\"TOPIC.FIELD\", …], says it"
@@ -200,26 +199,21 @@ impl<'a> Context<'a> {
         }
     }
 
-    /// That carriers push what is carried up on the whole, as N says.
+    /// Mean and root mean square of the support, N, whose mean pushes what is carried up.
     ///
     /// # Errors
     /// A mean support that is negative: a sentence.
-    pub fn upright(&self) -> Result<(), String> {
-        let (mean_n, rms_n) = self.support_n();
+    pub fn upright(&self) -> Result<(f64, f64), String> {
+        let total = self.total_force_n();
+        let squares: Vec<f64> = total.iter().map(|n| n * n).collect();
+        let mean = super::contact::mean;
+        let (mean_n, rms_n) = (mean(&total), mean(&squares).sqrt());
         match mean_n < -LEAST_SUPPORT * rms_n {
             true => Err(format!(
                 "the mean support is {mean_n:.0} N, as if the load hung from the sky: these are forces on the carriers, or of a sensor that counts down; they are wanted with the other sign"
             )),
-            false => Ok(()),
+            false => Ok((mean_n, rms_n)),
         }
-    }
-
-    /// Mean and root mean square of the support, N.
-    fn support_n(&self) -> (f64, f64) {
-        let total = self.total_force_n();
-        let squares: Vec<f64> = total.iter().map(|n| n * n).collect();
-        let mean = super::contact::mean;
-        (mean(&total), mean(&squares).sqrt())
     }
 
     /// The carriers' phases (rad).

@@ -45,12 +45,10 @@ impl Most {
 /// Watches samples for what is said after a run.
 pub struct Remarks {
     weight_n: f64,
-    /// A scene without contact and gait is thrown, not carried.
-    carried: bool,
     beside_m: Most,
     given_m: Most,
-    away_m: Most,
-    above: bool,
+    above_m: Most,
+    below_m: Most,
     force_n: Most,
     /// Whether there are handles, and none ever met its shoulder.
     untouched: bool,
@@ -62,12 +60,15 @@ impl Remarks {
         let weight_n = scene.body.mass_kg * gravity.sum::<f64>().sqrt();
         Self {
             weight_n,
-            carried: scene.effects.contact.is_some() || scene.effects.gait.is_some(),
             beside_m: Most::above(BREADTH_M),
             given_m: Most::above(GIVES_M),
-            away_m: Most::above(AWAY_M),
-            above: false,
-            force_n: Most::above(WEIGHTS * weight_n),
+            above_m: Most::above(AWAY_M),
+            below_m: Most::above(AWAY_M),
+            // Without gravity nothing is so many weights.
+            force_n: Most::above(match weight_n > 0.0 {
+                true => WEIGHTS * weight_n,
+                false => f64::INFINITY,
+            }),
             untouched: scene.effects.contact.is_some() && !scene.carriers.handles_m.is_empty(),
         }
     }
@@ -84,17 +85,12 @@ impl Remarks {
                 self.beside_m.look(i + 1, beside_m, t_s);
                 self.given_m.look(i + 1, sample.compression_m[i], t_s);
             }
-            if self.weight_n > 0.0 {
-                self.force_n.look(i + 1, normal_n, t_s);
-            }
+            self.force_n.look(i + 1, normal_n, t_s);
         }
         if !sample.shoulder_m.is_empty() {
             let up_m = sample.pose.position_m[2] - shoulders_m;
-            let before_m = self.away_m.value;
-            self.away_m.look(1, up_m.abs(), t_s);
-            if self.away_m.value > before_m {
-                self.above = up_m > 0.0;
-            }
+            self.above_m.look(1, up_m, t_s);
+            self.below_m.look(1, -up_m, t_s);
         }
     }
 
@@ -107,8 +103,13 @@ impl Remarks {
                     .to_owned(),
             );
         }
-        if let Some(Most { value, t_s, .. }) = self.away_m.told().filter(|_| self.carried) {
-            let where_to = if self.above { "above" } else { "below" };
+        let (away_m, where_to) = match self.above_m.value > self.below_m.value {
+            true => (self.above_m, "above"),
+            false => (self.below_m, "below"),
+        };
+        // A scene without contact and gait is thrown, not carried.
+        let carried = scene.effects.contact.is_some() || scene.effects.gait.is_some();
+        if let Some(Most { value, t_s, .. }) = away_m.told().filter(|_| carried) {
             let why = match scene.effects.contact {
                 Some(_) => "nobody carried it then",
                 None => "without effects.contact nobody carries it",

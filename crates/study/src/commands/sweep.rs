@@ -197,11 +197,10 @@ pub fn report(plan: &Plan, store: &Store, out: &Path, figures: bool, format: For
         Format::Json => format!("{:#}\n", json(plan, &summary, &table, indices.as_ref())),
     })?;
     // Tables of nothing are no success to a script.
-    match summary.runs {
-        0 => Ok(()),
-        n if n == summary.failures => bail!("none of the {n} runs has a result"),
-        _ => Ok(()),
+    if summary.runs > 0 && summary.failures == summary.runs {
+        bail!("none of the {} runs has a result", summary.runs);
     }
+    Ok(())
 }
 
 fn json(

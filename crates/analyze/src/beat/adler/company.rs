@@ -9,28 +9,28 @@ pub fn company(walk: &Walk) -> Vec<Vec<Field>> {
     if n < 2 {
         return Vec::new();
     }
-    let steps = walk.t_s.len() - 1;
-    // Phases turn evenly enough that halfway between two is their mean.
-    let courses: Vec<Vec<f64>> = walk.phase.iter().map(|p| course(walk, p)).collect();
-    let pointer = |c: usize, k: usize| -> Field {
-        let [a, b] = [courses[c][k], courses[c][k + 1]];
-        [a, 0.5 * (a + b), b].map(|phi| match phi.is_finite() {
-            true => [phi.cos(), phi.sin()],
-            false => [0.0; 2],
-        })
+    let pointer = |phi: f64| match phi.is_finite() {
+        true => [phi.cos(), phi.sin()],
+        false => [0.0; 2],
     };
-    let combine = |a: Field, b: Field, sign: f64| -> Field {
+    // Phases turn evenly enough that halfway between two is their mean.
+    let mut fields: Vec<Vec<Field>> = (walk.phase.iter())
+        .map(|phase| course(walk, phase))
+        .map(|phi| {
+            let step = |phi: &[f64]| [phi[0], 0.5 * (phi[0] + phi[1]), phi[1]].map(pointer);
+            phi.windows(2).map(step).collect()
+        })
+        .collect();
+    let combine = |a: &Field, b: &Field, sign: f64| -> Field {
         std::array::from_fn(|m| std::array::from_fn(|x| a[m][x] + sign * b[m][x]))
     };
-    let all: Vec<Field> = (0..steps)
-        .map(|k| (0..n).fold(Field::default(), |sum, c| combine(sum, pointer(c, k), 1.0)))
-        .collect();
-    let others = |c: usize| -> Vec<Field> {
-        let of = |k: usize| combine(all[k], pointer(c, k), -1.0);
-        let shared = |field: Field| field.map(|z| z.map(|x| x / n as f64));
-        (0..steps).map(|k| shared(of(k))).collect()
-    };
-    (0..n).map(others).collect()
+    for k in 0..walk.t_s.len() - 1 {
+        let all = (fields.iter()).fold(Field::default(), |sum, own| combine(&sum, &own[k], 1.0));
+        for own in &mut fields {
+            own[k] = combine(&all, &own[k], -1.0).map(|z| z.map(|x| x / n as f64));
+        }
+    }
+    fields
 }
 
 /// A carrier's phase at each moment of the grid, straight between what was observed; NaN outside, and through more than half a turn off the

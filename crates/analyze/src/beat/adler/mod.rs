@@ -117,7 +117,7 @@ pub fn adler(
 ) -> Result<Adler, &'static str> {
     let mut walk = Walk::new(t_s, phase_rad, beat_rad, measured)?;
     walk.company = company::company(&walk);
-    let (x, best) = walk.highest(walk.starts()?);
+    let (x, best) = walk.highest()?;
     let cover = best.information.variances().ok_or(walk::TOO_LITTLE)?;
     let carriers = walk.phase.len();
     let bent = match walk.before_s > 0.0 && measured {
@@ -165,20 +165,22 @@ fn half_of(variance: f64) -> f64 {
 }
 
 impl Walk {
-    /// The highest summit that is climbed to from these starts.
-    fn highest<const M: usize>(&self, starts: [DVector<f64>; M]) -> (DVector<f64>, Score) {
-        let mut starts = starts.into_iter();
-        // OK because there is always a start.
-        let first = self.climb(starts.next().expect("a start"), false, None);
-        let others: Vec<_> = (starts.collect::<Vec<_>>().into_par_iter())
+    /// The highest summit that is climbed to.
+    fn highest(&self) -> Result<(DVector<f64>, Score), &'static str> {
+        let [first, others @ ..] = self.starts()?;
+        let first = self.climb(first, false, None);
+        let others: Vec<_> = (others.into_par_iter())
             .map(|start| self.climb(start, false, Some(&first)))
             .collect();
-        others.into_iter().fold(first, |highest, other| {
-            match other.1.value > highest.1.value + SAME || !highest.1.value.is_finite() {
+        let higher =
+            |highest: (DVector<f64>, Score), other: (DVector<f64>, Score)| match other.1.value
+                > highest.1.value + SAME
+                || !highest.1.value.is_finite()
+            {
                 true => other,
                 false => highest,
-            }
-        })
+            };
+        Ok(others.into_iter().fold(first, higher))
     }
 
     /// An end of the interval of K: where the likelihood, at its best over all else, has fallen by [`FALL`].

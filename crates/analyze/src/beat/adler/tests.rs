@@ -32,6 +32,11 @@ const MUSIC: Case = Case {
     noise: 0.01,
     error: 0.0,
 };
+/// As noisy as people walk.
+const PEOPLE: Case = Case {
+    noise: 0.2,
+    ..MUSIC
+};
 const SLIPPING: Case = Case {
     pull: 1.0,
     detuning: [0.7, 1.3],
@@ -153,20 +158,16 @@ fn coverage(case: Case, seeds: u64) -> [f64; 3] {
 /// Carriers who mind each other too: K came out half too strong, and of Δω two intervals of thirty held.
 #[test]
 fn what_carriers_do_to_each_other_is_told_from_the_beat() {
-    let people = Case {
-        noise: 0.2,
-        ..MUSIC
-    };
     let measured = Case {
         error: 0.06,
-        ..people
+        ..PEOPLE
     };
     // Of noisy measured carriers the Fisher information makes too much of how Δω and K_c go together: docs/metrics.md says so.
     for (case, coupling, least) in [
         (MUSIC, 0.5, 0.85),
         (MUSIC, 2.0, 0.85),
         (SLIPPING, 0.5, 0.85),
-        (people, 0.5, 0.8),
+        (PEOPLE, 0.5, 0.8),
         (measured, 0.5, 0.7),
     ] {
         let case = Case { coupling, ..case };
@@ -182,10 +183,6 @@ fn intervals_hold_what_they_promise() {
         noise: 0.3,
         ..MUSIC
     };
-    let people = Case {
-        noise: 0.2,
-        ..MUSIC
-    };
     let measured = |case: Case| Case {
         error: 0.06,
         ..case
@@ -196,7 +193,7 @@ fn intervals_hold_what_they_promise() {
         noisy,
         measured(MUSIC),
         measured(SLIPPING),
-        measured(people),
+        measured(PEOPLE),
     ] {
         let [pull, detuning, open] = coverage(case, 200);
         assert!((0.9..=0.99).contains(&pull), "{pull}");
