@@ -55,6 +55,8 @@ pub enum Kind {
     TrailingBytes,
     /// Sequences with more items than are made into signals.
     LongSequence,
+    /// A place of a list that holds now one thing, now another, as the names that its items carry say.
+    MixedItems,
 }
 
 impl Kind {
@@ -86,6 +88,7 @@ impl Kind {
             Kind::UnknownChannel => "unknown_channel",
             Kind::TrailingBytes => "trailing_bytes",
             Kind::LongSequence => "long_sequence",
+            Kind::MixedItems => "mixed_items",
         }
     }
 

@@ -8,6 +8,7 @@ use super::{
     container::{Block, Definitions, Fields, chunk_header, op},
     decode::{Decoder, Place, SchemaRef},
     decoders::{self, NoDecoder},
+    names::Sight,
     rows::{Long, MAX_PLACES, Rows, Selection},
 };
 use crate::finding::Kind;
@@ -24,6 +25,7 @@ pub(super) struct ChannelBatch {
     pub columns: Vec<BatchColumn>,
     pub absent: Vec<(String, u64)>,
     pub long: Vec<(Long, u64)>,
+    pub names: Vec<Sight>,
     pub trailing: u64,
     pub remark: Option<String>,
 }
@@ -474,7 +476,12 @@ impl<'a> ChannelState<'a> {
         let info = &recording.info.channels[index];
         ChannelState {
             index,
-            rows: Rows::new(&info.topic, select, recording.most_items(&info.schema)),
+            rows: Rows::new(
+                &info.topic,
+                select,
+                recording.most_items(&info.schema),
+                recording.options.by_name,
+            ),
             state: State::New,
             fresh: true,
             waiting: Vec::new(),
@@ -624,6 +631,7 @@ impl<'a> ChannelState<'a> {
                 long: (self.rows.long.some())
                     .chain(self.rows.long_types.some())
                     .collect(),
+                names: self.rows.names.take_new(),
                 trailing: self.rows.trailing,
                 remark: self.rows.remark.take(),
             });

@@ -2,10 +2,12 @@
 
 use std::collections::HashMap;
 
-use serde::de::{DeserializeSeed, IgnoredAny, MapAccess, SeqAccess, Visitor};
+use serde::de::{DeserializeSeed, Error as _, IgnoredAny, MapAccess, SeqAccess, Visitor};
+use serde_json::Value;
 
 use super::{
     decode::{Decoder, SchemaRef},
+    names,
     rows::{Long, MAX_PLACES, Rows, UNWANTED, places_of},
 };
 
@@ -22,7 +24,20 @@ struct Node {
     children: Vec<(String, Node)>,
     /// Places among the children.
     by_key: HashMap<String, usize>,
+    /// Items by their place, and by their names.
     items: Vec<Node>,
+    by_name: HashMap<String, Node>,
+    /// Its number among the lists with names.
+    list: Option<usize>,
+}
+
+impl Node {
+    fn item(&self, label: impl std::fmt::Display) -> Node {
+        Node {
+            field: format!("{}[{label}]", self.field),
+            ..Node::default()
+        }
+    }
 }
 
 pub(super) fn open(schema: &SchemaRef<'_>, rows: &mut Rows) -> Result<Box<dyn Decoder>, String> {
@@ -75,6 +90,8 @@ impl Json {
             rows,
             pending: &mut self.pending,
             stamp: &mut stamp,
+            names: &[],
+            item: None,
         };
         place.deserialize(&mut deserializer)?;
         deserializer.end()?;
@@ -159,6 +176,10 @@ struct Place<'a, 'r> {
     rows: &'a mut Rows<'r>,
     pending: &'a mut Vec<(u32, f64)>,
     stamp: &'a mut Stamp,
+    /// What a list of names before this value calls its items, if it is a list.
+    names: &'a [String],
+    /// Which list it is an item of, and where.
+    item: Option<(usize, usize)>,
 }
 
 impl Place<'_, '_> {
@@ -228,9 +249,12 @@ impl<'de> Visitor<'de> for Place<'_, '_> {
             rows,
             pending,
             stamp,
+            item,
+            ..
         } = self;
         // Keys mostly come in the same order, so the next one is tried first.
         let (mut hint, mut keys) = (0, 0);
+        let (mut names, mut texts): (Vec<String>, Vec<(String, String)>) = Default::default();
         while let Some(key) = map.next_key::<std::borrow::Cow<'_, str>>()? {
             keys += 1;
             if keys > MAX_KEYS {
@@ -246,6 +270,7 @@ impl<'de> Visitor<'de> for Place<'_, '_> {
                 map.next_value::<IgnoredAny>()?;
                 continue;
             }
+            let called = names::is_name(&key).then(|| key.to_string());
             let known = match node.children.get(hint) {
                 Some((known, _)) if *known == key => Some(hint),
                 _ => node.by_key.get(&*key).copied(),
@@ -267,12 +292,43 @@ impl<'de> Visitor<'de> for Place<'_, '_> {
             });
             hint = position + 1;
             let child = &mut node.children[position].1;
-            map.next_value_seed(Place {
+            let mut value = None;
+            if let Some(key) = called {
+                let told: Value = map.next_value()?;
+                match &told {
+                    Value::String(text) => texts.push((key, text.clone())),
+                    Value::Array(list) if names::is_list(&key) => {
+                        let text = |item: &Value| item.as_str().map(str::to_owned);
+                        names = list.iter().map_while(text).collect();
+                        let list =
+                            *(child.list).get_or_insert_with(|| rows.names.list(&child.field));
+                        for (place, name) in names.iter().enumerate().filter(|_| !rows.by_name) {
+                            rows.names.see(list, place, name.as_bytes());
+                        }
+                    }
+                    _ => {}
+                }
+                value = Some(told);
+            }
+            let place = Place {
                 node: child,
                 rows,
                 pending,
                 stamp,
-            })?;
+                names: &names,
+                item: None,
+            };
+            match value {
+                Some(value) => place.deserialize(value).map_err(A::Error::custom)?,
+                None => map.next_value_seed(place)?,
+            }
+        }
+        let text = names::of_item(texts.iter().map(|(key, _)| key.as_str()));
+        if let (Some((list, place)), Some(key)) = (item, text)
+            && let Some((_, name)) = texts.iter().find(|(known, _)| known == key)
+            && !rows.by_name
+        {
+            rows.names.see(list, place, name.as_bytes());
         }
         Ok(())
     }
@@ -283,7 +339,10 @@ impl<'de> Visitor<'de> for Place<'_, '_> {
             rows,
             pending,
             stamp,
+            names,
+            ..
         } = self;
+        let list = *(node.list).get_or_insert_with(|| rows.names.list(&node.field));
         let before = pending.len();
         let takes = places_of(node.field.len());
         let mut item = 0;
@@ -302,27 +361,62 @@ impl<'de> Visitor<'de> for Place<'_, '_> {
                 }
                 rows.enter(takes);
             } else {
-                if node.items.len() <= item {
-                    rows.places += takes;
-                    node.items.push(Node {
-                        field: format!("{}[{item}]", node.field),
-                        ..Node::default()
-                    });
+                let (mut value, mut name) = (None, None);
+                if rows.by_name {
+                    let Some(told) = seq.next_element::<Value>()? else {
+                        break;
+                    };
+                    name = name_of(&told).or_else(|| names.get(item).cloned());
+                    value = Some(told);
                 }
+                let inner = match name.filter(|name| !name.is_empty()) {
+                    Some(name) => {
+                        if !node.by_name.contains_key(&name) {
+                            let inner = node.item(&name);
+                            rows.places += places_of(inner.field.len());
+                            node.by_name.insert(name.clone(), inner);
+                        }
+                        node.by_name.get_mut(&name)
+                    }
+                    None => {
+                        if node.items.len() <= item {
+                            rows.places += takes;
+                            let inner = node.item(item);
+                            node.items.push(inner);
+                        }
+                        node.items.get_mut(item)
+                    }
+                };
+                let Some(inner) = inner else { break };
                 let place = Place {
-                    node: &mut node.items[item],
+                    node: inner,
                     rows,
                     pending,
                     stamp,
+                    names: &[],
+                    item: Some((list, item)),
                 };
-                if seq.next_element_seed(place)?.is_none() {
-                    break;
+                match value {
+                    Some(value) => place.deserialize(value).map_err(A::Error::custom)?,
+                    None => {
+                        if seq.next_element_seed(place)?.is_none() {
+                            break;
+                        }
+                    }
                 }
             }
             item += 1;
         }
         Ok(())
     }
+}
+
+/// What an item calls itself.
+fn name_of(item: &Value) -> Option<String> {
+    let object = item.as_object()?;
+    let texts = object.iter().filter(|(_, value)| value.is_string());
+    let key = names::of_item(texts.map(|(key, _)| key.as_str()))?;
+    object[key].as_str().map(str::to_owned)
 }
 
 /// Keys of one object that become signals.

@@ -4,8 +4,11 @@
 //! start, so every run has at most eight tables of offsets, made when first needed; a run is checked against the message's end once.
 //! Between runs stand the things of varying length: strings, sequences, arrays of structs that hold either.
 
+use std::{collections::HashMap, ops::Range};
+
 use super::{
     decode::Place,
+    names,
     rows::{Long, Rows, UNWANTED, places_of},
     types::{MAX_FIELDS, Prim, Type, Types},
 };
@@ -141,8 +144,27 @@ struct Items {
     part: bool,
     /// Whether they become signals, as those of items that are left out do not.
     take: bool,
-    /// Programs of the items seen so far.
+    /// What they are called by.
+    called: Names,
+    /// Programs of the items seen so far, by place and by name.
     programs: Vec<Program>,
+    by_name: HashMap<Box<[u8]>, Program>,
+}
+
+/// What the items of a list are called by, beside their place.
+#[derive(Clone, Debug)]
+enum Names {
+    None,
+    /// By a text in the item: the number of the list, and what leads up to the text, once it was needed.
+    Own {
+        list: usize,
+        field: String,
+        head: Option<Program>,
+    },
+    /// They are names themselves, of lists behind this one: its number.
+    Of(usize),
+    /// By those of a list before this one.
+    Beside,
 }
 
 /// A compiled type in one shape.
@@ -180,6 +202,8 @@ struct Context<'a> {
     shape: Shape,
     data: &'a [u8],
     skips: Vec<(Type, bool, Program)>,
+    /// Where the texts of the last list of names lie.
+    names: Vec<Range<usize>>,
     /// The flat table in the making; `None` where it is not wanted, or once something was met that it cannot hold.
     trace: Option<Box<Flat>>,
 }
@@ -272,6 +296,8 @@ struct Compiler<'a, 'r> {
     program: Program,
     run: Run,
     fields: usize,
+    /// Whether the field in hand is a list of names, or a list behind one.
+    names: Names,
 }
 
 impl Program {
@@ -317,6 +343,7 @@ impl Program {
             shape,
             data,
             skips: std::mem::take(&mut self.skips),
+            names: Vec::new(),
             trace,
         };
         let end = self.run(&mut context, 0, rows);
@@ -375,10 +402,7 @@ impl Program {
             at = match op {
                 Op::Run(run) if context.shape.big_endian => run.read::<true>(context, at, rows)?,
                 Op::Run(run) => run.read::<false>(context, at, rows)?,
-                Op::Text(field) => {
-                    let (length, at) = context.length(at, field)?;
-                    end_of(context.data, at, length, field)?
-                }
+                Op::Text(field) => context.text(at, field)?.end,
                 Op::WideText(field) => {
                     let (length, at) = context.length(at, field)?;
                     let bytes = length
@@ -422,6 +446,24 @@ impl Context<'_> {
         };
         Ok((length as usize, at + 4))
     }
+
+    /// Where a text lies.
+    fn text(&mut self, at: usize, field: &str) -> Result<Range<usize>, Fail> {
+        let (length, at) = self.length(at, field)?;
+        Ok(at..end_of(self.data, at, length, field)?)
+    }
+
+    /// The flat table is to hold only for messages with the same text there.
+    fn hold_to(&mut self, text: &Range<usize>) {
+        let Some(flat) = &mut self.trace else { return };
+        for at in text.clone().step_by(4) {
+            // Its length stands before it, and is as much the same.
+            let at = at.min(text.end - 4);
+            let bytes = std::array::from_fn(|k| self.data[at + k]);
+            // OK because messages with a flat table are shorter than 4 GiB.
+            flat.checks.push((at as u32, bytes));
+        }
+    }
 }
 
 fn compile(
@@ -440,6 +482,7 @@ fn compile(
         program: Program::default(),
         run: Run::default(),
         fields: 0,
+        names: Names::None,
     };
     match part {
         true => compiler.part(kind, field)?,
@@ -512,7 +555,8 @@ impl Compiler<'_, '_> {
                 // A message that is a header is stamped too.
                 let header =
                     role == Role::Header || (field.is_empty() && name.ends_with("/Header"));
-                for (inner, kind) in fields {
+                let names = names::list_of(&types.structs[*index]);
+                for (k, (inner, kind)) in fields.iter().enumerate() {
                     let role = match inner.as_str() {
                         "header" if field.is_empty() => Role::Header,
                         "stamp" if header => Role::Stamp,
@@ -525,7 +569,15 @@ impl Compiler<'_, '_> {
                     } else {
                         format!("{field}.{inner}")
                     };
+                    self.names = match names {
+                        Some(list) if list == k && self.take => {
+                            Names::Of(self.rows.names.list(&path))
+                        }
+                        Some(list) if list < k && self.take => Names::Beside,
+                        _ => Names::None,
+                    };
                     self.add(kind, &path, role)?;
+                    self.names = Names::None;
                 }
             }
             Type::Array(inner, count) => {
@@ -533,7 +585,13 @@ impl Compiler<'_, '_> {
                 self.array(inner, *count, headed, field)?;
             }
             Type::Sequence(inner) => {
-                let items = self.items(inner, self.shape.has_header(kind), false, field);
+                let names = std::mem::replace(&mut self.names, Names::None);
+                let mut items = self.items(inner, self.shape.has_header(kind), false, field);
+                match names {
+                    Names::Beside if items.prim.is_none() => {}
+                    Names::None => {}
+                    names => items.called = names,
+                }
                 self.push(Op::Sequence(items));
             }
         }
@@ -608,8 +666,25 @@ impl Compiler<'_, '_> {
         Ok(())
     }
 
-    fn items(&self, inner: &Type, header: bool, part: bool, field: &str) -> Box<Items> {
+    fn items(&mut self, inner: &Type, header: bool, part: bool, field: &str) -> Box<Items> {
+        let called = match inner {
+            Type::Struct(index) if self.take => {
+                let fields = self.types.structs[*index].fields.iter();
+                let texts = fields.filter(|(_, kind)| *kind == Type::Text);
+                match names::of_item(texts.map(|(name, _)| name.as_str())) {
+                    Some(name) => Names::Own {
+                        list: self.rows.names.list(field),
+                        field: name.to_owned(),
+                        head: None,
+                    },
+                    None => Names::None,
+                }
+            }
+            _ => Names::None,
+        };
         Box::new(Items {
+            called,
+            by_name: HashMap::new(),
             field: field.to_owned(),
             kind: inner.clone(),
             prim: inner.prim(),
@@ -661,34 +736,48 @@ impl Items {
     ) -> Result<usize, Fail> {
         let fits = count <= rows.max_items;
         let mut taken = 0;
+        if let Names::Of(_) = self.called {
+            context.names.clear();
+        }
         while self.take && fits && taken < count {
-            let room = match self.programs.get(taken) {
+            let name = self.name(context, at, taken, rows)?;
+            let known = match &name {
+                Some(name) => self.by_name.get_mut(name),
+                None => self.programs.get_mut(taken),
+            };
+            let room = match &known {
                 Some(program) => rows.enter(program.places),
                 // Without any room nothing has to be compiled to be refused.
-                None if !rows.has_room(1) => rows.enter(1),
-                None => {
-                    let (types, field) = (context.types, format!("{}[{taken}]", self.field));
-                    let program = compile(
-                        types,
-                        &self.kind,
-                        &field,
-                        context.shape,
-                        rows,
-                        (true, self.part),
-                    )
-                    .map_err(|_| other(at, &self.field, TOO_MANY))?;
-                    let room = rows.enter(program.places);
-                    if room {
-                        rows.places += program.places;
-                        self.programs.push(program);
-                    }
-                    room
-                }
+                None => rows.has_room(1) || rows.enter(1),
             };
             if !room {
                 break;
             }
-            at = self.programs[taken].run(context, at, rows)?;
+            let program = match known {
+                Some(program) => program,
+                None => {
+                    let label = match &name {
+                        Some(name) => String::from_utf8_lossy(name).into_owned(),
+                        None => taken.to_string(),
+                    };
+                    let (types, field) = (context.types, format!("{}[{label}]", self.field));
+                    let how = (true, self.part);
+                    let program = compile(types, &self.kind, &field, context.shape, rows, how)
+                        .map_err(|_| other(at, &self.field, TOO_MANY))?;
+                    if !rows.enter(program.places) {
+                        break;
+                    }
+                    rows.places += program.places;
+                    match name {
+                        Some(name) => self.by_name.entry(name).insert_entry(program).into_mut(),
+                        None => {
+                            self.programs.push(program);
+                            &mut self.programs[taken]
+                        }
+                    }
+                }
+            };
+            at = program.run(context, at, rows)?;
             taken += 1;
         }
         if taken == count {
@@ -700,6 +789,58 @@ impl Items {
         // The flat table does not count what is left out.
         context.trace = None;
         self.skip(context, at, count - taken, rows)
+    }
+
+    /// What the item at `at` is called, where items are called by name; where they are called by their place, the name is only noted.
+    fn name(
+        &mut self,
+        context: &mut Context<'_>,
+        at: usize,
+        place: usize,
+        rows: &mut Rows,
+    ) -> Result<Option<Box<[u8]>>, Fail> {
+        // Only the item itself goes into the flat table; and what is wrong with it is told when it is read.
+        let trace = context.trace.take();
+        let found = match &mut self.called {
+            Names::None => None,
+            Names::Own { list, field, head } => {
+                if head.is_none() {
+                    let how = (false, self.part);
+                    let (types, shape) = (context.types, context.shape);
+                    let mut whole = compile(types, &self.kind, "", shape, rows, how)
+                        .map_err(|_| other(at, &self.field, TOO_MANY))?;
+                    let is_name = |op: &Op| matches!(op, Op::Text(name) if name == field);
+                    let name = whole.ops.iter().position(is_name);
+                    whole.ops.truncate(name.unwrap_or(0));
+                    *head = Some(whole);
+                }
+                let text = head.as_mut().and_then(|head| {
+                    let at = head.run(context, at, rows).ok()?;
+                    context.text(at, field).ok()
+                });
+                text.map(|text| (text, Some(*list)))
+            }
+            Names::Of(list) => {
+                let text = context.text(at, &self.field).ok();
+                context.names.extend(text.clone());
+                text.map(|text| (text, Some(*list)))
+            }
+            Names::Beside => context.names.get(place).map(|text| (text.clone(), None)),
+        };
+        context.trace = trace;
+        let Some((text, list)) = found else {
+            return Ok(None);
+        };
+        let name = &context.data[text.clone()];
+        let name = name.strip_suffix(&[0]).unwrap_or(name);
+        if let Some(list) = list {
+            if !rows.by_name {
+                rows.names.see(list, place, name);
+            }
+            context.hold_to(&text);
+        }
+        let by_name = rows.by_name && !matches!(self.called, Names::Of(_)) && !name.is_empty();
+        Ok(by_name.then(|| name.into()))
     }
 
     /// Steps over items without looking at them.

@@ -16,6 +16,7 @@ mod early;
 mod idl;
 mod json;
 mod layout;
+mod names;
 mod protobuf;
 mod ros1;
 mod ros2msg;
@@ -55,6 +56,9 @@ pub struct ReadOptions {
     pub max_message_bytes: u64,
     /// A sequence becomes signals only where it has at most so many items; in the project's own messages, whose lists are people, up to 4096.
     pub max_items: usize,
+    /// Items of lists that carry a name, as the frames of `/tf` and the joints of `/joint_states` do, are called by it and not by their place:
+    /// `transforms[base_link]`.
+    pub by_name: bool,
     /// Threads that unpack and decode, the caller's included; 0 asks the machine.
     pub threads: usize,
     /// Whether these limits are options of the program, `--max-items` and so on: then what is said of one names it.
@@ -80,6 +84,7 @@ impl Default for ReadOptions {
             max_chunk_bytes: 4 << 30,
             max_message_bytes: 256 << 20,
             max_items: 64,
+            by_name: false,
             threads: 0,
             limits_are_options: false,
         }

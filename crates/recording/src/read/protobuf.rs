@@ -11,6 +11,7 @@ use prost_reflect::{DescriptorPool, FieldDescriptor, Kind as FieldKind, MessageD
 
 use super::{
     decode::{Decoder, SchemaRef},
+    names,
     rows::{Long, MAX_PLACES, Rows, UNWANTED, places_of},
 };
 
@@ -165,6 +166,7 @@ fn unfolded(bits: u64) -> i64 {
 }
 
 /// The bytes that are left of a message.
+#[derive(Clone)]
 struct Input<'a> {
     rest: &'a [u8],
 }
@@ -292,7 +294,12 @@ enum Plan {
         field: String,
         /// Of each.
         places: usize,
+        /// In the order of the message, or of the first sight of their names.
         items: Vec<Node>,
+        /// Number of the text that names an item, and of the list among those with names.
+        name: Option<(u64, usize)>,
+        /// Places among the items.
+        by_name: HashMap<Vec<u8>, usize>,
         count: usize,
     },
     Map {
@@ -337,6 +344,8 @@ impl Plan {
         }
         match (kind, descriptor.is_list()) {
             (FieldKind::Message(descriptor), true) => Plan::Messages {
+                name: name_of(&descriptor).map(|name| (name, rows.names.list(&field))),
+                by_name: HashMap::new(),
                 places: places(&descriptor, &field),
                 descriptor,
                 field,
@@ -564,20 +573,42 @@ impl Plan {
                 field,
                 places,
                 items,
+                name,
+                by_name,
                 count,
             } => {
                 *count += 1;
                 if *count > rows.max_items || !rows.enter(*places) {
                     return input.skip(wire, tag, depth);
                 }
-                if items.len() < *count {
-                    items.push(Node::new(
-                        descriptor,
-                        &format!("{field}[{}]", items.len()),
-                        rows,
-                    ));
+                let (mut position, mut label) = (*count - 1, (*count - 1).to_string());
+                if let Some((number, list)) = *name {
+                    let name = match wire {
+                        2 => text_of(input.clone().bytes()?, number, depth)?,
+                        _ => &[],
+                    };
+                    if rows.by_name {
+                        // One without a name is called by its place, as no name looks.
+                        let mut key = [b"\0", label.as_bytes()].concat();
+                        if !name.is_empty() {
+                            label = String::from_utf8_lossy(name).into_owned();
+                            key = name.to_vec();
+                        }
+                        position = *by_name.entry(key).or_insert(items.len());
+                    } else {
+                        rows.names.see(list, position, name);
+                    }
                 }
-                read_message(&mut items[*count - 1], input, wire, tag, depth, rows)?;
+                match items.get_mut(position) {
+                    // Of those with one name the last counts.
+                    Some(known) if known.present => known.flush(rows, false),
+                    Some(_) => {}
+                    None => {
+                        let field = format!("{field}[{label}]");
+                        items.push(Node::new(descriptor, &field, rows));
+                    }
+                }
+                read_message(&mut items[position], input, wire, tag, depth, rows)?;
             }
             Plan::Map {
                 entry,
@@ -663,6 +694,30 @@ impl Plan {
             }
         }
     }
+}
+
+/// The number of the text field that names a message of a list.
+fn name_of(descriptor: &MessageDescriptor) -> Option<u64> {
+    let texts = (descriptor.fields())
+        .filter(|field| matches!(field.kind(), FieldKind::String) && !field.is_list());
+    let texts: Vec<FieldDescriptor> = texts.collect();
+    let name = names::of_item(texts.iter().map(FieldDescriptor::name))?;
+    let field = texts.iter().find(|field| field.name() == name)?;
+    Some(u64::from(field.number()))
+}
+
+/// The text of a field in a message, the last one; empty where there is none.
+fn text_of(message: &[u8], field: u64, depth: usize) -> Result<&[u8], &'static str> {
+    let (mut input, mut text) = (Input { rest: message }, &[][..]);
+    while !input.rest.is_empty() {
+        let tag = input.varint()?;
+        let (number, wire) = (tag >> 3, (tag & 7) as u8);
+        match (number == field, wire) {
+            (true, 2) => text = input.bytes()?,
+            _ => input.skip(wire, number, depth)?,
+        }
+    }
+    Ok(text)
 }
 
 fn read_message(

@@ -2,6 +2,8 @@
 
 use std::{collections::HashMap, hash::Hash, sync::Arc};
 
+use super::names::Names;
+
 /// No column: a field that nobody wants.
 pub(super) const UNWANTED: u32 = u32::MAX;
 
@@ -141,6 +143,10 @@ pub(super) struct Rows<'a> {
     pub trailing: u64,
     /// Up to how many items of a sequence become signals.
     pub max_items: usize,
+    /// Whether items are called by the names they carry.
+    pub by_name: bool,
+    /// What the places of lists were called, where they are called by their place.
+    pub names: Names,
 }
 
 /// A count in `absent`, `long` or `long_types`, by its place there.
@@ -155,7 +161,7 @@ enum Noted {
 pub(super) type Selection<'a> = &'a (dyn Fn(&str) -> bool + Sync);
 
 impl<'a> Rows<'a> {
-    pub fn new(topic: &str, select: Selection<'a>, max_items: usize) -> Self {
+    pub fn new(topic: &str, select: Selection<'a>, max_items: usize, by_name: bool) -> Self {
         Rows {
             topic: topic.to_owned(),
             select,
@@ -178,6 +184,8 @@ impl<'a> Rows<'a> {
             held: 0,
             trailing: 0,
             max_items,
+            by_name,
+            names: Names::default(),
         }
     }
 
@@ -333,6 +341,7 @@ impl<'a> Rows<'a> {
         self.entered = 0;
         self.noted.clear();
         self.given.clear();
+        self.names.take_back();
     }
 
     /// Keeps the message that was decoded.
@@ -340,6 +349,7 @@ impl<'a> Rows<'a> {
         self.row += 1;
         self.held += self.given.len();
         self.stamps.extend(self.stamp_ns);
+        self.names.keep();
     }
 
     /// Takes back what a message gave before it turned out to be broken.
@@ -361,6 +371,7 @@ impl<'a> Rows<'a> {
     /// Takes back what was counted of the message in hand, which is read again.
     pub fn take_back_counts(&mut self) {
         self.entered = 0;
+        self.names.take_back();
         for noted in self.noted.drain(..) {
             match noted {
                 Noted::Absent(field, messages) => self.absent.list[field as usize].1 -= messages,

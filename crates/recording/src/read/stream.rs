@@ -12,6 +12,7 @@ use super::{
     clock::{Clocks, Order, seconds, unset},
     container::{Block, op},
     json::MAX_KEYS,
+    names::Called,
     rows::{
         Counts, Long, MAX_COLUMNS, MAX_PLACES, MAX_SIGNALS, Selection, too_many_columns,
         too_many_signals,
@@ -263,6 +264,8 @@ struct Watch {
     clocks: Clocks,
     absent: Counts<String>,
     long: Counts<Long>,
+    /// What the places of its lists were called.
+    names: BTreeMap<(String, usize), Called>,
     trailing: u64,
     odd: Vec<(Arc<str>, u64, i64)>,
     /// Path, name and number of the columns in the order of the last batch, which mostly is that of the next; no number where there are too many.
@@ -447,6 +450,9 @@ impl<'a> Taker<'a> {
         }
         for (what, count) in std::mem::take(&mut batch.long) {
             watch.long.add(what, count);
+        }
+        for (list, place, name) in std::mem::take(&mut batch.names) {
+            watch.names.entry((list, place)).or_default().add(&name);
         }
         watch.trailing += batch.trailing;
         let mut remark = batch.remark.take();
@@ -684,6 +690,25 @@ impl<'a> Taker<'a> {
                     )
                 };
                 say(Kind::AbsentField, *count, None, text);
+            }
+            let mut mixed = (watch.names.iter())
+                .filter_map(|((list, place), called)| Some((list, place, called.several()?)));
+            if let Some((list, place, called)) = mixed.next() {
+                let further = match mixed.count() {
+                    0 => String::new(),
+                    n => {
+                        let places = counted(n as u64, "further place", "further places");
+                        format!(", and {places} of lists likewise")
+                    }
+                };
+                let remedy = match self.recording.options.limits_are_options {
+                    true => "--by-name calls items by their names",
+                    false => "they can be read by name",
+                };
+                let text = format!(
+                    "{list}[{place}] is in turn {called}{further}: signals of such a place mix what belongs to several; {remedy}"
+                );
+                say(Kind::MixedItems, 1, None, text);
             }
             for (what, count) in watch.long.list.iter().take(MAX_TROUBLES) {
                 let messages = counted(*count, "message", "messages");
