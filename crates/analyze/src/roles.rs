@@ -229,6 +229,12 @@ impl RolesFile {
         toml::from_str(&text).map_err(|why| format!("{name}: is not a roles file: {why}"))
     }
 
+    /// All signals that it names.
+    pub fn signals(&self) -> Vec<String> {
+        let roles = Role::ALL.iter().filter(|role| !role.is_topic());
+        roles.flat_map(|role| self.patterns(*role)).collect()
+    }
+
     /// What it says of a role: paths of signals, or topics.
     pub fn patterns(&self, role: Role) -> Vec<String> {
         match role {
@@ -259,48 +265,54 @@ const BY_SCHEMA: &[(&str, Role, &str)] = &[
     ("rath.HandleForces", Role::Forces, "normal_n[*]"),
     ("rath.Phases", Role::Phases, "phase_rad[*]"),
     ("rath.Phases", Role::BeatPhase, "beat_phase_rad"),
-    ("nav_msgs/Odometry", Role::Height, "pose.pose.position.z"),
-    (
-        "nav_msgs/Odometry",
-        Role::Roll,
-        "pose.pose.orientation.roll",
-    ),
-    (
-        "nav_msgs/Odometry",
-        Role::Pitch,
-        "pose.pose.orientation.pitch",
-    ),
-    ("nav_msgs/Odometry", Role::Yaw, "pose.pose.orientation.yaw"),
-    ("geometry_msgs/PoseStamped", Role::Height, "pose.position.z"),
-    (
-        "geometry_msgs/PoseStamped",
-        Role::Roll,
-        "pose.orientation.roll",
-    ),
-    (
-        "geometry_msgs/PoseStamped",
-        Role::Pitch,
-        "pose.orientation.pitch",
-    ),
-    (
-        "geometry_msgs/PoseStamped",
-        Role::Yaw,
-        "pose.orientation.yaw",
-    ),
-    ("foxglove.PoseInFrame", Role::Height, "pose.position.z"),
-    ("foxglove.PoseInFrame", Role::Roll, "pose.orientation.roll"),
-    (
-        "foxglove.PoseInFrame",
-        Role::Pitch,
-        "pose.orientation.pitch",
-    ),
-    ("foxglove.PoseInFrame", Role::Yaw, "pose.orientation.yaw"),
     (
         "geometry_msgs/WrenchStamped",
         Role::Forces,
         "wrench.force.z",
     ),
 ];
+
+/// Where message types hold a pose: (schema, place, orientation), in order of preference.
+const POSES: &[(&str, &str, &str)] = &[
+    (
+        "nav_msgs/Odometry",
+        "pose.pose.position",
+        "pose.pose.orientation",
+    ),
+    (
+        "geometry_msgs/PoseStamped",
+        "pose.position",
+        "pose.orientation",
+    ),
+    (
+        "geometry_msgs/PoseWithCovarianceStamped",
+        "pose.pose.position",
+        "pose.pose.orientation",
+    ),
+    (
+        "geometry_msgs/TransformStamped",
+        "transform.translation",
+        "transform.rotation",
+    ),
+    ("foxglove.PoseInFrame", "pose.position", "pose.orientation"),
+    ("foxglove.Odometry", "pose.position", "pose.orientation"),
+];
+
+/// All rows of schema, role and field.
+fn by_schema() -> impl Iterator<Item = (&'static str, Role, String)> {
+    let own = BY_SCHEMA
+        .iter()
+        .map(|(s, role, f)| (*s, *role, (*f).to_owned()));
+    let poses = POSES.iter().flat_map(|(schema, place, turn)| {
+        [
+            (*schema, Role::Height, format!("{place}.z")),
+            (*schema, Role::Roll, format!("{turn}.roll")),
+            (*schema, Role::Pitch, format!("{turn}.pitch")),
+            (*schema, Role::Yaw, format!("{turn}.yaw")),
+        ]
+    });
+    own.chain(poses)
+}
 
 /// Which signals and topics play which role.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -346,9 +358,9 @@ impl Roles {
         channels.sort();
         channels.dedup();
         let mut roles = Roles::default();
-        for (schema, role, field) in BY_SCHEMA {
+        for (schema, role, field) in by_schema() {
             // Rows of one role stand in order of preference; forces may come from several topics of one type.
-            if roles.patterns.contains_key(role) {
+            if roles.patterns.contains_key(&role) {
                 continue;
             }
             let mut found: Vec<String> = channels
@@ -359,7 +371,7 @@ impl Roles {
             if !matches!(role, Role::Forces) {
                 let takes = |r: &Role| user.is_none_or(|user| user.patterns(*r).is_empty());
                 if matches!(role, Role::Height) && [Role::Height, Role::Roll].iter().any(takes) {
-                    let topics = found.iter().map(|path| path.trim_end_matches(field));
+                    let topics = found.iter().map(|path| path.trim_end_matches(&field));
                     let topics = topics.map(|t| t.trim_end_matches('.').to_owned());
                     let topics: Vec<String> = topics.collect();
                     roles.choose(&topics, "height and angles are taken from this topic");
@@ -367,7 +379,7 @@ impl Roles {
                 found.truncate(1);
             }
             if !found.is_empty() {
-                roles.patterns.insert(*role, found);
+                roles.patterns.insert(role, found);
             }
         }
         let of_type = |schemas: &[&str]| -> Vec<String> {
@@ -412,12 +424,8 @@ impl Roles {
         if let Some(topic) = beats.chain(named.map(|(t, _)| (*t).to_owned())).next() {
             roles.patterns.insert(Role::Beats, vec![topic]);
         }
-        let pose = [
-            "geometry_msgs/PoseStamped",
-            "nav_msgs/Odometry",
-            "foxglove.PoseInFrame",
-            "rath.State",
-        ];
+        let poses = POSES.iter().map(|(schema, ..)| *schema);
+        let pose: Vec<&str> = poses.chain(["rath.State"]).collect();
         if let Some(truth) = of_type(&pose).into_iter().find(|t| is_truth(t)) {
             roles.patterns.insert(Role::Truth, vec![truth]);
         } else if let Some(state) = of_type(&["rath.State"]).first() {
@@ -898,6 +906,24 @@ mod tests {
         assert!(moves(&with("imu = \"/none\"")));
         let said = "imu = \"/payload/imu\"\nroll = \"/robot1/odom.pose.pose.orientation.roll\"";
         assert!(moves(&with(said)));
+    }
+
+    #[test]
+    fn every_type_of_pose_tells_how_the_load_moves() {
+        for (schema, place, turn) in POSES {
+            let roles = Roles::infer([("/p", *schema)].into_iter(), None);
+            assert_eq!(roles.patterns(Role::Height), [format!("/p.{place}.z")]);
+            assert_eq!(roles.patterns(Role::Yaw), [format!("/p.{turn}.yaw")]);
+            let truth = Roles::infer([("/truth", *schema)].into_iter(), None);
+            assert_eq!(truth.topic(Role::Truth), Some("/truth"));
+            for axis in ["x", "y", "z", "w"] {
+                assert!(
+                    crate::field::is_of_truth(&format!("{turn}.{axis}")),
+                    "{schema}"
+                );
+            }
+            assert!(crate::field::is_of_truth(&format!("{place}.z")), "{schema}");
+        }
     }
 
     #[test]

@@ -964,6 +964,93 @@ fn what_may_move_the_load_is_told_with_its_remedy() {
     assert!(!kinds(&found).contains(&"unknown_type".to_owned()));
 }
 
+/// The transform of a frame that rolls by `roll_deg` and stands `z` high.
+fn frame(name: &str, roll_deg: f64, z: f64) -> String {
+    let (sin, cos) = (roll_deg.to_radians() / 2.0).sin_cos();
+    format!(
+        "{{\"transforms\":[{{\"child_frame_id\":\"{name}\",\"transform\":{{\
+         \"translation\":{{\"x\":0.0,\"y\":0.0,\"z\":{z}}},\
+         \"rotation\":{{\"x\":{sin},\"y\":0.0,\"z\":0.0,\"w\":{cos}}}}}}}]}}"
+    )
+}
+
+/// A robot and its load publish one topic in turn: their places mix both, their names do not.
+#[test]
+fn frames_on_one_topic_are_told_apart_by_name() {
+    let folder = tempfile::tempdir().unwrap();
+    let messages = (0..6000).map(|k| {
+        let t = f64::from(k) * 0.01;
+        let text = match k % 2 {
+            0 => frame("load", 8.0 * tone(1.1, t), 1.0 + 0.03 * tone(2.2, t)),
+            _ => frame("base", 0.5 * tone(0.7, t), 0.4),
+        };
+        (t, text)
+    });
+    let file = told(folder.path(), &[("/tf", messages.collect())]);
+    let found = json(&[&file, "--format", "json"]);
+    let quality = found["quality"].as_array().unwrap();
+    let told = |kind: &str| {
+        let remark = quality.iter().find(|q| q["kind"] == kind);
+        remark.unwrap()["text"].as_str().unwrap().to_owned()
+    };
+    let mixed = told("mixed_items");
+    assert!(
+        mixed.contains("transforms[0] is in turn base, load"),
+        "{mixed}"
+    );
+    assert!(mixed.contains("--by-name"), "{mixed}");
+    let hint = told("unknown_type");
+    let line = "roll = \"/tf.transforms[NAME].transform.rotation.roll\"";
+    assert!(hint.contains(line), "{hint}");
+
+    let path = |name: &str, last: &str| format!("/tf.transforms[{name}].transform.{last}");
+    let listed = json(&[&file, "--format", "json", "--by-name"]);
+    let signals = listed["signals"].as_object().unwrap();
+    for (name, sd_m) in [("load", 0.03 / 2f64.sqrt()), ("base", 0.0)] {
+        let signal = &signals[&path(name, "translation.z")];
+        assert_eq!(signal["count"], 3000);
+        assert!((signal["sd"].as_f64().unwrap() - sd_m).abs() < 1e-5);
+    }
+    assert!(!signals.contains_key(&path("0", "translation.z")));
+    assert!(!kinds(&listed).contains(&"mixed_items".to_owned()));
+
+    // A roles file that writes the name is enough.
+    let roles = format!(
+        "height = \"{}\"\nroll = \"{}\"\n",
+        path("load", "translation.z"),
+        path("load", "rotation.roll")
+    );
+    let found = with_roles(folder.path(), &file, &roles);
+    assert!((metric(&found, "rms_roll_deg") - 8.0 / 2f64.sqrt()).abs() < 1e-3);
+    assert!((metric(&found, "dz_pp_m") - 0.06).abs() < 1e-4);
+    assert!((metric(&found, "roll_peak_hz") - 1.1).abs() < 0.01);
+}
+
+/// A topic where a signal is wanted, and the reverse.
+#[test]
+fn a_role_of_the_wrong_kind_is_told_what_is_meant() {
+    let folder = tempfile::tempdir().unwrap();
+    let messages = (0..600).map(|k| {
+        let t = f64::from(k) * 0.1;
+        (t, frame("load", 8.0 * tone(1.1, t), 1.0))
+    });
+    let file = told(folder.path(), &[("/tf", messages.collect())]);
+    for (roles, said) in [
+        (
+            "roll = \"/tf\"",
+            "the roles file's roll, /tf, is not in the recording as a signal: it is a topic, and one of its fields is wanted, such as /tf.transforms[0].transform.rotation.roll",
+        ),
+        (
+            "truth = \"/tf.transforms[0].transform.rotation\"",
+            "the roles file's truth, /tf.transforms[0].transform.rotation, is not in the recording as a topic: is /tf meant?",
+        ),
+    ] {
+        let found = with_roles(folder.path(), &file, roles);
+        let warnings = found["recording"]["warnings"].as_array().unwrap();
+        assert!(warnings.iter().any(|w| w == said), "{warnings:?}");
+    }
+}
+
 /// `-` is standard output where a recording is all that is written, and refused where the result stands there.
 #[test]
 fn a_recording_may_go_to_standard_output() {

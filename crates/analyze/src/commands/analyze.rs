@@ -13,7 +13,7 @@ use recording::Kind;
 use recording::read::{ReadOptions, Recording, STDIN};
 use recording::whole::{self, Output, Usage};
 
-use super::{AnalyzeArgs, Done, Format, Limits, annotate, complain, print};
+use super::{AnalyzeArgs, Done, Format, annotate, complain, print};
 
 pub(super) fn run(args: &AnalyzeArgs) -> anyhow::Result<Done> {
     let request = request(args)?;
@@ -106,8 +106,10 @@ fn request(args: &AnalyzeArgs) -> anyhow::Result<Request> {
 }
 
 /// Opens a recording, or what comes through standard input.
-fn open(path: &Path, limits: &Limits) -> anyhow::Result<Recording> {
+fn open(path: &Path, args: &AnalyzeArgs, request: &Request) -> anyhow::Result<Recording> {
+    let limits = &args.limits;
     let options = ReadOptions {
+        by_name: args.by_name || request.names_items(),
         max_chunk_bytes: limits.max_chunk_bytes,
         max_message_bytes: limits.max_message_bytes,
         max_items: limits.max_items,
@@ -134,7 +136,7 @@ fn open(path: &Path, limits: &Limits) -> anyhow::Result<Recording> {
 }
 
 fn one(path: &Path, args: &AnalyzeArgs, request: &Request) -> anyhow::Result<Analysis> {
-    let mut recording = open(path, &args.limits)?;
+    let mut recording = open(path, args, request)?;
     let name = if path.as_os_str() == "-" {
         STDIN.to_owned()
     } else {
@@ -166,8 +168,12 @@ fn one(path: &Path, args: &AnalyzeArgs, request: &Request) -> anyhow::Result<Ana
     if let Some(out) = &args.out {
         let findings = analyze::table::write(&recording, request, args.downsample, out)?;
         let out = out.display();
-        let limits =
-            (findings.iter()).filter(|f| matches!(f.kind, Kind::LongSequence | Kind::OddSchema));
+        let limits = findings.iter().filter(|f| {
+            matches!(
+                f.kind,
+                Kind::LongSequence | Kind::OddSchema | Kind::MixedItems
+            )
+        });
         for limit in limits.take(20) {
             recording::note!("analyze: {out}: {limit}");
         }

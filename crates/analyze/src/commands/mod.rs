@@ -99,6 +99,9 @@ struct AnalyzeArgs {
     /// All sensors were stamped by one clock: leave the clocks of carriers and sound as they are
     #[arg(long)]
     one_clock: bool,
+    /// Call items of lists by the names they carry, as frames and joints do, and not by their place
+    #[arg(long)]
+    by_name: bool,
     #[command(flatten)]
     limits: Limits,
 }

@@ -14,6 +14,8 @@ pub use natural::natural;
 pub(crate) use pass::with_angles;
 pub use request::Request;
 
+use std::collections::BTreeSet;
+
 use recording::read::{ReadError, Recording};
 
 use crate::events::{Event, events};
@@ -93,7 +95,10 @@ pub fn examine(
     field.hold_against_pose(&inputs, &roles, window);
     quality.extend(remarks);
     quality.extend(pass.coverage(window, &field.own_s));
-    quality.extend(pass.unknown_movers());
+    let mixed = quality.iter().filter(|q| q.kind == "mixed_items");
+    let mixed: BTreeSet<&str> = mixed.map(|q| q.topic.as_str()).collect();
+    let movers = pass.unknown_movers(&mixed);
+    quality.extend(movers);
     quality.extend(field.quality());
     let mut metrics = metrics(&inputs, window);
     field.finish(&inputs, &mut metrics, window);

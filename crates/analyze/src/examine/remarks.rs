@@ -4,11 +4,12 @@ use std::collections::{BTreeMap, BTreeSet, HashSet};
 
 use recording::text::counted;
 
+use super::natural::natural;
 use super::pass::{Entry, Pass, field};
 use crate::field::{ACCEL, GYRO};
 use crate::inputs::Window;
 use crate::quality::Quality;
-use crate::roles::{Role, RolesFile, SOUND, is_carrier, matches, meant, stands_beside};
+use crate::roles::{Role, RolesFile, SOUND, is_carrier, matches, meant, of_topic, stands_beside};
 
 /// A topic that begins so late or ends so early is worth a word: this share of the window, and this long (s).
 const LEAST_ABSENT: f64 = 0.02;
@@ -18,15 +19,17 @@ const LARGEST_ANGLE_RAD: f64 = 3.15;
 /// A load that rolls farther than this, so often, does not hang on shoulders: cosine and share.
 const UPSIDE_DOWN_COS: f64 = -0.5;
 const MOSTLY: f64 = 0.9;
-/// Where transforms of ROS and of Foxglove hold a place and an orientation.
-const TRANSFORMS: [(&str, &str); 3] = [
-    (
-        "transforms[0].transform.translation",
-        "transforms[0].transform.rotation",
-    ),
-    ("transforms[0].translation", "transforms[0].rotation"),
-    ("translation", "rotation"),
-];
+/// What stands beside an orientation where a place is meant.
+const PLACES: [&str; 2] = ["position", "translation"];
+
+/// The path with a name in the place of the last number in brackets.
+fn with_name(path: &str) -> String {
+    let numbered = path.rsplit_once('[').and_then(|(before, after)| {
+        let (_, after) = after.split_once(']')?;
+        Some(format!("{before}[NAME]{after}"))
+    });
+    numbered.unwrap_or_else(|| path.to_owned())
+}
 
 impl Pass<'_> {
     /// Remarks on single values: what is no rotation, and what is too large or too small to be squared.
@@ -93,7 +96,9 @@ impl Pass<'_> {
     }
 
     /// Where nothing tells how anybody moves, remarks on topics that might, though their type does not say so, with what to write.
-    pub(super) fn unknown_movers(&self) -> Vec<Quality> {
+    ///
+    /// `mixed` are topics with lists whose places hold now this, now that.
+    pub(super) fn unknown_movers(&self, mixed: &BTreeSet<&str>) -> Vec<Quality> {
         let movers = [Role::Height, Role::Roll, Role::Imu, Role::Carriers];
         if movers.iter().any(|r| !self.roles.patterns(*r).is_empty()) {
             return Vec::new();
@@ -107,9 +112,9 @@ impl Pass<'_> {
         };
         let carriers = topics.iter().filter(|t| is_carrier(t) && senses(t));
         let carriers: Vec<String> = carriers.map(|t| format!("\"{t}\"")).collect();
+        let poses = self.poses(&paths);
         let mut out = Vec::new();
         for topic in topics.into_iter().filter(|t| !stands_beside(t)) {
-            let has = |field: String| paths.contains(&*format!("{topic}.{field}"));
             if is_carrier(topic) && senses(topic) {
                 let text = format!(
                     "holds what an inertial sensor tells, but its type does not say so: if a carrier wears it, write carriers = [{}] into a file for --roles",
@@ -118,28 +123,53 @@ impl Pass<'_> {
                 out.push(Quality::remark(topic, "unknown_type", text));
                 continue;
             }
-            let transforms = TRANSFORMS
-                .iter()
-                .find(|(place, turn)| has(format!("{place}.z")) && has(format!("{turn}.roll")));
-            let (what, lines) = if senses(topic) {
-                (
-                    "holds what an inertial sensor tells",
-                    format!("imu = \"{topic}\""),
-                )
-            } else if let Some((place, turn)) = transforms {
-                (
-                    "holds transforms",
-                    format!("height = \"{topic}.{place}.z\" and roll = \"{topic}.{turn}.roll\""),
-                )
+            let poses = poses.get(topic).map_or(&[][..], Vec::as_slice);
+            let (what, which, lines) = if senses(topic) {
+                let what = "holds what an inertial sensor tells";
+                (what, "it is", format!("imu = \"{topic}\""))
+            } else if let [(place, turn), further @ ..] = poses {
+                let (mut place, mut turn) = (place.clone(), turn.clone());
+                let (what, which) = if mixed.contains(topic) {
+                    // No place of the list is one body's.
+                    (place, turn) = (with_name(&place), with_name(&turn));
+                    let which = "NAME, as --by-name lists it, is";
+                    ("holds poses of several, in places that change", which)
+                } else if further.is_empty() {
+                    ("holds a pose", "it is")
+                } else {
+                    ("holds several poses", "the first is")
+                };
+                let lines = format!("height = \"{place}.z\" and roll = \"{turn}.roll\"");
+                (what, which, lines)
             } else {
                 continue;
             };
             let text = format!(
-                "{what}, but its type does not say whose: if it is the load's, write {lines} into a file for --roles"
+                "{what}, but its type does not say whose: if {which} the load's, write {lines} into a file for --roles"
             );
             out.push(Quality::remark(topic, "unknown_type", text));
         }
         out
+    }
+
+    /// By topic: the places and orientations that its messages hold beside each other.
+    fn poses(&self, paths: &HashSet<&str>) -> BTreeMap<&str, Vec<(String, String)>> {
+        let mut poses: BTreeMap<&str, Vec<(String, String)>> = BTreeMap::new();
+        for (path, entry) in &self.by_path {
+            let turn = path.strip_suffix(".roll").unwrap_or_default();
+            let around = turn.rsplit_once('.').map_or("", |(around, _)| around);
+            let mut places = PLACES.iter().map(|place| format!("{around}.{place}"));
+            if let Some(place) = places.find(|place| paths.contains(&*format!("{place}.z"))) {
+                let channel = self.entries[*entry].channel;
+                let topic = &self.recording.info().channels[channel].topic;
+                let of_topic = poses.entry(topic).or_default();
+                of_topic.push((place, turn.to_owned()));
+            }
+        }
+        for of_topic in poses.values_mut() {
+            of_topic.sort_by(|a, b| natural(&a.1, &b.1));
+        }
+        poses
     }
 
     /// Remarks on topics that metrics rest on and that cover clearly less of the window than there is of the recording.
@@ -223,7 +253,8 @@ impl Pass<'_> {
                     out.extend(self.plays_none(role, pattern));
                     continue;
                 }
-                let hint = meant(pattern, names.iter().copied());
+                let hint = self.of_another_kind(role, pattern);
+                let hint = hint.unwrap_or_else(|| meant(pattern, names.iter().copied()));
                 out.push(format!(
                     "the roles file's {word}, {pattern}, is not in the recording{hint}"
                 ));
@@ -237,6 +268,30 @@ impl Pass<'_> {
             }
         }
         out
+    }
+
+    /// What is meant where a topic stands for a signal, or a signal for a topic.
+    fn of_another_kind(&self, role: Role, pattern: &str) -> Option<String> {
+        let channels = self.recording.info().channels.iter();
+        let mut topics = channels.map(|c| c.topic.as_str());
+        if role.is_topic() {
+            let topic = topics.find(|topic| of_topic(topic, pattern))?;
+            return Some(format!(" as a topic: is {topic} meant?"));
+        }
+        let topic = topics.find(|topic| *topic == pattern)?;
+        let last = match role {
+            Role::Height => ".z",
+            Role::Forces => "force.z",
+            _ => role.name(),
+        };
+        let paths = self.entries.iter().map(|e| e.path.as_str());
+        let fits = |path: &&str| of_topic(topic, path) && path.ends_with(last);
+        let like = paths.filter(fits).min_by(|a, b| natural(a, b));
+        let like = like.map(|path| format!(", such as {path}"));
+        let like = like.unwrap_or_default();
+        Some(format!(
+            " as a signal: it is a topic, and one of its fields is wanted{like}"
+        ))
     }
 
     /// Why the topics that a pattern of a roles file names do not play the role, where they are there.

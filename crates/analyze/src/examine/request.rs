@@ -30,6 +30,23 @@ impl Request {
             && (self.signals.is_empty() || self.signals.iter().any(|p| matches(p, path)))
     }
 
+    /// Whether an item of a list is named by the name it carries, not by its place.
+    pub fn names_items(&self) -> bool {
+        let named = |path: &String| {
+            let places = path.split('[').skip(1);
+            let mut places = places.filter_map(|rest| rest.split_once(']'));
+            places.any(|(place, _)| {
+                !place.is_empty() && !place.chars().all(|c| c.is_ascii_digit() || c == '*')
+            })
+        };
+        let of_roles = self.roles.iter().flat_map(RolesFile::signals);
+        self.signals
+            .iter()
+            .cloned()
+            .chain(of_roles)
+            .any(|p| named(&p))
+    }
+
     /// Whether a field may have to be read for that, before it is known where in the path the topic ends, and whether the signal will be called
     /// `TOPIC:field` because another topic has a field of its name.
     pub(crate) fn may_list(&self, path: &str) -> bool {

@@ -69,13 +69,24 @@ const ORIENTATION: &[[&str; 4]] = &[
         "pose.pose.orientation.w",
     ],
     [
+        "transform.rotation.x",
+        "transform.rotation.y",
+        "transform.rotation.z",
+        "transform.rotation.w",
+    ],
+    [
         "orientation.x",
         "orientation.y",
         "orientation.z",
         "orientation.w",
     ],
 ];
-const HEIGHT: &[&str] = &["pose.position.z", "pose.pose.position.z", "position_m.z"];
+const HEIGHT: &[&str] = &[
+    "pose.position.z",
+    "pose.pose.position.z",
+    "transform.translation.z",
+    "position_m.z",
+];
 
 /// Whether a field may be part of a truth.
 pub fn wants(field: &str) -> bool {

@@ -14,6 +14,8 @@ mod place;
 mod sound;
 mod thin;
 
+#[cfg(test)]
+pub(crate) use judge::wants as is_of_truth;
 use std::collections::BTreeMap;
 use std::f64::consts::FRAC_PI_2;
 
