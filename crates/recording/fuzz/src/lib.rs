@@ -27,7 +27,7 @@ fn part<const N: usize>(bytes: &[u8]) -> Option<(&[u8], &[u8])> {
 
 /// Decodes an input: the schema's name (its length in one byte before it), the schema (two), messages (two each).
 ///
-/// Messages of ROS 1 are decoded after others and on their own; both have to give the same numbers.
+/// Items are called by their place, then by their names. Messages of ROS 1 are decoded after others and on their own; both have to give the same numbers.
 pub fn decode(message_encoding: &str, schema_encoding: &str, input: &[u8]) {
     let Some((name, rest)) = part::<1>(input) else {
         return;
@@ -45,7 +45,7 @@ pub fn decode(message_encoding: &str, schema_encoding: &str, input: &[u8]) {
             break;
         }
     }
-    let read = |messages: &[&[u8]], first: u64| {
+    let read = |messages: &[&[u8]], first: u64, by_name: bool| {
         let bytes = file(
             message_encoding,
             schema_encoding,
@@ -54,7 +54,11 @@ pub fn decode(message_encoding: &str, schema_encoding: &str, input: &[u8]) {
             messages,
             first,
         );
-        let recording = Recording::from_bytes(bytes, &options()).expect("opens");
+        let options = ReadOptions {
+            by_name,
+            ..options()
+        };
+        let recording = Recording::from_bytes(bytes, &options).expect("opens");
         let (signals, _) = recording.signals(&|_| true).expect("reads");
         let mut values = Vec::new();
         for signal in signals {
@@ -64,16 +68,18 @@ pub fn decode(message_encoding: &str, schema_encoding: &str, input: &[u8]) {
         }
         values
     };
-    let mut together = read(&messages, 0);
-    // The other encodings learn from the messages before: readings of CDR, keys of maps.
-    if message_encoding == "ros1" && messages.len() <= 4 && together.len() < 4096 {
-        let mut alone: Vec<_> = (0..)
-            .zip(messages.chunks(1))
-            .flat_map(|(k, message)| read(message, k))
-            .collect();
-        together.sort();
-        alone.sort();
-        assert_eq!(together, alone);
+    for by_name in [false, true] {
+        let mut together = read(&messages, 0, by_name);
+        // The other encodings learn from the messages before: readings of CDR, keys of maps.
+        if message_encoding == "ros1" && messages.len() <= 4 && together.len() < 4096 {
+            let mut alone: Vec<_> = (0..)
+                .zip(messages.chunks(1))
+                .flat_map(|(k, message)| read(message, k, by_name))
+                .collect();
+            together.sort();
+            alone.sort();
+            assert_eq!(together, alone);
+        }
     }
 }
 
