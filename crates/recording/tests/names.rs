@@ -257,7 +257,7 @@ fn read(bytes: &[u8], by_name: bool) -> (BTreeMap<String, Vec<(i64, f64)>>, Vec<
 }
 
 /// Three publishers in turn: two whose messages are equally long, so that nothing but the names tells them apart, and one of two items. Now and then
-/// somebody has no name.
+/// somebody has no name, alone or behind one who has.
 fn messages() -> Vec<Vec<Item>> {
     let each = |k: usize| {
         let x = k as f64;
@@ -265,6 +265,7 @@ fn messages() -> Vec<Vec<Item>> {
             0 | 1 => vec![("left", x)],
             2 => vec![("rear", x + 0.5)],
             3 => vec![("base", -x), ("left", x + 0.25)],
+            _ if k % 25 == 14 => vec![("base", x + 0.75), ("", x)],
             _ if k % 25 == 24 => vec![("", x)],
             _ => vec![("base", -x), ("left", x + 0.25)],
         }

@@ -379,9 +379,10 @@ impl<'de> Visitor<'de> for Place<'_, '_> {
                         node.by_name.get_mut(&name)
                     }
                     None => {
-                        if node.items.len() <= item {
+                        // Those before it may have names.
+                        while node.items.len() <= item {
                             rows.places += takes;
-                            let inner = node.item(item);
+                            let inner = node.item(node.items.len());
                             node.items.push(inner);
                         }
                         node.items.get_mut(item)

@@ -4,7 +4,7 @@
 //! start, so every run has at most eight tables of offsets, made when first needed; a run is checked against the message's end once.
 //! Between runs stand the things of varying length: strings, sequences, arrays of structs that hold either.
 
-use std::{collections::HashMap, ops::Range};
+use std::{collections::HashMap, fmt, ops::Range};
 
 use super::{
     decode::Place,
@@ -146,9 +146,26 @@ struct Items {
     take: bool,
     /// What they are called by.
     called: Names,
-    /// Programs of the items seen so far, by place and by name.
+    /// Programs of the items seen so far: by their place, or where labels say.
     programs: Vec<Program>,
-    by_name: HashMap<Box<[u8]>, Program>,
+    labels: HashMap<Label, usize>,
+}
+
+/// What one item is called, where items are called by name.
+#[derive(Clone, Debug, PartialEq, Eq, Hash)]
+enum Label {
+    Name(Box<[u8]>),
+    /// One without a name.
+    Place(usize),
+}
+
+impl fmt::Display for Label {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Label::Name(name) => f.write_str(&String::from_utf8_lossy(name)),
+            Label::Place(place) => place.fmt(f),
+        }
+    }
 }
 
 /// What the items of a list are called by, beside their place.
@@ -684,7 +701,7 @@ impl Compiler<'_, '_> {
         };
         Box::new(Items {
             called,
-            by_name: HashMap::new(),
+            labels: HashMap::new(),
             field: field.to_owned(),
             kind: inner.clone(),
             prim: inner.prim(),
@@ -740,44 +757,37 @@ impl Items {
             context.names.clear();
         }
         while self.take && fits && taken < count {
-            let name = self.name(context, at, taken, rows)?;
-            let known = match &name {
-                Some(name) => self.by_name.get_mut(name),
-                None => self.programs.get_mut(taken),
+            let label = self.label(context, at, taken, rows)?;
+            let place = match &label {
+                Some(label) => self.labels.get(label).copied(),
+                None => Some(taken),
             };
-            let room = match &known {
+            let place = place.unwrap_or(self.programs.len());
+            let room = match self.programs.get(place) {
                 Some(program) => rows.enter(program.places),
                 // Without any room nothing has to be compiled to be refused.
-                None => rows.has_room(1) || rows.enter(1),
-            };
-            if !room {
-                break;
-            }
-            let program = match known {
-                Some(program) => program,
+                None if !rows.has_room(1) => rows.enter(1),
                 None => {
-                    let label = match &name {
-                        Some(name) => String::from_utf8_lossy(name).into_owned(),
-                        None => taken.to_string(),
-                    };
+                    let label = label.unwrap_or(Label::Place(taken));
                     let (types, field) = (context.types, format!("{}[{label}]", self.field));
                     let how = (true, self.part);
                     let program = compile(types, &self.kind, &field, context.shape, rows, how)
                         .map_err(|_| other(at, &self.field, TOO_MANY))?;
-                    if !rows.enter(program.places) {
-                        break;
-                    }
-                    rows.places += program.places;
-                    match name {
-                        Some(name) => self.by_name.entry(name).insert_entry(program).into_mut(),
-                        None => {
-                            self.programs.push(program);
-                            &mut self.programs[taken]
+                    let room = rows.enter(program.places);
+                    if room {
+                        rows.places += program.places;
+                        self.programs.push(program);
+                        if rows.by_name {
+                            self.labels.insert(label, place);
                         }
                     }
+                    room
                 }
             };
-            at = program.run(context, at, rows)?;
+            if !room {
+                break;
+            }
+            at = self.programs[place].run(context, at, rows)?;
             taken += 1;
         }
         if taken == count {
@@ -792,13 +802,13 @@ impl Items {
     }
 
     /// What the item at `at` is called, where items are called by name; where they are called by their place, the name is only noted.
-    fn name(
+    fn label(
         &mut self,
         context: &mut Context<'_>,
         at: usize,
         place: usize,
         rows: &mut Rows,
-    ) -> Result<Option<Box<[u8]>>, Fail> {
+    ) -> Result<Option<Label>, Fail> {
         // Only the item itself goes into the flat table; and what is wrong with it is told when it is read.
         let trace = context.trace.take();
         let found = match &mut self.called {
@@ -828,19 +838,22 @@ impl Items {
             Names::Beside => context.names.get(place).map(|text| (text.clone(), None)),
         };
         context.trace = trace;
-        let Some((text, list)) = found else {
-            return Ok(None);
-        };
-        let name = &context.data[text.clone()];
-        let name = name.strip_suffix(&[0]).unwrap_or(name);
-        if let Some(list) = list {
-            if !rows.by_name {
-                rows.names.see(list, place, name);
+        let by_name = rows.by_name && matches!(self.called, Names::Own { .. } | Names::Beside);
+        let mut label = by_name.then_some(Label::Place(place));
+        if let Some((text, list)) = found {
+            let name = &context.data[text.clone()];
+            let name = name.strip_suffix(&[0]).unwrap_or(name);
+            if by_name && !name.is_empty() {
+                label = Some(Label::Name(name.into()));
             }
-            context.hold_to(&text);
+            if let Some(list) = list {
+                if !rows.by_name {
+                    rows.names.see(list, place, name);
+                }
+                context.hold_to(&text);
+            }
         }
-        let by_name = rows.by_name && !matches!(self.called, Names::Of(_)) && !name.is_empty();
-        Ok(by_name.then(|| name.into()))
+        Ok(label)
     }
 
     /// Steps over items without looking at them.
