@@ -469,6 +469,41 @@ fn the_recorder_s_rate_is_not_in_the_pendulum() {
     }
 }
 
+/// A motion capture of 50 Hz beside load cells of 300, of 50 at other moments, and the reverse: the same pendulum.
+#[test]
+fn roll_and_forces_may_have_clocks_of_their_own() {
+    let field = field_of(&scene_of("music log_rate_hz=300 effects.noise.grid_hz=30"));
+    let window = analyze::Window::from(15.0);
+    let (a, wide) = {
+        let whole = fit(&field, window);
+        let e = find(&whole, "pendulum");
+        (e.value, e.interval[1] - e.interval[0])
+    };
+    let every = |x: &[f64], from: usize, skip: usize| -> Vec<f64> {
+        x.iter().skip(from).step_by(skip).copied().collect()
+    };
+    // Of the roll, and of the forces: from which sample, every how manyth.
+    for (roll, force) in [
+        ((0, 6), (0, 1)),
+        ((0, 6), (3, 6)),
+        ((0, 1), (3, 6)),
+        ((900, 6), (0, 5)),
+    ] {
+        let mut field = field_of(&scene_of("music log_rate_hz=300 effects.noise.grid_hz=30"));
+        let i = &mut field.inputs;
+        i.force_t_s = every(&i.t_s, force.0, force.1);
+        let normal_n = i.normal_n.iter().map(|n| every(n, force.0, force.1));
+        i.normal_n = normal_n.collect();
+        i.t_s = every(&i.t_s, roll.0, roll.1);
+        i.roll_rad = every(&i.roll_rad, roll.0, roll.1);
+        let found = fit(&field, window);
+        let e = find(&found, "pendulum");
+        println!("{roll:?} {force:?} {a} {e:?}");
+        assert!((e.value / a - 1.0).abs() < 1e-4, "{a} {e:?}");
+        assert!(e.interval[1] - e.interval[0] < 1.1 * wide, "{e:?}");
+    }
+}
+
 /// Forces of handles and the support ratio of a weighed body are the same load.
 #[test]
 fn a_pendulum_hangs_on_the_support_as_on_the_forces() {
@@ -784,6 +819,36 @@ fn field_twins_lie_within_their_intervals() {
             "{name}: intervals of {width} of the value say nothing"
         );
     }
+}
+
+/// Who minds whom shows in steps too, of carriers who wander as people do, beside a pull of 2.7 rad/s; and what does not show has a reason.
+#[test]
+fn steps_tell_a_coupling_beside_the_pull() {
+    let folder = tempfile::tempdir().unwrap();
+    let fitted = |strength: f64, noise: f64, seed: u64| {
+        let scene = format!(
+            "field-imu solver.tolerance=1e-6 solver.energy=false seed={seed} effects.noise.phase_rad_per_sqrt_s={noise} effects.coupling.strength_rad_per_s={strength}"
+        );
+        let path = folder.path().join(format!("{seed}.mcap"));
+        field_log(&scene_of(&scene), &path);
+        let (field, told) = Field::read(&path, None, false).unwrap();
+        fit(&field, told.window)
+    };
+    for (strength, noise) in [(0.5, 0.1), (0.0, 0.2)] {
+        let (mut held, mut apart) = (0, 0);
+        for seed in 6001..6009 {
+            let found = fitted(strength, noise, seed);
+            let e = find(&found, "coupling");
+            println!("{strength} {e:?}");
+            held += usize::from(e.interval[0] <= strength && strength <= e.interval[1]);
+            apart += usize::from(e.interval[0] > 0.0);
+            assert!(e.interval[1] - e.interval[0] < 1.0, "{e:?}");
+        }
+        assert!(held >= 7, "{strength}: {held} of 8");
+        assert!(strength == 0.0 || apart >= 7, "{strength}: {apart} of 8");
+    }
+    let found = fitted(2.0, 0.2, 6001);
+    assert!(reason(&found, "coupling").contains("goes with the steps"));
 }
 
 /// Beats that are heard err by themselves: the course through them is smooth, and what it leaves of them tells no interval (5 of 30 held).

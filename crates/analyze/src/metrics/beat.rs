@@ -2,7 +2,7 @@
 
 use super::contact::mean;
 use super::{Context, Value};
-use crate::beat::adler::Adler;
+use crate::beat::adler::{Adler, VAGUE_RAD_PER_S};
 use crate::beat::lock::RATIOS;
 use crate::inputs::between;
 use crate::phase::{Circular, circular, hilbert, relative_phase, unwrap};
@@ -12,8 +12,6 @@ use std::f64::consts::TAU;
 const STAYS: f64 = 0.9;
 /// The analytic signal knows no phase so near its ends, s.
 const ENDS_S: f64 = 2.0;
-/// An own frequency that is known no better is not known, rad/s: own paces scatter by a third of it.
-const VAGUE_RAD_PER_S: f64 = 1.0;
 /// Any two rhythms keep step for a shorter time than this, s.
 const SHORTEST_S: f64 = 8.0;
 

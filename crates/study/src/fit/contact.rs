@@ -3,7 +3,7 @@
 use super::squares::{Block, bootstrapped, jackknifed, solve, unexplained, whoever_errs};
 use super::{BLOCK_S, CARRIES, EDGE, Field, Outcome, budgeted, even, pair};
 use analyze::imu::budget::Budget;
-use analyze::inputs::{Window, about_mean, mean_step_s};
+use analyze::inputs::{Inputs, Window, about_mean, between, drawn, mean_step_s};
 use analyze::mechanism::fit_roll;
 use analyze::spectrum::{Options, welch};
 use analyze::spline::spline_derivatives;
@@ -288,22 +288,11 @@ pub(super) fn contact_from_sensors(field: &Field, window: Window) -> Result<Vec<
 /// where the line alone leaves 0.02 % of its squares unexplained and all lines 0.4 %. Range: a part without a hole as long as a window. Source: Shinbrot, Trans. ASME 79
 /// (1957) 547; Messenger & Bortz, Multiscale Model. Simul. 19 (2021) 1474.
 pub(super) fn pendulum(field: &Field, window: Window) -> Result<Vec<Outcome>, String> {
-    let i = &field.inputs;
-    let range = window.range(&i.t_s);
-    let mut total = i.total_force_n();
-    if let (true, Some(mass_kg)) = (total.is_empty(), i.mass_kg) {
-        total = i
-            .support_ratio
-            .iter()
-            .map(|s| s * mass_kg * i.gravity_m_per_s2)
-            .collect();
-    }
-    if total.len() != i.t_s.len() || i.roll_rad.len() != i.t_s.len() {
-        return Err("roll and forces are not recorded together".into());
-    }
-    let t_s = &i.t_s[range.clone()];
+    let (t_s, roll, total) = roll_and_load(&field.inputs)?;
+    let range = window.range(&t_s);
+    let t_s = &t_s[range.clone()];
     let step_s = mean_step_s(t_s).ok_or("no samples in the window")?;
-    let (roll, total) = (&i.roll_rad[range.clone()], &total[range]);
+    let (roll, total) = (&roll[range.clone()], &total[range]);
     if roll.iter().chain(total).any(|x| !x.is_finite()) {
         return Err("roll or forces have gaps".into());
     }
@@ -391,6 +380,34 @@ pub(super) fn pendulum(field: &Field, window: Window) -> Result<Vec<Outcome>, St
     });
     let names = [("pendulum", "1/(kg·m)"), ("roll damping", "1/s")];
     Ok(pair(names, [value[0], value[1]], interval))
+}
+
+/// Times (s), roll (rad) and the whole force (N) at them. Forces on a clock of their own keep it, for they have kinks; the roll, which has none, is drawn
+/// between its samples by a cubic spline. Where it begins late, ends early or has holes it is NaN within, and left out at the ends.
+fn roll_and_load(i: &Inputs) -> Result<(Vec<f64>, Vec<f64>, Vec<f64>), String> {
+    let mut total = i.total_force_n();
+    if let (true, Some(mass_kg)) = (total.is_empty(), i.mass_kg) {
+        let weight_n = mass_kg * i.gravity_m_per_s2;
+        total = i.support_ratio.iter().map(|s| s * weight_n).collect();
+    }
+    if total.is_empty() || i.roll_rad.len() != i.t_s.len() || i.roll_rad.is_empty() {
+        return Err("it takes the roll, and the forces or the support".into());
+    }
+    let at_s = i.force_times();
+    if at_s == i.t_s || i.normal_n.is_empty() {
+        return Ok((i.t_s.clone(), i.roll_rad.clone(), total));
+    }
+    let step_s = mean_step_s(&i.t_s).ok_or("the roll has too few samples")?;
+    let mut roll = between(&i.t_s, &i.roll_rad, at_s);
+    let smooth = drawn(&i.t_s, &i.roll_rad, at_s, step_s);
+    for (x, smooth) in roll.iter_mut().zip(smooth).filter(|(x, _)| !x.is_nan()) {
+        *x = smooth;
+    }
+    let known = |x: &f64| !x.is_nan();
+    let begin = roll.iter().position(known).unwrap_or(0);
+    let end = roll.iter().rposition(known).map_or(begin, |last| last + 1);
+    let part = |x: &[f64]| x[begin..end].to_vec();
+    Ok((part(at_s), part(&roll), part(&total)))
 }
 
 /// A swing of ω [rad/s] at sample `n` of a window of `long` steps that takes it in and out, and its derivatives.

@@ -2,7 +2,7 @@
 
 use super::squares::{Block, bootstrapped, unexplained};
 use super::{BLOCK_S, Estimate, Field, Outcome, budgeted, estimate, unwrapped};
-use analyze::beat::adler::Adler;
+use analyze::beat::adler::{Adler, VAGUE_RAD_PER_S};
 use analyze::imu::budget::Budget;
 use analyze::inputs::{Window, between, longest_step_s, mean_step_in, mean_step_s, stretches};
 use nalgebra::{DMatrix, DVector};
@@ -722,6 +722,16 @@ fn gait_from_steps(field: &Field, from: usize) -> Result<Vec<Outcome>, String> {
                     false => Err((
                         name,
                         "who is with the beat all the time does not show it".into(),
+                    )),
+                });
+            }
+            if let Some([strength, half]) = found.coupling_rad_per_s {
+                let [low, high] = [strength - half, strength + half];
+                out.push(match half <= VAGUE_RAD_PER_S {
+                    true => estimate("coupling", "rad/s", strength, half),
+                    false => Err((
+                        "coupling".into(),
+                        format!("anything from {low:.1} to {high:.1} rad/s goes with the steps"),
                     )),
                 });
             }

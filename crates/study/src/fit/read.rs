@@ -44,6 +44,19 @@ impl Field {
         put_clocks_right: bool,
     ) -> Result<(Self, Told)> {
         let name = file.display().to_string();
+        // To put clocks right by the carriers' own lags would take away what the pull is seen by.
+        let request = Request {
+            clocks: match put_clocks_right {
+                true => DeviceClocks::PutRight,
+                false => DeviceClocks::Told,
+            },
+            roles: roles.cloned(),
+            ..Request::default()
+        };
+        let options = ReadOptions {
+            by_name: request.names_items(),
+            ..ReadOptions::default()
+        };
         let log = file
             .extension()
             .is_some_and(|e| e.eq_ignore_ascii_case("npz"));
@@ -54,18 +67,9 @@ impl Field {
             let mut writer = RecordingWriter::create(&path, &WriterOptions::default())?;
             ingest(&[file.to_owned()], &ImportOptions::default(), &mut writer)?;
             writer.finish()?;
-            Recording::from_bytes(std::fs::read(&path)?, &ReadOptions::default())?
+            Recording::from_bytes(std::fs::read(&path)?, &options)?
         } else {
-            Recording::open(file, &ReadOptions::default())?
-        };
-        // To put clocks right by the carriers' own lags would take away what the pull is seen by.
-        let request = Request {
-            clocks: match put_clocks_right {
-                true => DeviceClocks::PutRight,
-                false => DeviceClocks::Told,
-            },
-            roles: roles.cloned(),
-            ..Request::default()
+            Recording::open(file, &options)?
         };
         let analysis = examine(&name, &recording, &request)?;
         let (mut signals, _) =

@@ -95,6 +95,8 @@ impl Adler {
 const FALL: f64 = 1.9207;
 /// Intervals of ln K narrower than this are those of a normal distribution (standard error).
 const NARROW: f64 = 0.1;
+/// An own frequency or a coupling that is known no better is not known, rad/s: own paces scatter by a third of it.
+pub const VAGUE_RAD_PER_S: f64 = 1.0;
 /// Log-likelihoods that differ by less are one summit, climbed from two sides.
 const SAME: f64 = 0.1;
 /// What a step detector bends the phase by within the stretch before the first beat, SD by twins, rad.
