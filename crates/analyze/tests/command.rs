@@ -964,6 +964,28 @@ fn what_may_move_the_load_is_told_with_its_remedy() {
     assert!(!kinds(&found).contains(&"unknown_type".to_owned()));
 }
 
+/// Phases that another program told, of walkers who follow the beats of a topic beside them.
+#[test]
+fn beats_stand_beside_phases_that_others_told() {
+    let folder = tempfile::tempdir().unwrap();
+    let turn = std::f64::consts::TAU;
+    let phases = (0..1800).map(|k| {
+        let t = f64::from(k) / 30.0;
+        let (a, b) = (turn * 1.9 * t - 0.3, turn * 1.9 * t - 0.5);
+        (t, format!("{{\"a\":{a},\"b\":{b}}}"))
+    });
+    let beats = (1..114).map(|k| (f64::from(k) / 1.9, "{}".to_owned()));
+    let file = told(
+        folder.path(),
+        &[("/p", phases.collect()), ("/beat", beats.collect())],
+    );
+    let found = with_roles(folder.path(), &file, "phases = [\"/p.a\", \"/p.b\"]\n");
+    assert!((metric(&found, "beat_hz") - 1.9).abs() < 1e-3);
+    assert!((metric(&found, "beat_synchrony") - 1.0).abs() < 1e-3);
+    let lead = metric(&found, "beat_lead_deg");
+    assert!((lead + 0.4f64.to_degrees()).abs() < 0.5, "{lead}");
+}
+
 /// The transform of a frame that rolls by `roll_deg` and stands `z` high.
 fn frame(name: &str, roll_deg: f64, z: f64) -> String {
     let (sin, cos) = (roll_deg.to_radians() / 2.0).sin_cos();

@@ -493,11 +493,14 @@ impl Field {
             self.filled.phases = true;
             self.fill_phases(inputs, t_s, phases);
         }
-        // Without anybody's phases it still beats.
-        if inputs.phase_rad.is_empty() && inputs.beat_phase_rad.is_empty() && self.beat_s.len() >= 3
-        {
+        // Without anybody's phases it still beats, and beside phases that somebody else told.
+        if inputs.beat_phase_rad.is_empty() && self.beat_s.len() >= 3 {
             self.filled.beat = true;
-            inputs.beat_phase_rad = self.course().phase(&inputs.t_s);
+            let t_s = match inputs.phase_rad.is_empty() {
+                true => &inputs.t_s,
+                false => inputs.phase_times(),
+            };
+            inputs.beat_phase_rad = self.course().phase(t_s);
             inputs.sources.beat = self.beat_source.into();
         }
     }
