@@ -9,7 +9,7 @@ use promise::{errors, look};
 use sim::model::Model;
 use sim::run::{Sample, run_model};
 use sim::scene::{BUILTIN, builtin, parse};
-use sim::solve::{Settings, method};
+use sim::solve::{METHODS, Settings, method};
 
 fn course(model: &Model, name: &str, tolerance: f64) -> Vec<[f64; 2]> {
     let mut all = Vec::new();
@@ -29,6 +29,32 @@ fn course(model: &Model, name: &str, tolerance: f64) -> Vec<[f64; 2]> {
     );
     outcome.unwrap();
     all
+}
+
+/// Whoever names a method that chooses its steps and locates events gets what `auto` promises; those that are blind to events do not (`dopri5-blind` errs by 34).
+#[test]
+fn the_tolerance_means_so_much_to_each_method_that_locates_events() {
+    let mut missed = Vec::new();
+    for &(name, text) in BUILTIN {
+        let mut scene = parse(name, text, &[]).unwrap();
+        scene.duration_s = scene.duration_s.min(60.0);
+        scene.solver.energy = false;
+        let model = Model::new(&scene);
+        let truth = course(&model, "dop853", 1e-10);
+        for m in METHODS.iter().filter(|m| m.adaptive && m.locates) {
+            for tolerance in [1e-6, 1e-8] {
+                let [roll, height] = errors(&course(&model, m.name, tolerance), &truth);
+                println!("{name} {} {tolerance:e}: {roll:.1e} {height:.1e}", m.name);
+                if roll.max(height) > 10.0 * tolerance {
+                    missed.push(format!(
+                        "{name} by {} at {tolerance:e}: roll errs by {roll:.1e}, height by {height:.1e}",
+                        m.name
+                    ));
+                }
+            }
+        }
+    }
+    assert!(missed.is_empty(), "{missed:#?}");
 }
 
 #[test]

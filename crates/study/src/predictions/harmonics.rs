@@ -117,7 +117,7 @@ pub fn run(lab: &Lab) -> Result<Finding, String> {
     };
     let because = format!(
         "Contact loss multiplies the second harmonic of the force by {:.1} and that of the height by {:.1}; that of the roll it multiplies by {:.2}, which is nothing to go by. What stands out in roll is \
-         f/2, the mark of parametric rocking, whether contact is lost ({:.0} % of all runs) or handles are tied ({:.0} %): the paper did not name it.",
+         f/2, which parametric pumping makes here (as shoulders that sway at f/2 would, and none of these do), whether contact is lost ({:.0} % of all runs) or handles are tied ({:.0} %): the paper did not name it.",
         added(1),
         added(2),
         added(3),
