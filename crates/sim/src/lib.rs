@@ -12,6 +12,7 @@ pub mod lanes;
 pub mod model;
 pub mod random;
 pub mod record;
+pub mod remarks;
 pub mod replay;
 pub mod run;
 pub mod scene;

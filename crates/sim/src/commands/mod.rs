@@ -4,7 +4,6 @@ mod accuracy;
 mod drum;
 mod explain;
 mod record;
-mod remarks;
 mod replay;
 mod scenes;
 

@@ -1,6 +1,5 @@
 //! `sim record`: a scene becomes a recording.
 
-use super::remarks::Remarks;
 use super::{patient_bar, real, setting};
 use anyhow::{Context, Result, anyhow, bail};
 use indicatif::ProgressBar;
@@ -8,6 +7,7 @@ use recording::whole::{Usage, remove_unfinished_files};
 use recording::write::{RecordingWriter, WriteError, WriterOptions};
 use sim::model::Model;
 use sim::record::Recorder;
+use sim::remarks::Remarks;
 use sim::run::{Listener, Sample, method_name, method_of, run_model, settings};
 use sim::scene::{SceneError, load};
 use sim::sensors::Reading;

@@ -345,6 +345,15 @@ fn set_key<'a>(
         ));
     }
     let takes_away = value == toml::Value::Boolean(false) && may_be_absent(&path);
+    // An effect that is on is as the scene has it, else with its defaults.
+    let value = match (&value, &path[..]) {
+        (toml::Value::Boolean(true), ["effects", effect]) => {
+            let effects = table.get("effects").and_then(toml::Value::as_table);
+            let there = effects.and_then(|effects| effects.get(*effect));
+            there.cloned().unwrap_or_else(|| toml::Table::new().into())
+        }
+        _ => value,
+    };
     gone.retain(|whole| *whole != key);
     if takes_away {
         gone.push(key);

@@ -71,7 +71,7 @@ pub struct Stats {
 pub enum Stopped {
     /// The error cannot be kept within the tolerance.
     #[error(
-        "{method} gave up at t = {t_s} s: the step fell to {step_s:.1e} s without reaching the tolerance {tolerance:e}; loosen --tolerance or soften the scene"
+        "{method} gave up at t = {t_s} s: the step fell to {step_s:.1e} s without reaching the tolerance {tolerance:e}; loosen solver.tolerance or soften the scene"
     )]
     StepTooSmall {
         /// Method name.

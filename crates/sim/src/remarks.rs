@@ -1,7 +1,7 @@
 //! What a motion did that nobody carries so: not wrong, but more often a unit that slipped than a wish.
 
-use sim::run::Sample;
-use sim::scene::Scene;
+use crate::run::Sample;
+use crate::scene::Scene;
 
 /// Beside a shoulder by more than a shoulder's breadth nobody carries, m: the law of contact asks for height alone.
 const BREADTH_M: f64 = 0.5;
@@ -55,6 +55,7 @@ pub struct Remarks {
 }
 
 impl Remarks {
+    /// For a run of `scene`.
     pub fn of(scene: &Scene) -> Self {
         let gravity = scene.body.gravity_m_per_s2.iter().map(|g| g * g);
         let weight_n = scene.body.mass_kg * gravity.sum::<f64>().sqrt();
@@ -73,6 +74,7 @@ impl Remarks {
         }
     }
 
+    /// Takes the next sample.
     pub fn look(&mut self, sample: &Sample) {
         let t_s = sample.t_s;
         let mut shoulders_m = 0.0;
