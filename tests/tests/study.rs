@@ -17,7 +17,9 @@ solver.tolerance = 1e-4
 [[axes]]
 key = "body.mass_kg"
 name = "mass"
-values = [40, 60, -1]
+from = -1
+to = 60
+count = 3
 [[axes]]
 key = "effects.contact.bilateral"
 values = [false, true]
@@ -113,7 +115,8 @@ fn a_run_that_fails_is_a_row_with_its_reason() {
         let cells: Vec<&str> = row.split(',').collect();
         let bad = cells[1] == "-1";
         assert_eq!(cells[5], if bad { "3" } else { "0" }, "failures in {row}");
-        assert_eq!(cells[6].is_empty(), bad, "mean roll in {row}");
+        assert_eq!(cells[6], "0", "remarks in {row}");
+        assert_eq!(cells[7].is_empty(), bad, "mean roll in {row}");
     }
 }
 
@@ -311,9 +314,19 @@ fn parts_of_another_study_are_not_mixed_in() {
     assert!(
         out.status.code() == Some(1)
             && said.contains("000000002.parquet: is damaged")
+            && said.contains("--resume")
             && !said.contains("summary"),
         "{said}"
     );
+    // It is made again.
+    let out = run_in(at, "study", &["a.toml", "--out", "x", "--resume"]);
+    let said = String::from_utf8_lossy(&out.stderr);
+    assert!(
+        out.status.success() && said.contains("000000002.parquet: is damaged"),
+        "{said}"
+    );
+    let again = std::fs::read(at.join("x/runs.parquet")).expect("a table");
+    assert!(again == table);
     // What is somebody's own stays.
     std::fs::write(at.join("scene.toml"), "# hours of work\n").expect("written");
     let out = run_in(at, "study", &["a.toml", "--out", "."]);
@@ -323,6 +336,96 @@ fn parts_of_another_study_are_not_mixed_in() {
         "{said}"
     );
     assert_eq!(read(at, "scene.toml"), b"# hours of work\n");
+}
+
+/// A part of other runs under its name, and any bit that is another: it is told, and made again.
+#[test]
+fn a_part_that_is_not_what_was_written_is_made_again() {
+    let folder = folder_with(
+        "a.toml",
+        "scene = \"stand-still\"\nset.duration_s = 1.0\nset.analysis_start_s = 0.0\nseeds = 40\nmetrics = [\"z_mean_m\"]\n",
+    );
+    let at = folder.path();
+    study(at, &["a.toml", "--out", "x"]);
+    let table = read(&at.join("x"), "runs.parquet");
+    let [first, second] = ["000000000-000000016", "000000016-000000032"]
+        .map(|name| at.join(format!("x/parts/{name}.parquet")));
+    let part = std::fs::read(&second).expect("a part");
+    std::fs::copy(&first, &second).expect("copied");
+    let status = json(&study(at, &["status", "x", "--format", "json"]));
+    assert_eq!(status["done"], 24);
+    let damaged = status["damaged"][0].as_str().expect("a sentence");
+    assert!(damaged.contains("its runs are others"), "{damaged}");
+    let out = run_in(at, "study", &["merge", "x"]);
+    let said = String::from_utf8_lossy(&out.stderr);
+    assert!(
+        out.status.code() == Some(1) && said.contains("--resume"),
+        "{said}"
+    );
+    study(at, &["a.toml", "--out", "x", "--resume"]);
+    assert!(std::fs::read(&second).expect("a part") == part);
+    assert!(read(&at.join("x"), "runs.parquet") == table);
+    for at_byte in (0..part.len()).step_by(23) {
+        let mut flipped = part.clone();
+        flipped[at_byte] ^= 1 << (at_byte % 8);
+        std::fs::write(&second, &flipped).expect("written");
+        let out = run_in(at, "study", &["merge", "x"]);
+        assert!(
+            out.status.code() == Some(1) || read(&at.join("x"), "runs.parquet") == table,
+            "byte {at_byte}"
+        );
+    }
+}
+
+/// Two studies begun in one folder at one moment: one of them has it, the other is told so.
+#[test]
+fn a_folder_is_of_one_study_at_a_time() {
+    let text = |mass: f64| {
+        format!(
+            "scene = \"music\"\nset.duration_s = 3.0\nset.analysis_start_s = 0.0\nset.body.mass_kg = {mass:?}\nseeds = 400\n"
+        )
+    };
+    let folder = folder_with("a.toml", &text(60.0));
+    let at = folder.path();
+    std::fs::write(at.join("b.toml"), text(61.0)).expect("written");
+    for round in 0..3 {
+        let out = format!("x{round}");
+        let ended = std::thread::scope(|scope| {
+            let run = |file: &'static str| {
+                let out = &out;
+                scope.spawn(move || run_in(at, "study", &[file, "--out", out, "--jobs", "1"]))
+            };
+            let both = [run("a.toml"), run("b.toml")];
+            both.map(|one| one.join().expect("ends"))
+        });
+        let well = ended.iter().filter(|out| out.status.success()).count();
+        let said = ended.map(|out| String::from_utf8_lossy(&out.stderr).into_owned());
+        assert!(well == 1, "{said:?}");
+        assert!(
+            said.iter().any(|said| said.contains("another study")),
+            "{said:?}"
+        );
+    }
+}
+
+/// What `sim record` says of a motion that nobody carries stands in the table, too.
+#[test]
+fn what_nobody_carries_is_remarked_on() {
+    let folder = folder_with(
+        "soft.toml",
+        "scene = \"music\"\nset.duration_s = 3.0\nset.analysis_start_s = 0.0\nseeds = 8\naxes = [{ key = \"effects.contact.stiffness_n_per_m\", values = [3000, 300] }]\n",
+    );
+    let out = study(folder.path(), &["soft.toml", "--format", "json"]);
+    let found = json(&out);
+    assert_eq!(found["remarked"], 8, "{found}");
+    let remarks = found["remarks"].to_string();
+    assert!(remarks.contains("gave way by"), "{remarks}");
+    let csv = String::from_utf8(read(&folder.path().join("soft"), "summary.csv")).expect("text");
+    let remarked = csv
+        .lines()
+        .skip(1)
+        .map(|row| row.split(',').nth(4).expect("a cell"));
+    assert_eq!(remarked.collect::<Vec<_>>(), ["0", "8"]);
 }
 
 #[test]

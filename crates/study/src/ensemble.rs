@@ -5,6 +5,7 @@ use crate::statistics::correlation;
 use analyze::inputs::{Inputs, Window};
 use analyze::metrics::{Metric, Need, metrics_of};
 use sim::model::Model;
+use sim::remarks::Remarks;
 use sim::run::{Listener, Sample, run_abreast, run_model, settings};
 use sim::scene::Scene;
 use sim::sensors::Reading;
@@ -61,6 +62,8 @@ pub struct Columns {
     pub inputs: Inputs,
     /// Whether any of the samples is [`Sample::doubtful`].
     pub doubtful: bool,
+    /// What the motion did that nobody carries so.
+    pub remarks: Remarks,
     /// Nobody asks for tilt and heading.
     only_roll: bool,
 }
@@ -86,6 +89,7 @@ impl Columns {
                 ..Inputs::default()
             },
             doubtful: false,
+            remarks: Remarks::of(scene),
             only_roll: false,
         }
     }
@@ -100,8 +104,9 @@ impl Columns {
     }
 
     /// Forgets all samples, but not what room they took.
-    fn clear(&mut self) {
+    fn clear(&mut self, scene: &Scene) {
         self.doubtful = false;
+        self.remarks = Remarks::of(scene);
         let i = &mut self.inputs;
         let single = [
             &mut i.t_s,
@@ -118,6 +123,7 @@ impl Columns {
     /// Adds a sample.
     pub fn push(&mut self, s: &Sample) {
         self.doubtful |= s.doubtful;
+        self.remarks.look(s);
         let i = &mut self.inputs;
         i.t_s.push(s.t_s);
         i.height_m.push(s.pose.position_m[2]);
@@ -149,7 +155,7 @@ pub fn observe(
     scene: &Scene,
     most_evaluations: Option<u64>,
     also: &mut dyn Listener,
-) -> (Inputs, Stats, Result<(), Stopped>) {
+) -> (Columns, Stats, Result<(), Stopped>) {
     let model = Model::new(scene);
     let method = method(&scene.solver.method).expect("a checked scene names a method");
     let mut settings = settings(scene);
@@ -159,7 +165,7 @@ pub fn observe(
         also,
     };
     let (stats, outcome) = run_model(&model, method, &settings, &mut both);
-    (both.columns.inputs, stats, outcome)
+    (both.columns, stats, outcome)
 }
 
 /// One scene under several seeds with method `auto`, side by side in the processor's registers, as far as the scene is one for that (else
@@ -227,7 +233,7 @@ impl<T, M: Fn(&Columns, &Stats, &Result<(), Stopped>) -> T> Listener for Lane<'_
         self.columns();
         if let Some(mut columns) = self.columns.take() {
             self.found = Some((self.measure)(&columns, stats, outcome));
-            columns.clear();
+            columns.clear(self.scene);
             self.spare.borrow_mut().push(columns);
         }
     }
@@ -254,8 +260,9 @@ impl Listener for Both<'_> {
 /// # Errors
 /// [`Stopped`] when the run does not reach its end.
 pub fn run_one(scene: &Scene) -> Result<Run, Stopped> {
-    let (inputs, stats, outcome) = observe(scene, None, &mut |_: &Sample| true);
+    let (columns, stats, outcome) = observe(scene, None, &mut |_: &Sample| true);
     outcome?;
+    let inputs = columns.inputs;
     let window = Window::from(scene.analysis_start_s);
     let found = metrics_of(&inputs, window, |name| KEPT.contains(&name));
     let metrics = KEPT

@@ -34,12 +34,13 @@ pub fn summarise(values: impl Iterator<Item = f64>) -> Option<Summary> {
     })
 }
 
-/// Numbers that are the same after a `turn` (degrees: 360), each as the one nearest their circular mean: what a mean, a spread and an
-/// order can be taken of.
-pub fn about_their_mean(values: &[f64], turn: f64) -> Vec<f64> {
+/// Of numbers that are the same after a `turn` (degrees: 360) the circular mean, and each as the one nearest to it: what a spread and an order
+/// can be taken of.
+pub fn about_their_mean(values: &[f64], turn: f64) -> (f64, Vec<f64>) {
     let angles = values.iter().map(|x| x / turn * TAU);
     let mean = circular(angles).map_or(0.0, |c| c.mean_rad / TAU * turn);
-    values.iter().map(|x| nearest(*x, mean, turn)).collect()
+    let about = values.iter().map(|x| nearest(*x, mean, turn));
+    (mean, about.collect())
 }
 
 /// Which of the numbers that are `x` but for whole turns is nearest to `to`.

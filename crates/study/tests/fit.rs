@@ -33,7 +33,8 @@ fn twins_lie_within_their_intervals() {
                 .for_each(|(c, d)| c.push(*d));
             true
         };
-        let (inputs, _, outcome) = study::ensemble::observe(&scene, None, &mut keep);
+        let (columns, _, outcome) = study::ensemble::observe(&scene, None, &mut keep);
+        let inputs = columns.inputs;
         outcome.unwrap();
         let own = sim::model::Model::new(&scene).natural_rad_per_s().to_vec();
         let field = Field {
@@ -82,11 +83,11 @@ fn noise_does_not_bias_the_pull() {
             format!("seed={seed}"),
         ];
         let scene = sim::scene::load("music", &settings).unwrap();
-        let (inputs, _, outcome) =
+        let (columns, _, outcome) =
             study::ensemble::observe(&scene, None, &mut |_: &sim::run::Sample| true);
         outcome.unwrap();
         let field = Field {
-            inputs,
+            inputs: columns.inputs,
             onset_s: 5.0,
             build_up_s: 11.0,
             ..Field::default()
@@ -120,7 +121,8 @@ fn field_of(scene: &sim::scene::Scene) -> Field {
         each.for_each(|(c, d): (&mut Vec<f64>, &f64)| c.push(*d));
         true
     };
-    let (inputs, _, outcome) = study::ensemble::observe(scene, None, &mut keep);
+    let (columns, _, outcome) = study::ensemble::observe(scene, None, &mut keep);
+    let inputs = columns.inputs;
     outcome.unwrap();
     let (onset_s, build_up_s) = match &scene.effects.music {
         Some(music) => (music.onset_s, music.build_up_s),

@@ -42,7 +42,8 @@ fn without_rows(of: &Inputs, row: usize, share: f64, seed: u64) -> Inputs {
 #[test]
 fn lost_states_leave_the_lines_of_music() {
     let scene = load("music", &["solver.energy=false".into()]).unwrap();
-    let (inputs, _, outcome) = observe(&scene, None, &mut |_: &Sample| true);
+    let (columns, _, outcome) = observe(&scene, None, &mut |_: &Sample| true);
+    let inputs = columns.inputs;
     outcome.unwrap();
     let read = |inputs: &Inputs| {
         let found = metrics(inputs, W);

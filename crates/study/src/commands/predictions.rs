@@ -86,7 +86,12 @@ pub fn run(args: &Args) -> Result<()> {
             }
         }
         // Page and numbers are of the same experiments, be they all or some.
-        let text = page(&findings, "predictions", args.seeds);
+        let text = page(
+            &findings,
+            &folder.display().to_string(),
+            "predictions",
+            args.seeds,
+        );
         write_whole(&folder.join("predictions.md"), text.as_bytes())?;
         write_whole(&folder.join("predictions.json"), json.as_bytes())?;
     }

@@ -39,7 +39,7 @@ pub fn run(args: &Args) -> Result<()> {
             "{:#}\n",
             json!({
                 "study": plan.spec.name, "runs": plan.runs(), "done": found.runs, "failed": found.failed,
-                "parts": parts, "of_parts": plan.blocks(), "missing_runs": gaps, "merged": merged,
+                "parts": parts, "of_parts": plan.blocks(), "missing_runs": gaps, "damaged": found.damaged, "merged": merged,
             })
         ),
         Format::Table => {
@@ -57,6 +57,9 @@ pub fn run(args: &Args) -> Result<()> {
             }
             if gaps.len() > 10 {
                 text += &format!("  and {} more stretches\n", gaps.len() - 10);
+            }
+            for damaged in found.damaged.iter().take(20) {
+                text += &format!("  {damaged}; --resume computes it again\n");
             }
             if gaps.is_empty() && !merged {
                 text += &format!(

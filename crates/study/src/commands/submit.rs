@@ -15,9 +15,9 @@ pub struct Args {
     /// The scheduler.
     #[arg(long, value_enum, default_value_t = Engine::Slurm)]
     engine: Engine,
-    /// Tasks of the array. Few and long: each starts once and works through its share.
-    #[arg(long, value_name = "N", default_value_t = 8, allow_negative_numbers = true, value_parser = count(1..=100_000))]
-    tasks: u64,
+    /// Tasks of the array. Few and long: each starts once and works through its share. Default: 8, or as many as the study has parts.
+    #[arg(long, value_name = "N", allow_negative_numbers = true, value_parser = count(1..=100_000))]
+    tasks: Option<u64>,
     /// Cores, and so threads, of each task.
     #[arg(long, value_name = "N", default_value_t = 1, allow_negative_numbers = true, value_parser = count(1..=1024))]
     cpus: u64,
@@ -31,6 +31,9 @@ pub struct Args {
     #[arg(last = true)]
     options: Vec<String>,
 }
+
+/// Tasks where nobody says how many.
+const USUAL_TASKS: u64 = 8;
 
 /// The schedulers there are.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, clap::ValueEnum)]
@@ -51,10 +54,11 @@ requeued by Slurm and leaves what it finds done.";
 pub fn run(args: &Args) -> Result<()> {
     let plan = sweep::plan(&args.file)?;
     let out = sweep::folder(&args.file, args.out.as_ref());
-    if args.tasks > plan.blocks() {
+    let tasks = args.tasks.unwrap_or(USUAL_TASKS.min(plan.blocks()));
+    if tasks > plan.blocks() {
         bail!(
             "--tasks is {}, but this study of {} runs has only {} parts to share out",
-            args.tasks,
+            tasks,
             plan.runs(),
             plan.blocks()
         );
@@ -82,12 +86,12 @@ pub fn run(args: &Args) -> Result<()> {
          #SBATCH --open-mode=append\n\
          #SBATCH --output={}\n\
          exec {} run {} --shard \"$SLURM_ARRAY_TASK_ID/{}\" --out {} --jobs \"${{SLURM_CPUS_PER_TASK:-{}}}\"\n",
-        args.tasks,
+        tasks,
         args.cpus,
         directive(&out.join("task-%a.log"))?,
         shell(&study),
         shell(&out.join("study.toml")),
-        args.tasks,
+        tasks,
         shell(&out),
         args.cpus
     );
@@ -106,7 +110,7 @@ pub fn run(args: &Args) -> Result<()> {
             recording::note!(
                 "{} runs in {} tasks submitted; `study status {}` says how far they are, `study merge {}` puts them together",
                 plan.runs(),
-                args.tasks,
+                tasks,
                 out.display(),
                 out.display()
             );

@@ -102,7 +102,7 @@ pub fn run(args: &Args) -> Result<()> {
     };
     let mine = shard.unwrap_or(Shard::WHOLE);
     let there = store.progress(mine).map_err(sentence)?;
-    if there.runs > 0 && shard.is_none() && !args.resume {
+    if (there.runs > 0 || !there.damaged.is_empty()) && shard.is_none() && !args.resume {
         bail!(
             "{} holds {} of the {} runs of this study; --resume goes on, --out DIR begins elsewhere",
             out.display(),
@@ -110,7 +110,10 @@ pub fn run(args: &Args) -> Result<()> {
             plan.runs()
         );
     }
-    store.create().map_err(sentence)?;
+    let _claim = store.create().map_err(sentence)?;
+    for damaged in there.damaged.iter().take(20) {
+        recording::note!("{damaged}: its runs are computed again");
+    }
 
     let began = Instant::now();
     let size = |blocks: &[u64]| -> u64 {
@@ -177,7 +180,8 @@ pub fn report(plan: &Plan, store: &Store, out: &Path, figures: bool, format: For
         let folder = out.join("figures");
         let drawn =
             study::sweep::figures::draw(plan, store, &folder).map_err(anyhow::Error::msg)?;
-        recording::note!("{}: {drawn} figures", folder.display());
+        let figures = recording::text::counted(drawn as u64, "figure", "figures");
+        recording::note!("{}: {figures}", folder.display());
     }
     let table = store.table();
     recording::note!(
@@ -229,6 +233,8 @@ fn json(
         "failed": summary.failures,
         "reasons": summary.reasons,
         "other_reasons": summary.other_reasons(),
+        "remarked": summary.remarked,
+        "remarks": summary.remarks,
         "metrics": metrics,
         "sensitivity": indices.map(|all| study::sweep::sensitivity::to_json(all)),
     })

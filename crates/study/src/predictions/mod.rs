@@ -204,9 +204,9 @@ fn scene(template: &Template, values: &[(&str, f64)], seed: u64) -> Result<Scene
 
 /// A run's columns; `also` sees every sample too.
 fn columns(scene: &Scene, also: &mut dyn Listener) -> Result<Inputs, String> {
-    let (inputs, _, outcome) = observe(scene, None, also);
+    let (columns, _, outcome) = observe(scene, None, also);
     outcome
-        .map(|()| inputs)
+        .map(|()| columns.inputs)
         .map_err(|e| format!("{} seed {}: {e}", scene.name, scene.seed))
 }
 
@@ -293,8 +293,8 @@ fn cell(text: &str) -> String {
 /// Seeds of every ensemble where nobody says how many.
 pub const SEEDS: u64 = 12;
 
-/// The findings as a page of Markdown, be they all or some; pictures are looked for in `pictures`.
-pub fn page(findings: &[(&str, Finding)], pictures: &str, seeds: u64) -> String {
+/// The findings as a page of Markdown, be they all or some, of a command that wrote it to `folder`; pictures are looked for in `pictures` beside it.
+pub fn page(findings: &[(&str, Finding)], folder: &str, pictures: &str, seeds: u64) -> String {
     let mut words = String::new();
     if findings.len() < EXPERIMENTS.len() {
         words.extend(findings.iter().map(|(name, _)| format!(" {name}")));
@@ -303,7 +303,7 @@ pub fn page(findings: &[(&str, Finding)], pictures: &str, seeds: u64) -> String 
         let _ = write!(words, " --seeds {seeds}");
     }
     let mut out = format!(
-        "# The paper's predictions, tried\n\n    $ cargo run --release -p study -- predictions{words} --out docs\n\n\
+        "# The paper's predictions, tried\n\n    $ cargo run --release -p study -- predictions{words} --out {folder}\n\n\
          wrote this page and its pictures, with {seeds} seeds for an ensemble where nothing else is said. What the scenes are: docs/reproduction.md; what the\n\
          metrics are: docs/metrics.md. Everything said here is said of this model, not of any procession.\n\n\
          | prediction | verdict | condition |\n|---|---|---|\n"

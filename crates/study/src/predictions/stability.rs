@@ -56,7 +56,7 @@ pub fn simulated(
     )?;
     // Once the roll is large there is nothing more to learn.
     let mut large = false;
-    let (inputs, _, outcome) = observe(&scene, None, &mut |s: &Sample| {
+    let (columns, _, outcome) = observe(&scene, None, &mut |s: &Sample| {
         large = s.pose.roll_pitch_yaw_rad()[0].abs() > 10.0 * LINEAR_RAD.1;
         !large
     });
@@ -64,6 +64,7 @@ pub fn simulated(
         return Err(e.to_string());
     }
     let window = 2 * SAMPLES;
+    let inputs = columns.inputs;
     let largest: Vec<(f64, f64)> = inputs
         .roll_rad
         .chunks_exact(window)

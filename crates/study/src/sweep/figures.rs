@@ -88,6 +88,11 @@ fn label(name: &str, unit: &str) -> String {
     with_unit(find(name).map_or(name, |m| m.label), unit)
 }
 
+/// The name of an axis, with the unit of its key.
+fn axis_label(plan: &Plan, axis: usize) -> String {
+    with_unit(&plan.spec.axes[axis].name, &plan.columns()[2 + axis].unit)
+}
+
 /// What a figure leaves out, behind its title.
 const HALF: &str = "; where at least half of the runs have it";
 
@@ -115,8 +120,8 @@ fn band(
     }
     let left_out = if found.len() < points.len() { HALF } else { "" };
     (found.len() > 1).then(|| Figure {
-        title: format!("{label}{left_out}"),
-        x_label: axis.name.clone(),
+        title: format!("{label}: mean, median and the band of 90 % of the runs{left_out}"),
+        x_label: axis_label(plan, 0),
         x_log: axis.spacing == Spacing::Log,
         y_label: label.into(),
         layers: vec![
@@ -170,8 +175,8 @@ fn map(
     let ends = |edges: &[f64]| Some((edges[0], edges[edges.len() - 1]));
     Some(Figure {
         title: format!("{label}{left_out}"),
-        x_label: x.name.clone(),
-        y_label: y.name.clone(),
+        x_label: axis_label(plan, 1),
+        y_label: axis_label(plan, 0),
         x_range: ends(&columns),
         y_range: ends(&rows),
         x_log: x.spacing == Spacing::Log,
@@ -185,7 +190,8 @@ fn map(
     })
 }
 
-/// Which of an axis' values each cell is of, from the lowest up, and the cells' edges: half-way between neighbours, and as far beyond the ends.
+/// Which of an axis' values each cell is of, from the lowest up, and the cells' edges: half-way between neighbours, and as far beyond the ends, but not below
+/// nought where all values lie above it.
 fn cells(axis: &Axis) -> (Vec<usize>, Vec<f64>) {
     let apart = |x: f64| match axis.spacing {
         Spacing::Linear => x,
@@ -196,7 +202,10 @@ fn cells(axis: &Axis) -> (Vec<usize>, Vec<f64>) {
     at.sort_by(|a, b| a.0.total_cmp(&b.0));
     let between = |w: &[(f64, usize)]| 0.5 * (w[0].0 + w[1].0);
     let inner: Vec<f64> = at.windows(2).map(between).collect();
-    let first = 2.0 * at[0].0 - inner[0];
+    let mut first = 2.0 * at[0].0 - inner[0];
+    if axis.spacing == Spacing::Linear && at[0].0 > 0.0 {
+        first = first.max(0.0);
+    }
     let last = 2.0 * at[at.len() - 1].0 - inner[inner.len() - 1];
     let edges = [first].into_iter().chain(inner).chain([last]);
     let edges = edges.map(|x| match axis.spacing {
@@ -209,7 +218,7 @@ fn cells(axis: &Axis) -> (Vec<usize>, Vec<f64>) {
 /// Share of all `runs` up to each value: it ends below one where some have none.
 fn distribution(label: &str, mut values: Vec<f64>, runs: u64, turn: Option<f64>) -> Option<Figure> {
     if let Some(turn) = turn {
-        values = about_their_mean(&values, turn);
+        (_, values) = about_their_mean(&values, turn);
     }
     values.sort_by(f64::total_cmp);
     let n = values.len();
@@ -273,6 +282,8 @@ mod tests {
             cells(&found[0]),
             (vec![0, 2, 1], vec![35.0, 45.0, 65.0, 95.0])
         );
+        let far = axes("{ key = \"body.mass_kg\", values = [50, 450] }");
+        assert_eq!(cells(&far[0]).1, [0.0, 250.0, 650.0]);
         let (order, edges) = cells(&found[1]);
         assert_eq!(order, [0, 1, 2]);
         for (edge, power) in edges.iter().zip([-0.5, 0.5, 1.5, 2.5]) {

@@ -11,7 +11,7 @@ pub mod summary;
 pub mod table;
 
 use crate::ensemble::{Columns, measure_abreast, observe};
-use analyze::inputs::{Inputs, Window};
+use analyze::inputs::Window;
 use analyze::metrics::{Metric, find, metrics_of};
 use design::Points;
 use recording::write::{RecordingWriter, WriteError, WriterOptions};
@@ -36,9 +36,13 @@ pub const FIXED_COLUMNS: &[&str] = &[
     "rejected",
     "evaluations",
     "events",
+    "remarks",
     "failed",
     "version",
 ];
+
+/// What stands between two remarks of one run.
+const BETWEEN_REMARKS: &str = " | ";
 
 /// The key that says whether a run keeps its energy account.
 const ACCOUNT: &str = "solver.energy";
@@ -111,8 +115,14 @@ impl Plan {
         };
         let template = Template::load(&scene, &set)
             .map_err(|e| format!("scene: {e}").replace("scene: --set: ", "set: "))?;
-        for axis in &spec.axes {
+        for (k, axis) in spec.axes.iter().enumerate() {
             try_axis(axis, &template)?;
+            let others = spec
+                .axes
+                .iter()
+                .enumerate()
+                .filter(|(other, _)| *other != k);
+            no_value_is_hopeless(axis, &template, others.map(|(_, other)| other))?;
         }
         let whole = |axis: &spec::Axis| {
             template
@@ -319,6 +329,7 @@ impl Plan {
         let Measured {
             metrics,
             stats,
+            remarks,
             failed,
         } = found;
         // OK because all these counts are far below 2^63.
@@ -349,7 +360,13 @@ impl Plan {
             work(|s| s.evaluations),
             work(|s| s.events),
         ]);
-        row.push(failed.map_or(Cell::Empty, Cell::Text));
+        let words = |text: String| Cell::Text(text);
+        row.push(
+            (!remarks.is_empty())
+                .then(|| remarks.join(BETWEEN_REMARKS))
+                .map_or(Cell::Empty, words),
+        );
+        row.push(failed.map_or(Cell::Empty, words));
         row.push(Cell::Text(VERSION.into()));
         row
     }
@@ -373,7 +390,7 @@ impl Plan {
             let seeds = scene.seed..scene.seed + (runs.end - runs.start);
             let weigh = |columns: &Columns, stats: &Stats, outcome: &Result<(), Stopped>| {
                 let outcome = outcome.clone().map_err(|e| e.to_string());
-                let measured = self.weigh(&scene, &columns.inputs, *stats, outcome);
+                let measured = self.weigh(&scene, columns, *stats, outcome);
                 (measured, unwatched && columns.doubtful)
             };
             let metrics = &self.metrics;
@@ -416,13 +433,13 @@ impl Plan {
                 Err(error) => return of_its_run(&error).map(Measured::failed),
             }
         }
-        let (inputs, stats, outcome) = observe(scene, Some(MOST_EVALUATIONS), &mut keeper);
+        let (columns, stats, outcome) = observe(scene, Some(MOST_EVALUATIONS), &mut keeper);
         // The writer knows best why it stopped a run.
         let ended = match keeper.recorder.map_or(Ok(()), Recorder::finish) {
             Ok(()) => outcome.map_err(|e| e.to_string()),
             Err(error) => Err(of_its_run(&error)?),
         };
-        let measured = self.weigh(scene, &inputs, stats, ended);
+        let measured = self.weigh(scene, &columns, stats, ended);
         Ok(match unwatched && keeper.doubtful {
             true => with_its_account(scene, scene.seed, measured),
             false => measured,
@@ -433,7 +450,7 @@ impl Plan {
     fn weigh(
         &self,
         scene: &Scene,
-        inputs: &Inputs,
+        columns: &Columns,
         stats: Stats,
         ended: Result<(), String>,
     ) -> Measured {
@@ -443,6 +460,7 @@ impl Plan {
                 ..Measured::failed(reason)
             };
         }
+        let inputs = &columns.inputs;
         let wanted = |name: &str| self.metrics.iter().any(|m| m.name == name);
         let found = metrics_of(inputs, Window::from(scene.analysis_start_s), wanted);
         let cell = |metric: &&Metric| {
@@ -465,6 +483,7 @@ impl Plan {
         Measured {
             metrics,
             stats: Some(stats),
+            remarks: columns.remarks.said(scene),
             failed: nothing.then(why),
         }
     }
@@ -519,6 +538,8 @@ impl Shares {
 struct Measured {
     metrics: Vec<Cell>,
     stats: Option<Stats>,
+    /// What the motion did that nobody carries so.
+    remarks: Vec<String>,
     failed: Option<String>,
 }
 
@@ -527,6 +548,7 @@ impl Measured {
         Self {
             metrics: Vec::new(),
             stats: None,
+            remarks: Vec::new(),
             failed: Some(reason),
         }
     }
@@ -563,7 +585,7 @@ impl Listener for Keeper<'_> {
 /// How many values of a row or a range are tried before its key is called a slip.
 const TRIED: u64 = 100;
 
-/// A key that no value can be given to is a slip; a value that a scene may not have is a row with its reason.
+/// A key that no value can be given to is a slip; a value out of a range that a scene may not have is a row with its reason.
 fn try_axis(axis: &spec::Axis, template: &Template) -> Result<(), String> {
     let whole = template
         .value(&axis.key)
@@ -594,7 +616,20 @@ fn try_axis(axis: &spec::Axis, template: &Template) -> Result<(), String> {
             axis.key
         ));
     }
-    let tried: Vec<toml::Value> = match (axis.is_sampled(), axis.len().min(TRIED)) {
+    let mut why = Ok(());
+    for value in tried(axis) {
+        let set = with_along(axis, as_key(value));
+        match template.with(set.iter().map(|(k, v)| (k.as_str(), v.clone()))) {
+            Ok(_) => return Ok(()),
+            Err(error) => why = why.and(Err(format!("axis `{}`: {error}", axis.key))),
+        }
+    }
+    why
+}
+
+/// Values of an axis that are tried before a study begins: all that are named, some of many.
+fn tried(axis: &spec::Axis) -> Vec<toml::Value> {
+    match (axis.is_sampled(), axis.len().min(TRIED)) {
         (true, _) => (0..=TRIED)
             .map(|k| axis.at(k as f64 / TRIED as f64).into())
             .collect(),
@@ -602,21 +637,42 @@ fn try_axis(axis: &spec::Axis, template: &Template) -> Result<(), String> {
         (false, n) => (0..n)
             .map(|k| axis.value(k * (axis.len() - 1) / (n - 1).max(1)))
             .collect(),
-    };
-    let mut why = Ok(());
-    for value in tried {
-        let value = as_key(value);
-        let along = flatten(&axis.along);
-        let along = along.iter().filter_map(|(key, factor)| {
-            Some((key.as_str(), (number(&value)? * number(factor)?).into()))
-        });
-        let own = [(axis.key.as_str(), value.clone())];
-        match template.with(own.into_iter().chain(along)) {
-            Ok(_) => return Ok(()),
-            Err(error) => why = why.and(Err(format!("axis `{}`: {error}", axis.key))),
+    }
+}
+
+/// What a value of an axis sets: its key, and what goes along with it.
+fn with_along(axis: &spec::Axis, value: toml::Value) -> Vec<(String, toml::Value)> {
+    let along = flatten(&axis.along)
+        .into_iter()
+        .filter_map(|(key, factor)| Some((key, (number(&value)? * number(&factor)?).into())));
+    let along: Vec<(String, toml::Value)> = along.collect();
+    [vec![(axis.key.clone(), value)], along].concat()
+}
+
+/// A value that is named and can never be, such as a word for a number, would cost all its runs: one that is refused for its own key, alone and beside
+/// any value of another axis.
+fn no_value_is_hopeless<'a>(
+    axis: &spec::Axis,
+    template: &Template,
+    others: impl Iterator<Item = &'a spec::Axis> + Clone,
+) -> Result<(), String> {
+    let beside: Vec<Vec<(String, toml::Value)>> = others
+        .flat_map(|other| tried(other).into_iter().map(|v| with_along(other, v)))
+        .collect();
+    let named = axis.values.iter().filter(|_| axis.count.is_none());
+    for value in named {
+        let own = with_along(axis, value.clone());
+        let made = |beside: &[(String, toml::Value)]| {
+            let set = own.iter().chain(beside);
+            template.with(set.map(|(k, v)| (k.as_str(), v.clone())))
+        };
+        let Err(error) = made(&[]) else { continue };
+        let error = error.to_string();
+        if error.contains(&axis.key) && !beside.iter().any(|other| made(other).is_ok()) {
+            return Err(format!("axis `{}`: {error}", axis.key));
         }
     }
-    why
+    Ok(())
 }
 
 /// A value that an axis with values of its own has more than once.
@@ -673,6 +729,7 @@ fn columns(spec: &Spec, metrics: &[&Metric]) -> Vec<Column> {
     for name in ["steps", "rejected", "evaluations", "events"] {
         out.push(column(name, Kind::Whole, ""));
     }
+    out.push(column("remarks", Kind::Text, ""));
     out.push(column("failed", Kind::Text, ""));
     out.push(column("version", Kind::Text, ""));
     out

@@ -42,6 +42,8 @@ pub struct Progress {
     pub runs: u64,
     /// Of these, runs without a result.
     pub failed: u64,
+    /// What is wrong with the parts of missing blocks that are there but damaged, a sentence each.
+    pub damaged: Vec<String>,
 }
 
 /// What writing a block's parts came to.
@@ -56,6 +58,15 @@ pub struct Written {
 }
 
 type Outcome<T> = Result<T, String>;
+
+/// The lock of a study's folder.
+const LOCK: &str = ".lock";
+/// So often a folder is claimed while others write their study into it.
+const CLAIMS: u32 = 20;
+
+/// A folder that is a study's as long as this is held.
+#[derive(Debug)]
+pub struct Claim(#[expect(dead_code, reason = "held for its lock")] Option<std::fs::File>);
 
 impl<'p> Store<'p> {
     /// The folder of `plan`; nothing is made yet.
@@ -94,19 +105,61 @@ impl<'p> Store<'p> {
         ]
     }
 
-    /// Makes the folder and writes the study into it.
+    /// Makes the folder and writes the study into it. As long as what is returned is held, no other study takes the folder.
     ///
     /// # Errors
-    /// What the system says; that the folder holds parts of another study, or files of these names that are no study's.
-    pub fn create(&self) -> Outcome<()> {
+    /// What the system says; that the folder holds parts of another study, or files of these names that are no study's; that another study is
+    /// being computed there.
+    pub fn create(&self) -> Outcome<Claim> {
+        let parts = self.folder.join("parts");
+        self.may_be_ours()?;
+        std::fs::create_dir_all(&parts)
+            .map_err(|e| format!("{}: cannot be made: {e}", parts.display()))?;
+        let lock = std::fs::File::create(self.folder.join(LOCK)).ok();
+        for _ in 0..CLAIMS {
+            // Who writes a study is alone, who computes one is not: shards are of one study. Where the disk knows no locks there are none.
+            let alone = lock.as_ref().map(std::fs::File::try_lock);
+            if !matches!(alone, Some(Err(std::fs::TryLockError::WouldBlock))) {
+                self.write_study()?;
+            }
+            if let Some(lock) = &lock {
+                let _ = lock.unlock();
+                let _ = lock.lock_shared();
+            }
+            if self.is_written() {
+                return Ok(Claim(lock));
+            }
+            if let Some(lock) = &lock {
+                let _ = lock.unlock();
+            }
+        }
+        Err(format!(
+            "{}: another study is being computed there; choose another --out",
+            self.folder.display()
+        ))
+    }
+
+    fn files(&self) -> [(&'static str, String); 2] {
+        [
+            ("study.toml", self.plan.text()),
+            ("scene.toml", self.plan.scene_text().to_owned()),
+        ]
+    }
+
+    /// Whether the study in the folder is this one.
+    fn is_written(&self) -> bool {
+        let is = |(name, text): &(&str, String)| {
+            std::fs::read(self.folder.join(name)).is_ok_and(|found| found == text.as_bytes())
+        };
+        self.files().iter().all(is)
+    }
+
+    /// Whether nothing of anybody else's stands where the study goes.
+    fn may_be_ours(&self) -> Outcome<()> {
         let parts = self.folder.join("parts");
         let ours = parts.is_dir();
         let held = std::fs::read_dir(&parts).is_ok_and(|mut entries| entries.next().is_some());
-        let files = [
-            ("study.toml", self.plan.text()),
-            ("scene.toml", self.plan.scene_text().to_owned()),
-        ];
-        for (name, text) in &files {
+        for (name, text) in &self.files() {
             let path = self.folder.join(name);
             let other = std::fs::read(&path).is_ok_and(|found| found != text.as_bytes());
             if other && (held || !ours) {
@@ -121,9 +174,12 @@ impl<'p> Store<'p> {
                 return Err(format!("{}: {what}", path.display()));
             }
         }
-        std::fs::create_dir_all(&parts)
-            .map_err(|e| format!("{}: cannot be made: {e}", parts.display()))?;
-        for (name, text) in &files {
+        Ok(())
+    }
+
+    fn write_study(&self) -> Outcome<()> {
+        self.may_be_ours()?;
+        for (name, text) in &self.files() {
             let path = self.folder.join(name);
             write_whole(&path, |file| Ok(file.write_all(text.as_bytes())?))?;
         }
@@ -158,8 +214,19 @@ impl<'p> Store<'p> {
                     path.display()
                 )
             };
-            let reader =
-                Reader::open(&path).map_err(|e| say(&format!("is no part of a study: {e}")))?;
+            let mut damaged = |why: ParquetError| {
+                found.missing.push(block);
+                found
+                    .damaged
+                    .push(format!("{}: is damaged: {why}", path.display()));
+            };
+            let reader = match Reader::open(&path) {
+                Ok(reader) => reader,
+                Err(why) => {
+                    damaged(why);
+                    continue;
+                }
+            };
             for (name, expected) in &notes {
                 if reader.note(name) != Some(expected) {
                     return Err(say(match name.as_str() {
@@ -169,23 +236,19 @@ impl<'p> Store<'p> {
                     }));
                 }
             }
-            let range = self.plan.block(block);
-            if reader.rows != range.end - range.start {
-                return Err(say(&format!(
-                    "has {} of {} rows",
-                    reader.rows,
-                    range.end - range.start
-                )));
-            }
-            if with_recordings && !self.recorded(&reader).map_err(|e| say(&e.to_string()))? {
+            let rows = match self.rows(block, &reader) {
+                Ok(rows) => rows,
+                Err(why) => {
+                    damaged(why);
+                    continue;
+                }
+            };
+            if with_recordings && !self.recorded(&rows) {
                 found.missing.push(block);
                 continue;
             }
-            found.runs += reader.rows;
-            found.failed += reader
-                .note("failed")
-                .and_then(|n| n.parse().ok())
-                .unwrap_or(0);
+            found.runs += rows.len() as u64;
+            found.failed += rows.iter().filter(|row| !has_result(row)).count() as u64;
         }
         Ok(found)
     }
@@ -194,24 +257,28 @@ impl<'p> Store<'p> {
         self.folder.join("recordings")
     }
 
-    /// Whether every run of a part that has a result has its recording too, up to the last byte.
-    fn recorded(&self, part: &Reader) -> Result<bool, ParquetError> {
-        let failed = part.columns.len() - 2;
-        for group in 0..part.groups() {
-            for row in part.group(group)? {
-                let whole = match row[0] {
-                    Cell::Whole(run) => {
-                        ends_whole(&self.recordings().join(recording_name(run as u64)))
-                            .unwrap_or(false)
-                    }
-                    _ => true,
-                };
-                if row[failed] == Cell::Empty && !whole {
-                    return Ok(false);
-                }
-            }
+    /// The rows of a part, if they are those of its runs.
+    fn rows(&self, block: u64, part: &Reader) -> Result<Vec<Vec<Cell>>, ParquetError> {
+        let rows = part.checked()?;
+        // OK because runs are far below 2^63.
+        let runs = self.plan.block(block).map(|run| Cell::Whole(run as i64));
+        if !rows.iter().map(|row| row[0].clone()).eq(runs) {
+            return Err(ParquetError::General(
+                "its runs are others than its name says".into(),
+            ));
         }
-        Ok(true)
+        Ok(rows)
+    }
+
+    /// Whether every run of a part that has a result has its recording too, up to the last byte.
+    fn recorded(&self, rows: &[Vec<Cell>]) -> bool {
+        rows.iter().all(|row| {
+            let Cell::Whole(run) = row[0] else {
+                return true;
+            };
+            let path = self.recordings().join(recording_name(run as u64));
+            !has_result(row) || ends_whole(&path).unwrap_or(false)
+        })
     }
 
     /// Takes away what a kill left unfinished.
@@ -306,12 +373,9 @@ impl<'p> Store<'p> {
     }
 
     fn write_part(&self, block: u64, rows: &[Vec<Cell>]) -> Outcome<u64> {
-        let place = self.plan.columns().len() - 2;
-        let failed = rows.iter().filter(|r| r[place] != Cell::Empty).count() as u64;
-        let mut notes = self.notes();
-        notes.push(("failed".into(), failed.to_string()));
+        let failed = rows.iter().filter(|row| !has_result(row)).count() as u64;
         write_whole(&self.part(block), |file| {
-            let mut writer = Writer::new(file, self.plan.columns(), &notes)?;
+            let mut writer = Writer::new(file, self.plan.columns(), &self.notes())?;
             writer.group(rows)?;
             writer.close()
         })?;
@@ -324,6 +388,16 @@ impl<'p> Store<'p> {
     /// Missing or unreadable parts; a table that cannot be written.
     pub fn merge(&self) -> Outcome<Found> {
         let progress = self.parts(Shard::WHOLE, false)?;
+        if let Some(damaged) = progress.damaged.first() {
+            let further = match progress.damaged.len() - 1 {
+                0 => String::new(),
+                n => format!(", and so are {n} others"),
+            };
+            return Err(format!(
+                "{damaged}{further}; `study {} --resume` computes it again",
+                self.folder.join("study.toml").display()
+            ));
+        }
         if let Some(first) = progress.missing.first() {
             let runs = self.plan.block(*first);
             return Err(format!(
@@ -365,21 +439,19 @@ impl<'p> Store<'p> {
             let path = self.part(block);
             let mut named = |e: ParquetError| {
                 *damaged = Some(format!(
-                    "{}: is damaged ({e}); delete it, and `study {} --resume` computes it again",
+                    "{}: is damaged: {e}; `study {} --resume` computes it again",
                     path.display(),
                     self.folder.join("study.toml").display()
                 ));
                 e
             };
             let part = Reader::open(&path).map_err(&mut named)?;
-            for group in 0..part.groups() {
-                for row in part.group(group).map_err(&mut named)? {
-                    summary.row(&row)?;
-                    rows.push(row);
-                    if rows.len() == GROUP_ROWS {
-                        writer.group(&rows)?;
-                        rows.clear();
-                    }
+            for row in self.rows(block, &part).map_err(&mut named)? {
+                summary.row(&row)?;
+                rows.push(row);
+                if rows.len() == GROUP_ROWS {
+                    writer.group(&rows)?;
+                    rows.clear();
                 }
             }
         }
@@ -388,6 +460,11 @@ impl<'p> Store<'p> {
         }
         writer.close()
     }
+}
+
+/// Whether a run of the table has a result.
+fn has_result(row: &[Cell]) -> bool {
+    row[row.len() - 2] == Cell::Empty
 }
 
 /// Name of a run's recording.

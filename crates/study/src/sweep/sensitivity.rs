@@ -57,7 +57,7 @@ pub fn indices(plan: &Plan, found: &Found) -> Option<Vec<Index>> {
             .filter_map(|rows| rows.iter().map(|means| means[k]).collect())
             .collect();
         if let Some(turn) = turn_of(metric) {
-            let about = about_their_mean(&rows.concat(), turn);
+            let (_, about) = about_their_mean(&rows.concat(), turn);
             rows = about.chunks(axes + 2).map(<[f64]>::to_vec).collect();
         }
         for (axis, of) in plan.spec.axes.iter().enumerate() {

@@ -131,6 +131,9 @@ fn check(spec: &mut Spec) -> Result<(), String> {
     }
     check_seeds(spec)?;
     let names = || analyze::metrics::METRICS.iter().map(|m| m.name);
+    if spec.metrics.is_empty() {
+        return Err("metrics: none is named; leave the line out for the usual ones".into());
+    }
     for (k, name) in spec.metrics.iter().enumerate() {
         if !names().any(|n| n == name) {
             let hint =
@@ -212,13 +215,11 @@ fn check(spec: &mut Spec) -> Result<(), String> {
 /// Tables hold seeds as signed numbers.
 pub(super) fn check_seeds(spec: &Spec) -> Result<(), String> {
     let last = spec.first_seed.checked_add(spec.seeds - 1);
-    match last.is_some_and(|seed| i64::try_from(seed).is_ok()) {
+    match last.is_some_and(|seed| seed >> 56 == 0) {
         true => Ok(()),
         false => Err(format!(
-            "first_seed: found {} and {} seeds from it on, expected the last to be at most {}",
-            spec.first_seed,
-            spec.seeds,
-            i64::MAX
+            "first_seed: found {} and {} seeds from it on, expected the last to be below 2^56",
+            spec.first_seed, spec.seeds
         )),
     }
 }
@@ -317,6 +318,9 @@ fn check_axis(axis: &Axis) -> Result<(), String> {
                 Some(n) if n > 1 << 24 => Err(format!("count: {n} values are too many")),
                 _ => Ok(()),
             }
+        }
+        _ if axis.from.is_none() && axis.to.is_none() => {
+            Err("it has no values: expected either `values`, or `from` and `to`".into())
         }
         _ => Err("expected either `values`, or `from` and `to`".into()),
     }

@@ -11,10 +11,12 @@ use std::io::Write;
 pub struct Spread {
     /// How many runs have it.
     pub runs: usize,
-    /// Arithmetic mean.
+    /// Arithmetic mean; of angles, their circular mean.
     pub mean: f64,
     /// Sample standard deviation; `None` for one run.
     pub sd: Option<f64>,
+    /// Half the 95 % interval of the mean by Student's t; `None` for one run.
+    pub ci95: Option<f64>,
     /// Quantiles 5 %, 50 % and 95 %, straight between order statistics (NumPy's default).
     pub quantiles: [f64; 3],
 }
@@ -29,6 +31,7 @@ impl Spread {
             runs: s.runs,
             mean: s.mean,
             sd: s.sd,
+            ci95: s.ci95,
             quantiles: [0.05, 0.5, 0.95].map(|q| quantile(&sorted, q)),
         })
     }
@@ -38,7 +41,11 @@ impl Spread {
         let Some(turn) = turn else {
             return Self::of(values);
         };
-        let found = Self::of(&about_their_mean(values, turn))?;
+        let (mean, about) = about_their_mean(values, turn);
+        let found = Self {
+            mean,
+            ..Self::of(&about)?
+        };
         Some(found.near(0.0, turn))
     }
 
@@ -103,6 +110,9 @@ impl Range {
     }
 }
 
+/// What stands in the table of points of each metric, behind its name and a dot, which no name of a metric has.
+const PARTS: [&str; 7] = ["mean", "sd", "ci95", "q05", "q50", "q95", "n"];
+
 /// The summary of a study. Only the rows of one point are held at a time; a study of sensitivity keeps the means.
 pub struct Summary<W: Write> {
     csv: W,
@@ -113,6 +123,7 @@ pub struct Summary<W: Write> {
     values: Vec<Vec<f64>>,
     rows: u64,
     failed: u64,
+    remarked: u64,
     keeps_means: bool,
     found: Found,
 }
@@ -132,13 +143,27 @@ pub struct Found {
     pub runs: u64,
     /// Of these, without a result.
     pub failures: u64,
-    /// Reasons and how often each was given, of the first that differ.
+    /// Reasons and how often each was given, of the first that differ by more than their numbers.
     pub reasons: Vec<(String, u64)>,
+    /// Runs with a result that did what nobody carries so.
+    pub remarked: u64,
+    /// What they did, in the same way.
+    pub remarks: Vec<(String, u64)>,
+}
+
+/// Counts a sentence with those that differ from it in numbers alone, as times and values do. Enough are kept to see what is wrong.
+fn count(of: &mut Vec<(String, u64)>, text: &str) {
+    let words = |text: &str| -> String { text.chars().filter(|c| !c.is_ascii_digit()).collect() };
+    match of.iter().position(|(known, _)| words(known) == words(text)) {
+        Some(k) => of[k].1 += 1,
+        None if of.len() < 20 => of.push((text.to_owned(), 1)),
+        None => {}
+    }
 }
 
 impl<W: Write> Summary<W> {
-    /// Of no rows yet. Into `csv` goes a row per point: its axes, runs, failures, then mean, SD, quantiles 5, 50 and 95 %
-    /// and number of every metric.
+    /// Of no rows yet. Into `csv` goes a row per point: its axes, runs, failures, runs with remarks, then mean, SD, half the 95 % interval of
+    /// the mean, quantiles 5, 50 and 95 % and number of every metric.
     ///
     /// # Errors
     /// What the system says.
@@ -156,10 +181,10 @@ impl<W: Write> Summary<W> {
         for axis in &plan.spec.axes {
             write!(csv, ",{}", quoted(&axis.name))?;
         }
-        write!(csv, ",runs,failed")?;
+        write!(csv, ",runs,failed,remarked")?;
         for name in &metrics {
-            for part in ["mean", "sd", "q05", "q50", "q95", "n"] {
-                write!(csv, ",{name}_{part}")?;
+            for part in PARTS {
+                write!(csv, ",{name}.{part}")?;
             }
         }
         writeln!(csv)?;
@@ -172,6 +197,7 @@ impl<W: Write> Summary<W> {
             seeds: plan.spec.seeds,
             rows: 0,
             failed: 0,
+            remarked: 0,
             keeps_means: plan.is_sensitivity(),
             found: Found {
                 ranges: vec![Range::default(); metrics.len()],
@@ -192,12 +218,13 @@ impl<W: Write> Summary<W> {
         if let Cell::Text(reason) = &row[row.len() - 2] {
             found.failures += 1;
             self.failed += 1;
-            match found.reasons.iter().position(|(r, _)| r == reason) {
-                Some(k) => found.reasons[k].1 += 1,
-                // Enough to see what is wrong; a reason that names a time differs in every run.
-                None if found.reasons.len() < 20 => found.reasons.push((reason.clone(), 1)),
-                None => {}
-            }
+            count(&mut found.reasons, reason);
+        } else if let Cell::Text(remarks) = &row[row.len() - 3] {
+            found.remarked += 1;
+            self.remarked += 1;
+            remarks
+                .split(super::BETWEEN_REMARKS)
+                .for_each(|one| count(&mut found.remarks, one));
         }
         for (values, place) in self.values.iter_mut().zip(&self.places) {
             values.extend(row[*place].number());
@@ -220,7 +247,7 @@ impl<W: Write> Summary<W> {
                 Cell::Text(x) => write!(out, ",{}", quoted(x))?,
             }
         }
-        write!(out, ",{},{}", self.seeds, self.failed)?;
+        write!(out, ",{},{},{}", self.seeds, self.failed, self.remarked)?;
         let mut means = Vec::new();
         let ranges = self.found.ranges.iter_mut().zip(&self.turns);
         for (values, (range, turn)) in self.values.iter_mut().zip(ranges) {
@@ -228,11 +255,16 @@ impl<W: Write> Summary<W> {
             match &spread {
                 Some(s) => {
                     let [low, middle, high] = s.quantiles;
-                    let sd = s.sd.map_or_else(String::new, |sd| sd.to_string());
-                    write!(out, ",{},{sd},{low},{middle},{high},{}", s.mean, s.runs)?;
+                    let [sd, ci95] =
+                        [s.sd, s.ci95].map(|x| x.map_or_else(String::new, |x| x.to_string()));
+                    write!(
+                        out,
+                        ",{},{sd},{ci95},{low},{middle},{high},{}",
+                        s.mean, s.runs
+                    )?;
                     range.take(s, self.seeds, *turn, axes);
                 }
-                None => write!(out, ",,,,,,0")?,
+                None => write!(out, ",,,,,,,0")?,
             }
             if self.keeps_means {
                 // A mean over some of a point's runs is another quantity than one over all.
@@ -246,7 +278,7 @@ impl<W: Write> Summary<W> {
             self.found.means.push(means);
         }
         self.found.points += 1;
-        (self.rows, self.failed) = (0, 0);
+        (self.rows, self.failed, self.remarked) = (0, 0, 0);
         Ok(())
     }
 
@@ -308,6 +340,12 @@ impl Found {
             let times = recording::text::counted(others, "time", "times");
             out += &format!("failed {times} for other reasons: `failed` in the table of runs\n");
         }
+        for (remark, count) in &self.remarks {
+            let runs = recording::text::counted(*count, "run", "runs");
+            out += &format!(
+                "nobody carries so, in {runs} (`remarks` in the table of runs): {remark}\n"
+            );
+        }
         out
     }
 }
@@ -354,12 +392,14 @@ mod tests {
         for (found, expected) in s.quantiles.iter().zip([1.2, 4.0, 14.4]) {
             assert!((found - expected).abs() < 1e-14);
         }
-        // Angles beside the seam: scipy.stats.circmean([178, -179, -178], 180, -180) = -179.667
+        // Angles beside the seam: scipy.stats.circmean([178, -179, -178], 180, -180) = -179.66653; of [0, 10, 170]: 19.151928
         let turning = Spread::of_turning(&[178.0, -179.0, -178.0], Some(360.0)).unwrap();
         assert!(
-            (turning.mean + 179.0 + 2.0 / 3.0).abs() < 1e-9,
+            (turning.mean + 179.66653499840578).abs() < 1e-9,
             "{turning:?}"
         );
+        let wide = Spread::of_turning(&[0.0, 10.0, 170.0], Some(360.0)).unwrap();
+        assert!((wide.mean - 19.151927888120827).abs() < 1e-9, "{wide:?}");
         assert!((turning.sd.unwrap() - 2.081_665_999).abs() < 1e-6);
         assert_eq!(turning.quantiles[1], -179.0);
         assert_eq!(Spread::of(&[]), None);

@@ -68,10 +68,41 @@ impl Cell {
 /// Facts about a table that travel in its file.
 pub type Notes = Vec<(String, String)>;
 
+/// The fact that holds the checksum of all rows, in hexadecimal.
+const CHECKSUM: &str = "rows_crc32";
+
 /// A table that is being written.
 pub struct Writer<W: Write + Send> {
     file: SerializedFileWriter<W>,
     columns: Vec<Column>,
+    checksum: Checksum,
+}
+
+/// CRC-32 of rows as they are, whatever Parquet makes of them: its own checksums are of pages, and nobody's reader has to look at them.
+#[derive(Default)]
+struct Checksum(crc32fast::Hasher);
+
+impl Checksum {
+    fn take(&mut self, rows: &[Vec<Cell>]) {
+        for cell in rows.iter().flatten() {
+            let (kind, bits) = match cell {
+                Cell::Empty => (0, 0),
+                Cell::Real(x) => (1, x.to_bits()),
+                Cell::Whole(x) => (2, x.cast_unsigned()),
+                Cell::Truth(x) => (3, u64::from(*x)),
+                Cell::Text(x) => (4, x.len() as u64),
+            };
+            self.0.update(&[kind]);
+            self.0.update(&bits.to_le_bytes());
+            if let Cell::Text(x) = cell {
+                self.0.update(x.as_bytes());
+            }
+        }
+    }
+
+    fn told(self) -> String {
+        format!("{:08x}", self.0.finalize())
+    }
 }
 
 impl<W: Write + Send> Writer<W> {
@@ -103,6 +134,7 @@ impl<W: Write + Send> Writer<W> {
         Ok(Self {
             file: SerializedFileWriter::new(out, Arc::new(schema), Arc::new(properties))?,
             columns: columns.to_vec(),
+            checksum: Checksum::default(),
         })
     }
 
@@ -111,6 +143,7 @@ impl<W: Write + Send> Writer<W> {
     /// # Errors
     /// What the library says.
     pub fn group(&mut self, rows: &[Vec<Cell>]) -> Result<(), ParquetError> {
+        self.checksum.take(rows);
         let mut group = self.file.next_row_group()?;
         for k in 0..self.columns.len() {
             let Some(mut column) = group.next_column()? else {
@@ -151,7 +184,9 @@ impl<W: Write + Send> Writer<W> {
     ///
     /// # Errors
     /// What the library says.
-    pub fn close(self) -> Result<(), ParquetError> {
+    pub fn close(mut self) -> Result<(), ParquetError> {
+        let checksum = KeyValue::new(CHECKSUM.into(), self.checksum.told());
+        self.file.append_key_value_metadata(checksum);
         self.file.close().map(drop)
     }
 }
@@ -247,6 +282,24 @@ impl Reader {
     /// How many row groups there are.
     pub fn groups(&self) -> usize {
         self.file.num_row_groups()
+    }
+
+    /// All rows, if they are those that were written.
+    ///
+    /// # Errors
+    /// What the library says; that they are others.
+    pub fn checked(&self) -> Result<Vec<Vec<Cell>>, ParquetError> {
+        let (mut rows, mut checksum) = (Vec::new(), Checksum::default());
+        for group in 0..self.groups() {
+            rows.extend(self.group(group)?);
+        }
+        checksum.take(&rows);
+        match self.note(CHECKSUM) {
+            Some(told) if told == checksum.told() => Ok(rows),
+            _ => Err(ParquetError::General(
+                "its rows are not those that were written: their checksum is another".into(),
+            )),
+        }
     }
 
     /// The rows of one row group.
@@ -351,6 +404,7 @@ mod tests {
         assert_eq!((reader.rows, reader.groups()), (5000, 2));
         assert_eq!(reader.columns, columns);
         assert_eq!(reader.note("study"), Some("mine"));
+        assert_eq!(reader.checked().unwrap(), rows);
         assert_eq!(reader.group(0).unwrap(), rows[..3000]);
         assert_eq!(reader.group(1).unwrap(), rows[3000..]);
     }
