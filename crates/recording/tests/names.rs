@@ -229,9 +229,9 @@ fn write(encoding: &Encoding, messages: &[Vec<Item>]) -> Vec<u8> {
     shared.take()
 }
 
-/// The signals of a file, each as messages and values, and what is said of mixed places.
+/// The signals of a file, each as messages and values, and what is said of mixed places; all of it, the order of signals too, whatever the number of threads.
 fn read(bytes: &[u8], by_name: bool) -> (BTreeMap<String, Vec<(i64, f64)>>, Vec<String>) {
-    let of = |threads| {
+    let of = |threads| -> (Vec<_>, Vec<String>) {
         let options = ReadOptions {
             by_name,
             threads,
@@ -246,14 +246,16 @@ fn read(bytes: &[u8], by_name: bool) -> (BTreeMap<String, Vec<(i64, f64)>>, Vec<
         });
         let signals = signals.into_iter().map(|signal| {
             let times = signal.times_ns.iter().map(|t| t - start_ns);
-            let values = times.zip(signal.values.iter().copied()).collect();
+            let values: Vec<(i64, f64)> = times.zip(signal.values.iter().copied()).collect();
             (signal.path.clone(), values)
         });
         (signals.collect(), told.collect())
     };
-    let (one, three) = (of(1), of(3));
-    assert_eq!(one, three, "threads");
-    one
+    let one = of(1);
+    for threads in [2, 3, 3, 3] {
+        assert_eq!(of(threads), one, "{threads} threads");
+    }
+    (one.0.into_iter().collect(), one.1)
 }
 
 /// Three publishers in turn: two whose messages are equally long, so that nothing but the names tells them apart, and one of two items. Now and then

@@ -294,8 +294,10 @@ enum Plan {
         field: String,
         /// Of each.
         places: usize,
-        /// In the order of the message, or of the first sight of their names.
+        /// By place, or in the order of the first sight of their names.
         items: Vec<Node>,
+        /// Those in the message, in its order: on no other may that of columns rest, for each thread has seen other messages before.
+        came: Vec<usize>,
         /// Number of the text that names an item, and of the list among those with names.
         name: Option<(u64, usize)>,
         /// Places among the items.
@@ -350,6 +352,7 @@ impl Plan {
                 descriptor,
                 field,
                 items: Vec::new(),
+                came: Vec::new(),
                 count: 0,
             },
             (FieldKind::Message(descriptor), false) => Plan::Message {
@@ -573,6 +576,7 @@ impl Plan {
                 field,
                 places,
                 items,
+                came,
                 name,
                 by_name,
                 count,
@@ -602,10 +606,11 @@ impl Plan {
                 match items.get_mut(position) {
                     // Of those with one name the last counts.
                     Some(known) if known.present => known.flush(rows, false),
-                    Some(_) => {}
+                    Some(_) => came.push(position),
                     None => {
                         let field = format!("{field}[{label}]");
                         items.push(Node::new(descriptor, &field, rows));
+                        came.push(position);
                     }
                 }
                 read_message(&mut items[position], input, wire, tag, depth, rows)?;
@@ -671,6 +676,7 @@ impl Plan {
             Plan::Messages {
                 field,
                 items,
+                came,
                 count,
                 ..
             } => {
@@ -678,8 +684,8 @@ impl Plan {
                 if !fits && keep {
                     rows.note_long(Long::Items(field.clone()));
                 }
-                for item in items.iter_mut() {
-                    item.flush(rows, keep && fits);
+                for position in came.drain(..) {
+                    items[position].flush(rows, keep && fits);
                 }
                 *count = 0;
             }

@@ -32,7 +32,7 @@ pub struct Args {
     /// Simulated time, s.
     #[arg(long, value_name = "S", value_parser = real, allow_negative_numbers = true)]
     duration: Option<f64>,
-    /// Change a value of the scene; `effects.NAME=false` takes an effect away. May be repeated.
+    /// Change a value of the scene; `effects.NAME=false` takes an effect away, `=true` puts it there with its defaults. May be repeated.
     #[arg(long, value_name = "KEY=VALUE", value_parser = setting)]
     set: Vec<String>,
     /// Integration method.

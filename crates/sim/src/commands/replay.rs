@@ -39,7 +39,7 @@ pub struct Args {
     /// Left out of the misfit at the beginning, s. Default: 0 where the body, and poles and bristles with it, start as in the recording, else 3.
     #[arg(long, value_name = "S", value_parser = seconds, allow_hyphen_values = true)]
     settle: Option<f64>,
-    /// Change a value of the scene; `effects.NAME=false` takes an effect away. May be repeated.
+    /// Change a value of the scene; `effects.NAME=false` takes an effect away, `=true` puts it there with its defaults. May be repeated.
     #[arg(long, value_name = "KEY=VALUE", value_parser = setting)]
     set: Vec<String>,
     /// Where to write. Default: FILE-replay.mcap here.
