@@ -299,6 +299,8 @@ fn parts_of_another_study_are_not_mixed_in() {
                 out.status.code() == Some(1) && said.contains("another"),
                 "{said}"
             );
+            let seeds = said.contains("`seeds = 2`") && said.contains("`seeds = 3`");
+            assert_eq!(seeds, other.contains("seeds = 3"), "{said}");
         }
     }
     let kept = std::fs::read(at.join("x/runs.parquet")).expect("a table");

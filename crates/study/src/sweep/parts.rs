@@ -161,14 +161,15 @@ impl<'p> Store<'p> {
         let held = std::fs::read_dir(&parts).is_ok_and(|mut entries| entries.next().is_some());
         for (name, text) in &self.files() {
             let path = self.folder.join(name);
-            let other = std::fs::read(&path).is_ok_and(|found| found != text.as_bytes());
-            if other && (held || !ours) {
+            let there = std::fs::read(&path).unwrap_or_else(|_| text.clone().into());
+            if there != text.as_bytes() && (held || !ours) {
                 let what = match held {
-                    true => {
-                        "is of another study, whose parts are there; choose another --out, or delete the folder"
-                    }
+                    true => format!(
+                        "is of another study, whose parts are there: {}; choose another --out, or delete the folder",
+                        first_differences(&String::from_utf8_lossy(&there), text)
+                    ),
                     false => {
-                        "is there already, and this study would write its own there; choose another --out"
+                        "is there already, and this study would write its own there; choose another --out".into()
                     }
                 };
                 return Err(format!("{}: {what}", path.display()));
@@ -228,11 +229,15 @@ impl<'p> Store<'p> {
                 }
             };
             for (name, expected) in &notes {
-                if reader.note(name) != Some(expected) {
-                    return Err(say(match name.as_str() {
-                        "version" => "was written by another version of this program",
-                        "scene" => "is of the same study of another scene",
-                        _ => "is of another study",
+                let there = reader.note(name).unwrap_or_default();
+                if there != expected {
+                    let differs = first_differences(there, expected);
+                    return Err(say(&match name.as_str() {
+                        "version" => {
+                            format!("was written by another version of this program, {there}")
+                        }
+                        "scene" => format!("is of the same study of another scene: {differs}"),
+                        _ => format!("is of another study: {differs}"),
                     }));
                 }
             }
@@ -460,6 +465,20 @@ impl<'p> Store<'p> {
         }
         writer.close()
     }
+}
+
+/// What two texts do not have in common: the first lines of each that the other has not.
+fn first_differences(there: &str, here: &str) -> String {
+    let alone = |of: &str, other: &str| -> String {
+        let lines = of.lines().filter(|line| !other.lines().any(|o| o == *line));
+        let lines: Vec<String> = lines.take(3).map(|line| format!("`{line}`")).collect();
+        match lines.is_empty() {
+            true => "nothing else".into(),
+            false => lines.join(", "),
+        }
+    };
+    let [its, ours] = [alone(there, here), alone(here, there)];
+    format!("it has {its} where this one has {ours}")
 }
 
 /// Whether a run of the table has a result.
