@@ -90,6 +90,10 @@ fn a_named_value_that_can_never_be_is_a_slip_and_a_range_that_reaches_out_is_non
     }
     let reaches_out = axes(&[mass("from = -1, to = 60, count = 3")]);
     assert_eq!(plan(&reaches_out).unwrap().points(), 3);
+    // 2.0 is a whole number.
+    let poles = "scene = \"eight-carriers\"\naxes = [{ key = \"carriers.along_poles.count\", values = [4.0, 6] }]";
+    let spec = spec::parse("test", poles).unwrap();
+    assert_eq!(Plan::new(spec, Path::new("")).unwrap().points(), 2);
     // What goes only beside a value of another axis goes.
     let law = axis(
         "effects.friction.law",

@@ -124,11 +124,7 @@ impl Plan {
                 .filter(|(other, _)| *other != k);
             no_value_is_hopeless(axis, &template, others.map(|(_, other)| other))?;
         }
-        let whole = |axis: &spec::Axis| {
-            template
-                .value(&axis.key)
-                .is_some_and(toml::Value::is_integer)
-        };
+        let whole = |axis: &spec::Axis| is_whole(axis, &template);
         let metrics: Vec<&Metric> = spec.metrics.iter().filter_map(|m| find(m)).collect();
         Ok(Self {
             points: Points::new(&spec)?,
@@ -216,9 +212,7 @@ impl Plan {
     pub fn values(&self, point: u64) -> Vec<toml::Value> {
         let mut values = self.points.values(point);
         for (value, whole) in values.iter_mut().zip(&self.whole) {
-            if let (true, toml::Value::Float(x)) = (*whole, &*value) {
-                *value = toml::Value::Integer(x.round() as i64);
-            }
+            *value = as_key(value.clone(), *whole);
         }
         values
     }
@@ -587,9 +581,7 @@ const TRIED: u64 = 100;
 
 /// A key that no value can be given to is a slip; a value out of a range that a scene may not have is a row with its reason.
 fn try_axis(axis: &spec::Axis, template: &Template) -> Result<(), String> {
-    let whole = template
-        .value(&axis.key)
-        .is_some_and(toml::Value::is_integer);
+    let whole = is_whole(axis, template);
     if let (true, Some(broken)) = (
         whole,
         axis.values
@@ -601,10 +593,7 @@ fn try_axis(axis: &spec::Axis, template: &Template) -> Result<(), String> {
             axis.key
         ));
     }
-    let as_key = |value: toml::Value| match value {
-        toml::Value::Float(x) if whole => toml::Value::Integer(x.round() as i64),
-        other => other,
-    };
+    let as_key = |value: toml::Value| as_key(value, whole);
     if let Some(twice) = stands_twice(axis, as_key) {
         let why = if whole && axis.count.is_some() {
             ", rounded to whole numbers,"
@@ -618,7 +607,7 @@ fn try_axis(axis: &spec::Axis, template: &Template) -> Result<(), String> {
     }
     let mut why = Ok(());
     for value in tried(axis) {
-        let set = with_along(axis, as_key(value));
+        let set = with_along(axis, value, template);
         match template.with(set.iter().map(|(k, v)| (k.as_str(), v.clone()))) {
             Ok(_) => return Ok(()),
             Err(error) => why = why.and(Err(format!("axis `{}`: {error}", axis.key))),
@@ -640,8 +629,27 @@ fn tried(axis: &spec::Axis) -> Vec<toml::Value> {
     }
 }
 
+/// Whether an axis' key holds a whole number.
+fn is_whole(axis: &spec::Axis, template: &Template) -> bool {
+    let value = template.value(&axis.key);
+    value.is_some_and(toml::Value::is_integer)
+}
+
+/// A value as its key takes it: rounded where that is a `whole` number.
+fn as_key(value: toml::Value, whole: bool) -> toml::Value {
+    match value {
+        toml::Value::Float(x) if whole => toml::Value::Integer(x.round() as i64),
+        other => other,
+    }
+}
+
 /// What a value of an axis sets: its key, and what goes along with it.
-fn with_along(axis: &spec::Axis, value: toml::Value) -> Vec<(String, toml::Value)> {
+fn with_along(
+    axis: &spec::Axis,
+    value: toml::Value,
+    template: &Template,
+) -> Vec<(String, toml::Value)> {
+    let value = as_key(value, is_whole(axis, template));
     let along = flatten(&axis.along)
         .into_iter()
         .filter_map(|(key, factor)| Some((key, (number(&value)? * number(&factor)?).into())));
@@ -657,11 +665,15 @@ fn no_value_is_hopeless<'a>(
     others: impl Iterator<Item = &'a spec::Axis> + Clone,
 ) -> Result<(), String> {
     let beside: Vec<Vec<(String, toml::Value)>> = others
-        .flat_map(|other| tried(other).into_iter().map(|v| with_along(other, v)))
+        .flat_map(|other| {
+            tried(other)
+                .into_iter()
+                .map(|v| with_along(other, v, template))
+        })
         .collect();
     let named = axis.values.iter().filter(|_| axis.count.is_none());
     for value in named {
-        let own = with_along(axis, value.clone());
+        let own = with_along(axis, value.clone(), template);
         let made = |beside: &[(String, toml::Value)]| {
             let set = own.iter().chain(beside);
             template.with(set.map(|(k, v)| (k.as_str(), v.clone())))

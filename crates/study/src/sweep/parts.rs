@@ -264,6 +264,11 @@ impl<'p> Store<'p> {
 
     /// The rows of a part, if they are those of its runs.
     fn rows(&self, block: u64, part: &Reader) -> Result<Vec<Vec<Cell>>, ParquetError> {
+        if part.columns != self.plan.columns() {
+            return Err(ParquetError::General(
+                "its columns are not those of the study".into(),
+            ));
+        }
         let rows = part.checked()?;
         // OK because runs are far below 2^63.
         let runs = self.plan.block(block).map(|run| Cell::Whole(run as i64));
