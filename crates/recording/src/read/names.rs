@@ -2,10 +2,7 @@
 
 use std::collections::{BTreeSet, HashMap};
 
-use super::{
-    rows::MAX_PLACES,
-    types::{Struct, Type},
-};
+use super::types::{Struct, Type};
 
 /// The text field that says what an item of a list is: a frame of `tf2_msgs/TFMessage` and `foxglove.FrameTransforms`, a joint of
 /// `foxglove.JointStates`.
@@ -18,6 +15,8 @@ const OF_LISTS: [&str; 2] = ["name", "joint_names"];
 /// So many names of one place are told, and so many bytes of each.
 const MOST_TOLD: usize = 4;
 const MOST_BYTES: usize = 64;
+/// Of more lists nothing is kept.
+const MOST_LISTS: usize = 1 << 16;
 
 /// The field whose text names an item, out of its text fields.
 pub(super) fn of_item<'a>(texts: impl Iterator<Item = &'a str> + Clone) -> Option<&'a str> {
@@ -96,9 +95,9 @@ impl Names {
         if let Some(known) = self.by_field.get(field) {
             return *known;
         }
-        // Messages that never stop inventing lists: nothing is kept of further ones.
+        // Messages may never stop inventing lists.
         let list = self.lists.len();
-        if list < MAX_PLACES {
+        if list < MOST_LISTS {
             self.lists.push((field.to_owned(), Vec::new()));
             self.by_field.insert(field.to_owned(), list);
         }
