@@ -91,7 +91,7 @@ fn a_missing_reference_is_no_reason_to_loosen_what_cannot_be_set() {
         step_s: 1e-15,
         tolerance: 1e-12,
     };
-    assert!(why.to_string().contains("--tolerance"));
+    assert!(why.to_string().contains("solver.tolerance"));
     assert_eq!(
         why.what(),
         "dop853 gave up at t = 1.5 s: the step fell to 1.0e-15 s without reaching the tolerance 1e-12"
