@@ -28,6 +28,31 @@ struct Encoding {
     write: fn(&[Item]) -> Vec<u8>,
 }
 
+/// Fills up to what a number of this size is aligned to, where any is.
+fn pad(body: &mut Vec<u8>, size: usize, align: usize) {
+    body.resize(body.len().next_multiple_of(size.min(align)), 0);
+}
+
+/// A text as CDR and ROS 1 write it, with what stands behind it.
+fn put_text(body: &mut Vec<u8>, text: &str, zero: &[u8], align: usize) {
+    pad(body, 4, align);
+    body.extend(((text.len() + zero.len()) as u32).to_le_bytes());
+    body.extend([text.as_bytes(), zero].concat());
+}
+
+/// Frames as CDR and ROS 1 write them.
+fn named(items: &[Item], zero: &[u8], align: usize) -> Vec<u8> {
+    let mut body = (items.len() as u32).to_le_bytes().to_vec();
+    for (name, x) in items {
+        for text in ["n", name] {
+            put_text(&mut body, text, zero, align);
+        }
+        pad(&mut body, 8, align);
+        body.extend(x.to_le_bytes());
+    }
+    [&body[..], &[9]].concat()
+}
+
 /// Frames, each with its own name.
 fn frames() -> Vec<Encoding> {
     let bar = "=".repeat(80);
@@ -82,36 +107,14 @@ fn frames() -> Vec<Encoding> {
             schema: "ros2msg",
             name: "p/msg/M",
             definition: text("/msg"),
-            write: |items| {
-                let mut body = (items.len() as u32).to_le_bytes().to_vec();
-                for (name, x) in items {
-                    for text in ["n", name] {
-                        body.resize(body.len().next_multiple_of(4), 0);
-                        body.extend((text.len() as u32 + 1).to_le_bytes());
-                        body.extend(text.bytes().chain([0]));
-                    }
-                    body.resize(body.len().next_multiple_of(8), 0);
-                    body.extend(x.to_le_bytes());
-                }
-                [&[0, 1, 0, 0][..], &body, &[9]].concat()
-            },
+            write: |items| [&[0, 1, 0, 0][..], &named(items, &[0], 8)].concat(),
         },
         Encoding {
             message: "ros1",
             schema: "ros1msg",
             name: "p/M",
             definition: text(""),
-            write: |items| {
-                let mut body = (items.len() as u32).to_le_bytes().to_vec();
-                for (name, x) in items {
-                    for text in ["n", name] {
-                        body.extend((text.len() as u32).to_le_bytes());
-                        body.extend(text.bytes());
-                    }
-                    body.extend(x.to_le_bytes());
-                }
-                [&body[..], &[9]].concat()
-            },
+            write: |items| named(items, &[], 1),
         },
         Encoding {
             message: "json",
@@ -154,16 +157,13 @@ fn frames() -> Vec<Encoding> {
 /// Joints, with their names in a list before.
 fn joints() -> Vec<Encoding> {
     fn texts(items: &[Item], zero: &[u8], align: usize) -> Vec<u8> {
-        let pad = |body: &mut Vec<u8>, to: usize| body.resize(body.len().next_multiple_of(to), 0);
         let mut body = (items.len() as u32).to_le_bytes().to_vec();
         for (name, _) in items {
-            pad(&mut body, align.min(4));
-            body.extend(((name.len() + zero.len()) as u32).to_le_bytes());
-            body.extend([name.as_bytes(), zero].concat());
+            put_text(&mut body, name, zero, align);
         }
-        pad(&mut body, align.min(4));
+        pad(&mut body, 4, align);
         body.extend((items.len() as u32).to_le_bytes());
-        pad(&mut body, align);
+        pad(&mut body, 8, align);
         body.extend(items.iter().flat_map(|(_, x)| x.to_le_bytes()));
         [&body[..], &[9]].concat()
     }

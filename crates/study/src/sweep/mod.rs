@@ -354,13 +354,11 @@ impl Plan {
             work(|s| s.evaluations),
             work(|s| s.events),
         ]);
-        let words = |text: String| Cell::Text(text);
-        row.push(
-            (!remarks.is_empty())
-                .then(|| remarks.join(BETWEEN_REMARKS))
-                .map_or(Cell::Empty, words),
-        );
-        row.push(failed.map_or(Cell::Empty, words));
+        row.push(match remarks.is_empty() {
+            true => Cell::Empty,
+            false => Cell::Text(remarks.join(BETWEEN_REMARKS)),
+        });
+        row.push(failed.map_or(Cell::Empty, Cell::Text));
         row.push(Cell::Text(VERSION.into()));
         row
     }
