@@ -3,6 +3,7 @@
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::Path;
 
+use recording::text::document::from_toml;
 use serde::Deserialize;
 
 /// The columns that metrics are computed from.
@@ -226,7 +227,10 @@ impl RolesFile {
         let name = path.display();
         let text = recording::text::read_text(path)
             .map_err(|why| format!("{name}: the roles cannot be read: {why}"))?;
-        toml::from_str(&text).map_err(|why| format!("{name}: is not a roles file: {why}"))
+        from_toml(&text).map_err(|wrong| {
+            let (place, message) = (wrong.place(name), wrong.message);
+            format!("{place}: is not a roles file: {message}")
+        })
     }
 
     /// All signals that it names.

@@ -10,7 +10,7 @@ use super::{
     imu::{self, Log, STANDARD_GRAVITY, Track},
     table::Table,
 };
-use crate::text::read_text;
+use crate::text::{document::from_toml, read_text};
 
 /// Layouts that come with the program; of two that fit a file, the first is taken.
 pub const BUILT_IN: &[(&str, &str)] = &[
@@ -119,8 +119,10 @@ pub(super) fn find(name: &str) -> Result<Layout, ImportError> {
             )));
         }
     };
-    toml::from_str(&text)
-        .map_err(|error| problem(format!("is no layout: {}", error.to_string().trim_end())))
+    from_toml(&text).map_err(|wrong| ImportError::Content {
+        name: wrong.place(name),
+        problem: format!("is no layout: {}", wrong.message),
+    })
 }
 
 /// The built-in layout that fits a text: its header is there, with the columns that it needs.

@@ -5,7 +5,6 @@
 
 mod builtin;
 mod check;
-pub(crate) mod nearest;
 mod parse;
 pub(crate) mod parts;
 pub(crate) mod per_carrier;
@@ -13,7 +12,6 @@ pub(crate) mod problem;
 
 pub use builtin::{BUILTIN, builtin};
 pub use check::check;
-pub use nearest::nearest;
 pub use parse::{
     SceneError, Template, from_toml, json_schema, load, parse, setting_value, to_toml,
 };

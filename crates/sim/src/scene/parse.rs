@@ -1,9 +1,8 @@
 //! Text → [`Scene`], with errors that point at the line.
 
-use super::nearest::nearest;
 use super::{BUILTIN, Scene, builtin, check};
 use crate::effects::TABLE;
-use recording::text::read_text;
+use recording::text::{document, meant::did_you_mean, read_text};
 use std::path::Path;
 
 /// Why a scene cannot be used: one sentence that says where, what was found and what to do.
@@ -52,9 +51,7 @@ pub fn load(name_or_path: &str, settings: &[String]) -> Result<Scene, SceneError
         ))),
         Err(_) => {
             let names: Vec<&str> = BUILTIN.iter().map(|(n, _)| *n).collect();
-            let hint = nearest(name_or_path, names.iter().copied())
-                .map(|n| format!(" Did you mean `{n}`?"))
-                .unwrap_or_default();
+            let hint = did_you_mean(name_or_path, names.iter().copied());
             Err(SceneError::NotFound(format!(
                 "there is no scene `{name_or_path}`.{hint} Built in: {}; or give the path of a .toml file",
                 names.join(", ")
@@ -423,39 +420,20 @@ fn put(
     }
 }
 
-/// Adds the nearest key to serde's `unknown field` message.
+/// As of any document, but for what is a scene's own.
 fn readable(message: &str) -> String {
-    let mut message = message.trim().replace('\n', " ");
-    for (theirs, ours) in [
-        ("invalid type: ", "found "),
-        ("invalid value: ", "found "),
-        ("expected f64", "expected a number"),
-        ("expected u64", "expected a whole number, zero to 2^56 - 1"),
-        ("expected u32", "expected a whole number, zero or more"),
-        ("expected usize", "expected a whole number, zero or more"),
-        ("expected a sequence", "expected a list"),
-        (
-            "data did not match any variant of untagged enum PerCarrier",
-            "expected a number, or a list with one for each carrier",
-        ),
-    ] {
-        message = message.replace(theirs, ours);
-    }
+    let message = document::readable(message);
     // An effect is a table: `hold = true` is near, but none.
     if let Some((found, _)) = message.split_once(", expected struct ") {
         return format!("{found}, expected a table; `{{}}` is one with every default");
     }
-    if message == "missing field `name`" {
-        return "the scene has no `name`; begin with name = \"…\"".into();
+    match message.as_str() {
+        "missing field `name`" => "the scene has no `name`; begin with name = \"…\"".into(),
+        "data did not match any variant of untagged enum PerCarrier" => {
+            "expected a number, or a list with one for each carrier".into()
+        }
+        _ => message,
     }
-    let mut ticks = message.split('`').skip(1).step_by(2);
-    if (message.starts_with("unknown field") || message.starts_with("unknown variant"))
-        && let Some(word) = ticks.next()
-        && let Some(name) = nearest(word, ticks)
-    {
-        return format!("{message}. Did you mean `{name}`?");
-    }
-    message
 }
 
 fn located(
@@ -470,9 +448,7 @@ fn located(
             message: message.into(),
         };
     };
-    let before = &text[..span.start.min(text.len())];
-    let line = before.matches('\n').count() + 1;
-    let column = before.chars().rev().take_while(|&c| c != '\n').count() + 1;
+    let (line, column) = document::line_and_column(text, &span);
     SceneError::At {
         origin: origin.into(),
         line,

@@ -20,6 +20,7 @@ mod semi_implicit_euler;
 pub use course::{Event, EventKind};
 
 use crate::model::{Model, Workspace};
+use recording::text::meant::did_you_mean;
 
 /// No velocity's error counts as decaying more slowly than this, 1/s: see [`Model::units`].
 const SLOWEST_PER_S: f64 = 2.0;
@@ -313,9 +314,7 @@ pub const METHODS: &[Method] = &[
 pub fn method(name: &str) -> Result<&'static Method, String> {
     METHODS.iter().find(|m| m.name == name).ok_or_else(|| {
         let names = || METHODS.iter().map(|m| m.name);
-        let hint = crate::scene::nearest::nearest(name, names())
-            .map(|n| format!(" Did you mean `{n}`?"))
-            .unwrap_or_default();
+        let hint = did_you_mean(name, names());
         format!(
             "there is no method `{name}`.{hint} There are: {}",
             names().collect::<Vec<_>>().join(", ")

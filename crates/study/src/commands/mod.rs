@@ -147,8 +147,7 @@ fn unknown(word: &str) -> Option<String> {
     if word.starts_with('-') || word == "help" || names().any(|n| n == word) {
         return None;
     }
-    let hint = sim::scene::nearest(word, names())
-        .map_or(String::new(), |n| format!(" Did you mean `{n}`?"));
+    let hint = recording::text::meant::did_you_mean(word, names());
     Some(format!(
         "there is no study `{word}`.{hint} There are: {}; or give the path of a .toml file",
         names().collect::<Vec<_>>().join(", ")

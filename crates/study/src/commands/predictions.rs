@@ -38,8 +38,7 @@ pub fn run(args: &Args) -> Result<()> {
     let names = || EXPERIMENTS.iter().map(|e| e.name);
     for name in &args.names {
         if !names().any(|n| n == name) {
-            let hint = sim::scene::nearest(name, names())
-                .map_or(String::new(), |n| format!(" Did you mean `{n}`?"));
+            let hint = recording::text::meant::did_you_mean(name, names());
             bail!(
                 "there is no experiment `{name}`.{hint} There are: {}",
                 names().collect::<Vec<_>>().join(", ")

@@ -1,7 +1,8 @@
 //! The study file: what a sweep is to do, as TOML.
 
+use recording::text::meant::did_you_mean;
 use serde::{Deserialize, Serialize};
-use sim::scene::{SceneError, from_toml, nearest};
+use sim::scene::{SceneError, from_toml};
 
 /// A study file.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -136,8 +137,7 @@ fn check(spec: &mut Spec) -> Result<(), String> {
     }
     for (k, name) in spec.metrics.iter().enumerate() {
         if !names().any(|n| n == name) {
-            let hint =
-                nearest(name, names()).map_or(String::new(), |n| format!(" Did you mean `{n}`?"));
+            let hint = did_you_mean(name, names());
             return Err(format!(
                 "metrics: there is no metric `{name}`.{hint} `docs/metrics.md` lists them all"
             ));

@@ -1,5 +1,8 @@
 //! Small texts: scenes, studies, roles, layouts.
 
+pub mod document;
+pub mod meant;
+
 use std::fs::File;
 use std::io::{Error, ErrorKind, Read, Result, Write};
 use std::path::Path;
