@@ -171,6 +171,9 @@ fn what_a_segment_fixes_depends_on_no_other_effect() {
     }
 }
 
+/// How long the runs are that find out what is idle, s.
+const LASTS_S: f64 = 1.5;
+
 /// What is said to do nothing does nothing, and nothing else is.
 #[test]
 fn an_idle_effect_changes_no_motion() {
@@ -188,7 +191,7 @@ fn an_idle_effect_changes_no_motion() {
             .collect(),
         ..driven
     };
-    let mut cases = vec![full.clone(); 5];
+    let mut cases = vec![full.clone(); 6];
     (entry("measured").switch_off)(&mut cases[0].effects);
     (entry("measured").switch_off)(&mut cases[1].effects);
     (entry("contact").switch_off)(&mut cases[1].effects);
@@ -200,11 +203,20 @@ fn an_idle_effect_changes_no_motion() {
     for name in ["measured", "contact", "friction"] {
         (entry(name).switch_off)(&mut cases[4].effects);
     }
+    // Everything that begins does so when the run ends.
+    (entry("measured").switch_off)(&mut cases[5].effects);
+    let late = &mut cases[5].effects;
+    late.music.as_mut().unwrap().onset_s = LASTS_S;
+    let lift = late.lift.as_mut().unwrap();
+    (lift.onset_s, lift.build_up_s) = (9.0, 1.0);
+    for push in &mut late.push.as_mut().unwrap().pushes {
+        push.start_s = LASTS_S;
+    }
     let mut seen = std::collections::BTreeSet::new();
     for case in &mut cases {
         (entry("imu").switch_off)(&mut case.effects);
-        case.duration_s = 1.5;
-        let names: Vec<&str> = idle(&case.effects).map(|(name, _)| name).collect();
+        case.duration_s = LASTS_S;
+        let names: Vec<&str> = idle(case).map(|(name, _)| name).collect();
         seen.extend(names.iter().copied());
         let with = samples(case);
         for effect in TABLE
@@ -245,8 +257,10 @@ fn an_idle_effect_changes_no_motion() {
         "gait",
         "hold",
         "lift",
+        "music",
         "noise",
         "pole_friction",
+        "push",
         "sling",
     ];
     assert_eq!(seen.into_iter().collect::<Vec<_>>(), all);

@@ -8,6 +8,7 @@ use sim::model::Model;
 use sim::run::{Listener, Sample, method_of, run_model, settings};
 use sim::scene::{Freedom, Scene, load};
 use sim::solve::Settings;
+use std::borrow::Cow;
 use std::fmt::Write;
 use std::time::Instant;
 
@@ -46,7 +47,7 @@ struct Effect {
     name: &'static str,
     about: &'static str,
     on: bool,
-    idle: Option<&'static str>,
+    idle: Option<Cow<'static, str>>,
     adds_state: usize,
     cost_ns: Option<f64>,
     /// Cost of a simulated second of the scene without it, ms; `None` where the trial failed.
@@ -125,7 +126,7 @@ fn explore(scene: Scene) -> Findings {
                 name: e.name,
                 about: e.about,
                 on: (e.is_on)(&scene.effects),
-                idle: (e.idle)(&scene.effects),
+                idle: (e.idle)(&scene),
                 adds_state: 0,
                 cost_ns: None,
                 without_ms: None,
@@ -353,6 +354,7 @@ fn write_effects(out: &mut String, found: &Findings) -> std::fmt::Result {
             e.adds_state,
             e.about,
             e.idle
+                .as_ref()
                 .map_or(String::new(), |why| format!("; does nothing here: {why}"))
         )?;
     }

@@ -193,7 +193,7 @@ fn record(args: &Args) -> Result<()> {
         stats.steps,
         stats.events
     );
-    for (name, why) in sim::effects::idle(&scene.effects) {
+    for (name, why) in sim::effects::idle(&scene) {
         recording::note!("effects.{name} does nothing: {why}");
     }
     for remark in watch.remarks.said(&scene) {

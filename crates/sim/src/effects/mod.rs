@@ -27,6 +27,7 @@ use crate::model::Model;
 use crate::scene::Scene;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
+use std::borrow::Cow;
 
 /// The `[effects.NAME]` tables of a scene; absent means off.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
@@ -62,7 +63,7 @@ pub struct Entry {
     /// Whether a scene has it.
     pub is_on: fn(&Effects) -> bool,
     /// Why it does nothing though it is on, if it does nothing.
-    pub idle: fn(&Effects) -> Option<&'static str>,
+    pub idle: fn(&Scene) -> Option<Cow<'static, str>>,
     /// Takes it out of a scene.
     pub switch_off: fn(&mut Effects),
     /// Checks its parameters.
@@ -80,7 +81,7 @@ macro_rules! entry {
             name: stringify!($name),
             about: $about,
             is_on: |e| e.$name.is_some(),
-            idle: |e| e.$name.as_ref().and_then(|_| $idle(e)),
+            idle: |s| s.effects.$name.as_ref().and_then(|_| $idle(s)),
             switch_off: |e| e.$name = None,
             check: |s| s.effects.$name.as_ref().map_or(Ok(()), |p| p.check(s)),
             build: |s, m| {
@@ -93,21 +94,30 @@ macro_rules! entry {
 }
 
 /// For what acts through the load on a shoulder.
-fn without_contact(e: &Effects) -> Option<&'static str> {
+fn without_contact(s: &Scene) -> Option<Cow<'static, str>> {
     let why = "there is no `effects.contact` that would load a shoulder";
-    e.contact.is_none().then_some(why)
+    s.effects.contact.is_none().then_some(why.into())
 }
 
 /// For what acts on the phases alone.
-fn phases_measured(e: &Effects) -> Option<&'static str> {
-    let measured = e.measured.as_ref().filter(|m| !m.phase_rad.is_empty());
-    measured.map(|_| "the phases are those of `effects.measured`")
+fn phases_measured(s: &Scene) -> Option<Cow<'static, str>> {
+    let measured = s.effects.measured.as_ref();
+    let measured = measured.filter(|m| !m.phase_rad.is_empty());
+    measured.map(|_| "the phases are those of `effects.measured`".into())
 }
 
 /// For what moves shoulders.
-fn shoulders_measured(e: &Effects) -> Option<&'static str> {
-    let measured = e.measured.as_ref().filter(|m| !m.shoulder_m.is_empty());
-    measured.map(|_| "the shoulders move as `effects.measured` says")
+fn shoulders_measured(s: &Scene) -> Option<Cow<'static, str>> {
+    let measured = s.effects.measured.as_ref();
+    let measured = measured.filter(|m| !m.shoulder_m.is_empty());
+    measured.map(|_| "the shoulders move as `effects.measured` says".into())
+}
+
+/// For what begins at `onset_s`.
+fn after_the_end(s: &Scene, onset_s: f64) -> Option<Cow<'static, str>> {
+    let end_s = s.duration_s;
+    (onset_s >= end_s)
+        .then(|| format!("it begins at {onset_s} s, and the run ends at {end_s} s").into())
 }
 
 /// Every effect, in the order in which terms of the same kind are applied.
@@ -124,7 +134,11 @@ pub const TABLE: &[Entry] = &[
         "carriers adjust to each other (Kuramoto)",
         phases_measured
     ),
-    entry!(music, "carriers are entrained by a beat (Adler)"),
+    entry!(
+        music,
+        "carriers are entrained by a beat (Adler)",
+        |s: &Scene| after_the_end(s, s.effects.music.as_ref()?.onset_s)
+    ),
     entry!(
         noise,
         "gait phases wander (white phase noise)",
@@ -138,14 +152,17 @@ pub const TABLE: &[Entry] = &[
     entry!(
         lift,
         "shoulders lift harder or softer than the gait alone",
-        shoulders_measured
+        |s: &Scene| {
+            let onset_s = s.effects.lift.as_ref()?.onset_s;
+            shoulders_measured(s).or_else(|| after_the_end(s, onset_s))
+        }
     ),
     entry!(contact, "handles rest on shoulders: spring and damper"),
     entry!(
         hold,
         "hands hold the handles sideways: spring and damper",
         // Friction holds what the load presses, which is nothing.
-        |e: &Effects| without_contact(e).filter(|_| e.friction.is_some())
+        |s: &Scene| without_contact(s).filter(|_| s.effects.friction.is_some())
     ),
     entry!(
         sling,
@@ -156,7 +173,7 @@ pub const TABLE: &[Entry] = &[
     entry!(
         friction,
         "sideways force at a handle is limited by Coulomb friction",
-        |e: &Effects| without_contact(e).filter(|_| e.hold.is_none())
+        |s: &Scene| without_contact(s).filter(|_| s.effects.hold.is_none())
     ),
     entry!(
         pole_friction,
@@ -174,14 +191,20 @@ pub const TABLE: &[Entry] = &[
         flexure,
         "poles bend: their first mode",
         // A grip bends them too, as long as nothing limits it by the load.
-        |e: &Effects| without_contact(e).filter(|_| e.hold.is_none() || e.friction.is_some())
+        |s: &Scene| {
+            let (hold, friction) = (&s.effects.hold, &s.effects.friction);
+            without_contact(s).filter(|_| hold.is_none() || friction.is_some())
+        }
     ),
     entry!(
         push,
         "somebody beside the party pushes the load",
-        |e: &Effects| {
-            let nobody = e.push.as_ref().filter(|p| p.pushes.is_empty());
-            nobody.map(|_| "`effects.push.pushes` is empty")
+        |s: &Scene| {
+            let pushes = &s.effects.push.as_ref()?.pushes;
+            match pushes.iter().map(|p| p.start_s).reduce(f64::min) {
+                Some(first_s) => after_the_end(s, first_s),
+                None => Some("`effects.push.pushes` is empty".into()),
+            }
         }
     ),
     entry!(imu, "virtual inertial sensors on body and carriers"),
@@ -189,8 +212,8 @@ pub const TABLE: &[Entry] = &[
 ];
 
 /// The effects that are on and do nothing, and why.
-pub fn idle(effects: &Effects) -> impl Iterator<Item = (&'static str, &'static str)> {
-    let idle = |e: &Entry| Some((e.name, (e.idle)(effects)?));
+pub fn idle(scene: &Scene) -> impl Iterator<Item = (&'static str, Cow<'static, str>)> {
+    let idle = |e: &Entry| Some((e.name, (e.idle)(scene)?));
     TABLE.iter().filter_map(idle)
 }
 
