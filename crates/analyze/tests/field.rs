@@ -7,9 +7,12 @@ use analyze::examine::{Analysis, Request, examine};
 use analyze::field::DeviceClocks;
 use analyze::imu::Track;
 use analyze::imu::axes::{misfit, signed_permutations};
+use analyze::imu::bias::far_off;
+use analyze::imu::orientation::{Options, batch};
 use analyze::imu::rath::{Settings, motion};
+use analyze::imu::unit::other_unit;
 use analyze::quality::Quality;
-use nalgebra::{Matrix3, Vector3};
+use nalgebra::{Matrix3, UnitQuaternion, Vector3};
 use recording::cdr::Imu;
 use recording::import::{ImportOptions, ingest};
 use recording::read::{ReadOptions, Recording};
@@ -160,6 +163,49 @@ fn val_broad_axes() {
         let count = found_out(&track);
         println!("{name}: {count} of 47 wrong ways are found out");
         assert_eq!(count, 47, "{name}");
+    }
+}
+
+/// Real turns, read in another unit or with a bias on top of the sensor's own: told, and the attitude the same without it.
+#[test]
+#[ignore = "needs recordings that are not shipped: see above"]
+fn val_broad_unit_and_bias() {
+    const G: f64 = 9.80665;
+    for name in BROAD {
+        let track = track_of(name);
+        assert_eq!(other_unit(&track, G), None, "{name}");
+        assert_eq!(far_off(&track, G), None, "{name}");
+        let changed = |times: f64, bias: Vector3<f64>| {
+            let mut out = track.clone();
+            for rate in &mut out.gyro_rad_per_s {
+                *rate = (times * Vector3::from(*rate) + bias).into();
+            }
+            out
+        };
+        for times in [1f64.to_degrees(), 1f64.to_radians()] {
+            let found = other_unit(&changed(times, Vector3::zeros()), G);
+            println!("{name}, rates times {times:.3}: {found:?}");
+            let factor = found.map(|f| f.factor * times);
+            assert!(factor.is_some_and(|f| (f - 1.0).abs() < 1e-12), "{name}");
+        }
+        let upright = batch(&track, Options::default()).earth_from_sensor;
+        for bias in [Vector3::new(0.05, 0.0, 0.0), Vector3::new(-0.1, 0.2, 0.1)] {
+            let mut other = changed(1.0, bias);
+            let off_deg = |other: &Track| {
+                let found = batch(other, Options::default()).earth_from_sensor;
+                let up = |q: &UnitQuaternion<f64>| q.inverse() * Vector3::z();
+                let pairs = found.iter().zip(&upright);
+                let squares = pairs.map(|(a, b)| up(a).angle(&up(b)).powi(2)).sum::<f64>();
+                (squares / upright.len() as f64).sqrt().to_degrees()
+            };
+            let before_deg = off_deg(&other);
+            other.take_off_bias(far_off(&other, G).unwrap().bias_rad_per_s);
+            let deg = off_deg(&other);
+            println!(
+                "{name}, off by {bias:?}: inclined otherwise by {deg:.3}°, {before_deg:.1}° with it"
+            );
+            assert!(deg < 0.02 && before_deg > 0.3, "{name} {deg} {before_deg}");
+        }
     }
 }
 
@@ -396,6 +442,50 @@ fn a_device_on_two_topics_is_one_sensor() {
         let told = found.quality.iter().filter(|q| q.kind == "halves");
         assert_eq!(told.count(), 1, "{:?}", found.quality);
         assert!(found.quality.iter().all(|q| q.kind != "one_of_several"));
+    }
+}
+
+/// A driver that publishes deg/s, and a gyroscope that nobody has calibrated: of a roll of 5°.
+#[test]
+fn a_gyroscope_of_another_unit_or_far_off_is_told() {
+    let (amplitude, w) = (0.1_f64, TAU);
+    let truth_deg = (amplitude / 2.0_f64.sqrt()).to_degrees();
+    let folder = tempfile::tempdir().unwrap();
+    for (times, off_rad_per_s, told) in [
+        (1.0, 0.0, None),
+        (1.0, 0.15, Some("bias")),
+        (1f64.to_degrees(), 0.0, Some("unit")),
+    ] {
+        let path = folder.path().join("rath.mcap");
+        let mut writer = RecordingWriter::create(&path, &WriterOptions::default()).unwrap();
+        let channel = writer.channel("/imu/rath", MessageKind::Imu).unwrap();
+        for k in 0..6000 {
+            let t_ns = 10_000_000 * k;
+            let (sin, cos) = (w * t_ns as f64 / 1e9).sin_cos();
+            let roll: f64 = amplitude * sin;
+            let rate = [amplitude * w * cos + off_rad_per_s, -off_rad_per_s, 0.0];
+            let felt = [0.0, 9.81 * roll.sin(), 9.81 * roll.cos()];
+            let message = Imu::raw(t_ns, "rath", rate.map(|x| times * x), felt);
+            writer.message(channel, t_ns, &message).unwrap();
+        }
+        writer.finish().unwrap();
+        let recording = Recording::open(&path, &ReadOptions::default()).unwrap();
+        let request = Request {
+            roles: Some(toml::from_str("gyro_age_s = 0.0\naccel_age_s = 0.0").unwrap()),
+            ..Request::default()
+        };
+        let found = examine("rath.mcap", &recording, &request).unwrap();
+        let kinds = ["bias", "unit", "axes"];
+        let mut said = found.quality.iter().map(|q| q.kind);
+        assert_eq!(said.find(|kind| kinds.contains(kind)), told);
+        let roll = found.metrics.get("rms_roll_deg").unwrap();
+        match told {
+            Some("unit") => assert_eq!(roll.ci95, None, "{roll:?}"),
+            _ => {
+                let [low, high] = roll.ci95.unwrap();
+                assert!((low..=high).contains(&truth_deg), "{roll:?}");
+            }
+        }
     }
 }
 

@@ -39,6 +39,8 @@ const CLOCKS: [&str; 5] = [
 ];
 /// Radios that lose three samples of a hundred, ten at a time.
 const LOST: [&str; 2] = ["effects.imu.dropout=0.03", "effects.imu.dropout_row=10"];
+/// Gyroscopes that nobody has calibrated: 3°/s off on every axis, one standard deviation.
+const BIAS: &str = "effects.imu.gyro_bias_sd_rad_per_s=0.05";
 /// What makes the scene `baseline` of it.
 const BASELINE: [&str; 4] = [
     "effects.drum=false",
@@ -95,6 +97,16 @@ pub const CONDITIONS: &[Condition] = &[
             CLOCKS[4],
         ],
         clocks_off: true,
+    },
+    Condition {
+        name: "music, gyroscopes off",
+        settings: &[BIAS],
+        clocks_off: false,
+    },
+    Condition {
+        name: "baseline, gyroscopes off",
+        settings: &[BASELINE[0], BASELINE[1], BASELINE[2], BASELINE[3], BIAS],
+        clocks_off: false,
     },
 ];
 

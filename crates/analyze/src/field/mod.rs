@@ -28,6 +28,7 @@ use crate::events::Event;
 use crate::examine::Request;
 use crate::imu::Track;
 use crate::imu::axes::misfit;
+use crate::imu::bias::far_off;
 use crate::imu::bridge;
 use crate::imu::frozen::frozen;
 use crate::imu::interval::{self, Lost};
@@ -36,6 +37,7 @@ use crate::imu::rath::{self, Motion, Settings};
 use crate::imu::saturation::saturated;
 use crate::imu::stray;
 use crate::imu::track::Instrument;
+use crate::imu::unit::other_unit;
 use crate::imu::unloading::unloadings;
 use crate::inputs::{self, Inputs, Window};
 use crate::metrics::{Metrics, Value, metrics_of};
@@ -287,15 +289,21 @@ impl Field {
                 let all = still.axis.is_none().then_some(Lost::All(still.instrument));
                 lost("frozen", still.told(track.len()), &still.samples, all);
             }
-            if turns
-                && feels
-                && let Some(found) = misfit(&track, gravity_m_per_s2)
-            {
-                field
-                    .quality
-                    .push(Quality::remark(topic, "axes", found.told()));
-                if is_rath {
-                    field.lost.push(Lost::Axes);
+            if turns && feels {
+                let said = if let Some(found) = other_unit(&track, gravity_m_per_s2) {
+                    Some(("unit", found.told(), Some(Lost::Unit)))
+                } else if let Some(found) = misfit(&track, gravity_m_per_s2) {
+                    Some(("axes", found.told(), Some(Lost::Axes)))
+                } else if let Some(found) = far_off(&track, gravity_m_per_s2) {
+                    track.take_off_bias(found.bias_rad_per_s);
+                    let lost = found.is_absurd().then_some(Lost::Unit);
+                    Some(("bias", found.told(), lost))
+                } else {
+                    None
+                };
+                if let Some((kind, told, lost)) = said {
+                    field.quality.push(Quality::remark(topic, kind, told));
+                    field.lost.extend(lost.filter(|_| is_rath));
                 }
             }
             if !is_rath && roles.patterns(Role::Imu).contains(topic) {

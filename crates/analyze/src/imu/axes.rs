@@ -1,21 +1,15 @@
 //! Whether a gyroscope and the accelerometer of the same device stand on the same axes: a table's layout may have exchanged or turned them.
 //!
-//! ```text
-//! ω = P ω_read        m = ∫ w R f dt        r² = |m_B − m_A|² + (½|m_A + m_B| − g)²
-//! ```
-//! P one of the 48 signed permutations; R the turn since the window's beginning, integrated from ω; f specific force [m/s²], w Hann's weight of the first
-//! (A) or the second half (B) of a window of 4 s. Turned by the right rates, gravity stays where it is and as long as it is, and whatever else is felt has
-//! a mean of nothing, wherever the sensor sits; by wrong rates it wanders or shrinks. A bias of the gyroscope is fitted to each P.
+//! Of P, the 48 signed permutations, the one is looked for that [`super::gravity`] fits best, each with a bias of its own.
 //!
 //! Holds for a device that tilts. With the axes of roll and pitch exchanged it takes a roll of 8° each way within seconds (0.25 Hz), of 20° at 1 Hz: what
 //! swings to and fro faster comes back to where it was by wrong rates too, and what is left looks like sway. Both sensors turned alike cannot be told, nor an accelerometer that reads −f. Turning about
 //! one axis alone leaves several P alike: then the one nearest to the axes as read is named.
 
 use super::Track;
-use nalgebra::{Matrix3, UnitQuaternion, Vector3};
+use super::gravity::{Block, Fit, Known, mean_rate, windows};
+use nalgebra::{Matrix3, Vector3};
 
-/// Samples are averaged over this, s.
-const BLOCK_S: f64 = 0.04;
 const WINDOW_S: f64 = 4.0;
 /// Only windows in which it turns faster than this count, rad/s RMS, and so many of them.
 const TURNS_RAD_PER_S: f64 = 0.1;
@@ -27,10 +21,11 @@ const TIMES: f64 = 3.0;
 const MOSTLY: f64 = 0.75;
 /// Within this factor two ways fit alike.
 const ALIKE: f64 = 1.3;
-/// What a bias is held at nothing by: its standard deviation (rad/s), and that of a window's residual (m/s²).
-const BIAS_RAD_PER_S: f64 = 0.1;
-const RESIDUAL_M_PER_S2: f64 = 0.2;
-const ROUNDS: usize = 3;
+/// No bias is known beforehand.
+const ANY: Known = Known {
+    around: Vector3::new(0.0, 0.0, 0.0),
+    sd: 0.1,
+};
 
 /// Axes that do not agree.
 #[derive(Clone, Debug, PartialEq)]
@@ -66,30 +61,22 @@ impl Misfit {
     }
 }
 
-/// Mean of some samples.
-struct Block {
-    /// Till the next one, s.
-    step_s: f64,
-    rate: Vector3<f64>,
-    force: Vector3<f64>,
-}
-
 /// Whether other axes fit a track much better than its own; `None` where they do not, or it hardly turns.
 pub fn misfit(track: &Track, gravity_m_per_s2: f64) -> Option<Misfit> {
-    let windows = windows(track);
+    let mut windows = windows(track, WINDOW_S);
+    windows.retain(|w| turns(w));
     if windows.len() < FEWEST {
         return None;
     }
     let still = Vector3::zeros();
-    let as_read = Fit::of(&windows, &Matrix3::identity(), still, gravity_m_per_s2);
-    if as_read.rms() < WANDERS_M_PER_S2 {
+    let of = |axes: &Matrix3<f64>, bias| Fit::of(&windows, axes, bias, ANY, gravity_m_per_s2);
+    if of(&Matrix3::identity(), still).rms() < WANDERS_M_PER_S2 {
         return None;
     }
     // A large bias is not found from none: what hardly turns shows it as its mean.
-    let blocks = || windows.iter().flatten();
-    let mean = blocks().map(|b| b.rate).sum::<Vector3<f64>>() / blocks().count() as f64;
+    let mean = mean_rate(&windows);
     let fit = |axes: &Matrix3<f64>| {
-        let [a, b] = [still, mean].map(|bias| Fit::of(&windows, axes, bias, gravity_m_per_s2));
+        let [a, b] = [still, axes * mean].map(|bias| of(axes, bias));
         if a.rms() < b.rms() { a } else { b }
     };
     let fits: Vec<(Matrix3<f64>, Fit)> = signed_permutations()
@@ -114,49 +101,11 @@ pub fn misfit(track: &Track, gravity_m_per_s2: f64) -> Option<Misfit> {
     })
 }
 
-/// The windows in which it turns, as blocks.
-fn windows(track: &Track) -> Vec<Vec<Block>> {
-    let Some(period_s) = track.period_s() else {
-        return Vec::new();
-    };
-    let samples = ((BLOCK_S / period_s).round() as usize).max(1);
-    let mut out = Vec::new();
-    for stretch in track.stretches() {
-        let mut window: Vec<Block> = Vec::new();
-        let mut length_s = 0.0;
-        for start in stretch.clone().step_by(samples) {
-            let end = start + samples;
-            if end >= stretch.end {
-                break;
-            }
-            let mean = |v: &[[f64; 3]]| {
-                v[start..end]
-                    .iter()
-                    .map(|v| Vector3::from(*v))
-                    .sum::<Vector3<f64>>()
-                    / samples as f64
-            };
-            let step_s = track.t_s[end] - track.t_s[start];
-            window.push(Block {
-                step_s,
-                rate: mean(&track.gyro_rad_per_s),
-                force: mean(&track.accel_m_per_s2),
-            });
-            length_s += step_s;
-            if length_s >= WINDOW_S {
-                let square: f64 = window
-                    .iter()
-                    .map(|b| b.rate.norm_squared() * b.step_s)
-                    .sum();
-                let window = std::mem::take(&mut window);
-                if square > TURNS_RAD_PER_S.powi(2) * length_s {
-                    out.push(window);
-                }
-                length_s = 0.0;
-            }
-        }
-    }
-    out
+/// Whether it turns in a window.
+fn turns(window: &[Block]) -> bool {
+    let square = |b: &Block| b.rate.norm_squared() * b.step_s;
+    let length_s: f64 = window.iter().map(|b| b.step_s).sum();
+    window.iter().map(square).sum::<f64>() > TURNS_RAD_PER_S.powi(2) * length_s
 }
 
 /// The 48 ways to read three axes, those with a mirror among them; first as they are.
@@ -180,99 +129,11 @@ pub fn signed_permutations() -> impl Iterator<Item = Matrix3<f64>> {
     })
 }
 
-/// How well some axes fit: r² of each window [m²/s⁴].
-struct Fit {
-    squares: Vec<f64>,
-}
-
-impl Fit {
-    fn of(
-        windows: &[Vec<Block>],
-        axes: &Matrix3<f64>,
-        mut bias: Vector3<f64>,
-        gravity_m_per_s2: f64,
-    ) -> Self {
-        // Least squares of r over what is left of the bias, r = m_B − m_A + J b, a few times: large ones turn it far.
-        let held = (RESIDUAL_M_PER_S2 / BIAS_RAD_PER_S).powi(2);
-        let mut squares = Vec::new();
-        for _ in 0..ROUNDS {
-            let seen: Vec<Seen> = (windows.iter())
-                .map(|window| Seen::of(window, axes, bias))
-                .collect();
-            let mut normal = Matrix3::identity() * held;
-            let mut right = -held * bias;
-            for s in &seen {
-                normal += s.by_bias.transpose() * s.by_bias;
-                right -= s.by_bias.transpose() * s.moved;
-            }
-            let Some(cholesky) = normal.cholesky() else {
-                break;
-            };
-            let more = cholesky.solve(&right);
-            bias += more;
-            let square = |s: &Seen| {
-                let moved = s.moved + s.by_bias * more;
-                moved.norm_squared() + (s.length - gravity_m_per_s2).powi(2)
-            };
-            squares = seen.iter().map(square).collect();
-        }
-        Self { squares }
-    }
-
-    fn rms(&self) -> f64 {
-        (self.squares.iter().sum::<f64>() / self.squares.len() as f64).sqrt()
-    }
-}
-
-/// What a window shows of gravity.
-struct Seen {
-    /// m_B − m_A [m/s²].
-    moved: Vector3<f64>,
-    /// What a bias adds to it [m/s² per rad/s].
-    by_bias: Matrix3<f64>,
-    /// ½|m_A + m_B| [m/s²].
-    length: f64,
-}
-
-impl Seen {
-    fn of(window: &[Block], axes: &Matrix3<f64>, bias: Vector3<f64>) -> Self {
-        let whole_s: f64 = window.iter().map(|b| b.step_s).sum();
-        let mut turn = UnitQuaternion::identity();
-        let (mut means, mut weights) = ([Vector3::zeros(); 2], [0.0; 2]);
-        let (mut turned, mut by_bias) = (Matrix3::zeros(), [Matrix3::zeros(); 2]);
-        let mut t_s = 0.0;
-        for block in window {
-            let half =
-                UnitQuaternion::from_scaled_axis(axes * (block.rate - bias) * (0.5 * block.step_s));
-            turn *= half;
-            let felt = turn * block.force;
-            let turning = turn.to_rotation_matrix().matrix() * axes * block.step_s;
-            t_s += 0.5 * block.step_s;
-            let phase = 2.0 * t_s / whole_s;
-            let part = usize::from(phase >= 1.0);
-            let w = (std::f64::consts::PI * phase).sin().powi(2) * block.step_s;
-            weights[part] += w;
-            means[part] += felt * w;
-            // A bias turns it too far by ∫ R P b dt.
-            by_bias[part] += felt.cross_matrix() * (turned + 0.5 * turning) * w;
-            turned += turning;
-            turn *= half;
-            turn.renormalize_fast();
-            t_s += 0.5 * block.step_s;
-        }
-        let [a, b] = [0, 1].map(|part| means[part] / weights[part]);
-        Self {
-            moved: b - a,
-            by_bias: by_bias[1] / weights[1] - by_bias[0] / weights[0],
-            length: 0.5 * (a + b).norm(),
-        }
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
     use crate::random::Random;
+    use nalgebra::UnitQuaternion;
     use std::f64::consts::TAU;
 
     const G: f64 = 9.80665;

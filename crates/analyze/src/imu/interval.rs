@@ -262,6 +262,8 @@ pub enum Lost {
     All(Instrument),
     /// About which axes it turned.
     Axes,
+    /// In which unit it turned.
+    Unit,
     /// How it sits on the body.
     Mounting,
     /// That it sits there as it did before.
@@ -285,6 +287,7 @@ pub fn without_those(metrics: &mut Metrics, lost: Lost, rests_on: impl Fn(&str) 
             Instrument::Gyroscope,
             "does not stand on the accelerometer's axes",
         ),
+        Lost::Unit => (Instrument::Gyroscope, "reads no rad/s"),
         Lost::Mounting => (
             Instrument::Accelerometer,
             "shows gravity elsewhere than below the load as the sensor is said to be mounted",

@@ -16,16 +16,21 @@
 //! | [`unloading`] | when the support falls below a share of the weight |
 //! | [`floating`] | for what part of the time it is there |
 //! | [`saturation`] | where a sensor came to the end of its range |
+//! | [`gravity`] | how well rates keep gravity where it is |
+//! | [`unit`] | whether a gyroscope's unit is another than it is said to be |
+//! | [`bias`] | a gyroscope that is far off |
 //! | [`axes`] | whether a gyroscope stands on its accelerometer's axes |
 //! | [`frozen`] | where a sensor stands still in moving hands |
 //! | [`turned`] | whether a sensor slipped in its mounting |
 //! | [`truth`] | errors against a recorded truth |
 
 pub mod axes;
+pub mod bias;
 pub mod bridge;
 pub mod budget;
 pub mod floating;
 pub mod frozen;
+mod gravity;
 pub mod interval;
 pub mod orientation;
 pub mod rath;
@@ -34,6 +39,7 @@ pub mod stray;
 pub mod track;
 pub mod truth;
 pub mod turned;
+pub mod unit;
 pub mod unloading;
 pub mod vertical;
 

@@ -1,6 +1,7 @@
 //! A clean series of inertial samples.
 
 use crate::median::median;
+use nalgebra::Vector3;
 
 /// Beyond these a sample is an error of the file, not a motion [rad/s, m/s²].
 const GYRO_LIMIT_RAD_PER_S: f64 = 1e3;
@@ -148,9 +149,16 @@ impl Track {
         self.accel_m_per_s2.append(&mut later.accel_m_per_s2);
     }
 
+    /// Takes a constant bias from the gyroscope.
+    pub fn take_off_bias(&mut self, bias_rad_per_s: Vector3<f64>) {
+        for rate in &mut self.gyro_rad_per_s {
+            *rate = (Vector3::from(*rate) - bias_rad_per_s).into();
+        }
+    }
+
     /// The same samples seen in another frame: each vector is turned by `rotation`.
     pub fn rotated(&self, rotation: &nalgebra::UnitQuaternion<f64>) -> Self {
-        let turn = |v: &[f64; 3]| (rotation * nalgebra::Vector3::from(*v)).into();
+        let turn = |v: &[f64; 3]| (rotation * Vector3::from(*v)).into();
         Self {
             t_s: self.t_s.clone(),
             gyro_rad_per_s: self.gyro_rad_per_s.iter().map(turn).collect(),

@@ -563,6 +563,7 @@ fn what_rests_on_what_was_lost_has_no_interval() {
         Lost::Peaks(Instrument::Gyroscope),
         Lost::All(Instrument::Accelerometer),
         Lost::Axes,
+        Lost::Unit,
         Lost::Turned,
     ] {
         let mut left = whole.clone();
