@@ -51,15 +51,22 @@ pub fn events(inputs: &Inputs, window: Window) -> Vec<Event> {
     out
 }
 
-/// A handle's force falls to 0, or rises above it again. The first sample is no event, and a tied handle never lets go.
+/// A handle's force falls to 0, or rises above it again. The first sample is no event, nor is that behind a hole, and a tied handle never lets go.
 fn contact(inputs: &Inputs, out: &mut Vec<Event>) {
     if inputs.pulled_n().is_some() {
         return;
     }
     let t_s = inputs.force_times();
+    let begin: Vec<usize> = stretches(t_s, 0.0).iter().map(|s| s.start).collect();
     for (handle, force) in inputs.normal_n.iter().enumerate() {
         let mut held: Option<bool> = None;
-        for (t_s, n) in t_s.iter().zip(force).filter(|(_, n)| n.is_finite()) {
+        for (k, (t_s, n)) in t_s.iter().zip(force).enumerate() {
+            if begin.binary_search(&k).is_ok() {
+                held = None;
+            }
+            if !n.is_finite() {
+                continue;
+            }
             let holds = *n > 0.0;
             if held.is_some_and(|h| h != holds) {
                 let number = handle + 1;
@@ -128,13 +135,15 @@ fn jumps(c: &Context, out: &mut Vec<Event>) {
                             true => passes(k),
                             false => t_s[k.min(last)],
                         };
+                        let mean = ratio[from..k].iter().sum::<f64>() / (k - from) as f64;
+                        let how = match mean < -FLIGHT {
+                            true => "it is pulled down",
+                            false => "next to nothing holds it",
+                        };
                         out.push(Event {
                             t_s: begins_s,
                             kind: "jump",
-                            what: format!(
-                                "next to nothing holds it for {:.2} s",
-                                ends_s - begins_s
-                            ),
+                            what: format!("{how} for {:.2} s", ends_s - begins_s),
                         });
                     }
                     start = None;
@@ -159,9 +168,13 @@ fn beat(inputs: &Inputs, out: &mut Vec<Event>) {
         }
         let times_s = &t_s[from..to];
         let early = times_s.partition_point(|t| *t <= t_s[from] + TEMPO_S);
+        let begins = match from {
+            0 => "is there from the first sample on",
+            _ => "begins",
+        };
         let what = tempo_hz(&times_s[..early], &sounding[..early])
-            .map_or("a beat begins".into(), |hz| {
-                format!("a beat of {hz:.3} Hz begins")
+            .map_or(format!("a beat {begins}"), |hz| {
+                format!("a beat of {hz:.3} Hz {begins}")
             });
         out.push(Event {
             t_s: t_s[from],
@@ -336,6 +349,51 @@ mod tests {
         assert_eq!(told(slow(), |x| x), [begins]);
         assert_eq!(told(loose.collect(), phase::wrap), [begins]);
         assert_eq!(told(slow(), phase::wrap), ["a beat begins"]);
+        let late = (10..60).map(f64::from).collect();
+        let there = "a beat of 2.150 Hz is there from the first sample on";
+        assert_eq!(told(late, |x| x), [there]);
+    }
+
+    /// Of two handles one lets go within a hole, and is held again behind it.
+    #[test]
+    fn what_happened_in_a_hole_is_no_event_behind_it() {
+        let seen = (0..300).map(|k| f64::from(k) / 30.0);
+        let t_s: Vec<f64> = seen.filter(|t| !(4.0..6.0).contains(t)).collect();
+        let force = |t: &f64| match *t {
+            t if (5.0..8.0).contains(&t) => 0.0,
+            _ => 300.0,
+        };
+        let inputs = Inputs {
+            normal_n: vec![t_s.iter().map(force).collect(), vec![300.0; t_s.len()]],
+            t_s,
+            ..Inputs::default()
+        };
+        let events = events(&inputs, Window::ALL);
+        let told: Vec<(f64, &str)> = events.iter().map(|e| (e.t_s, e.kind)).collect();
+        assert_eq!(told, [(8.0, "contact_regained")]);
+    }
+
+    #[test]
+    fn a_tied_load_that_is_pulled_down_is_told_so() {
+        let told = |least_n: f64| {
+            let force = |k| {
+                if (20..25).contains(&k) {
+                    least_n
+                } else {
+                    300.0
+                }
+            };
+            let inputs = Inputs {
+                t_s: (0..100).map(|k| f64::from(k) / 10.0).collect(),
+                normal_n: vec![(0..100).map(force).collect(); 2],
+                mass_kg: Some(60.0),
+                ..Inputs::default()
+            };
+            let mut events = events(&inputs, Window::ALL).into_iter();
+            events.find(|e| e.kind == "jump").unwrap().what
+        };
+        assert_eq!(told(-500.0), "it is pulled down for 0.50 s");
+        assert_eq!(told(0.0), "next to nothing holds it for 0.50 s");
     }
 
     /// Loose up to 20 s, together from there on, but nothing is known from 23 s to 43 s.

@@ -60,6 +60,8 @@ impl Window {
 pub struct Sources {
     /// Roll, pitch and yaw.
     pub attitude: Cow<'static, str>,
+    /// Roll and pitch are about their means: how the sensor that they come from sits is not known.
+    pub levelled: bool,
     /// Height.
     pub height: Cow<'static, str>,
     /// Normal forces or the support ratio.
@@ -74,6 +76,7 @@ impl Default for Sources {
     fn default() -> Self {
         Sources {
             attitude: "state".into(),
+            levelled: false,
             height: "state".into(),
             forces: "forces".into(),
             phases: "phases".into(),

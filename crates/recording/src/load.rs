@@ -9,17 +9,22 @@ pub enum Load {
     NearlyUnloaded,
     /// It does not touch.
     Slack,
+    /// Tied to its shoulder, it is pulled down by more than that tenth.
+    Pulled,
 }
 
 impl Load {
-    /// The state of a handle that presses with `normal_n` (N), of `handles` that share `weight_n` (N). NaN counts as slack.
+    /// The state of a handle that presses with `normal_n` (N), of `handles` that share `weight_n` (N). Exactly 0 is slack, and so is NaN.
     pub fn of(normal_n: f64, weight_n: f64, handles: usize) -> Self {
-        if normal_n.is_nan() || normal_n <= 0.0 {
+        let little_n = 0.1 * weight_n / handles.max(1) as f64;
+        if normal_n.is_nan() || normal_n == 0.0 {
             Load::Slack
-        } else if normal_n < 0.1 * weight_n / handles.max(1) as f64 {
+        } else if normal_n >= little_n {
+            Load::Loaded
+        } else if normal_n > -little_n {
             Load::NearlyUnloaded
         } else {
-            Load::Loaded
+            Load::Pulled
         }
     }
 }
@@ -33,7 +38,8 @@ mod tests {
         let weight_n = 600.0;
         for (normal_n, handles, load) in [
             (0.0, 2, Load::Slack),
-            (-1.0, 2, Load::Slack),
+            (-1.0, 2, Load::NearlyUnloaded),
+            (-31.0, 2, Load::Pulled),
             (f64::NAN, 2, Load::Slack),
             (29.9, 2, Load::NearlyUnloaded),
             (30.0, 2, Load::Loaded),

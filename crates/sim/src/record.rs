@@ -335,7 +335,8 @@ impl<'m> Recorder<'m> {
         for ((&normal_n, tangential_n), handle_m) in
             s.normal_n.iter().zip(&s.tangential_n).zip(&s.handle_m)
         {
-            let color = Some(contact_color(Load::of(normal_n, self.weight_n, handles)));
+            let load = Load::of(normal_n, self.weight_n, handles);
+            let color = Some(contact_color(load));
             let force_n = [tangential_n[0], tangential_n[1], normal_n];
             let [x, y, z] = force_n.map(|n| metres_per_newton * n);
             let length = (x * x + y * y + z * z).sqrt();
@@ -363,7 +364,7 @@ impl<'m> Recorder<'m> {
                         w: 1.0,
                     }),
                 }),
-                size: Some(point(if normal_n > 0.0 { [0.1; 3] } else { [0.16; 3] })),
+                size: Some(point([if load == Load::Slack { 0.16 } else { 0.1 }; 3])),
                 color,
             });
         }
@@ -428,6 +429,7 @@ fn contact_color(load: Load) -> foxglove::Color {
         Load::Slack => [0.84, 0.37, 0.0],
         Load::NearlyUnloaded => [0.94, 0.89, 0.26],
         Load::Loaded => [0.0, 0.45, 0.70],
+        Load::Pulled => [0.80, 0.47, 0.65],
     };
     foxglove::Color { r, g, b, a: 1.0 }
 }

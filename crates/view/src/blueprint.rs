@@ -2,6 +2,8 @@
 //!
 //! The SDK's own builder has no axes, eye or visible range, and numbers views at random.
 
+use std::collections::BTreeMap;
+
 use re_log_types::EntityPath;
 use re_sdk_types::blueprint::{archetypes as a, components as c, datatypes as d};
 use re_sdk_types::components::{Color, Name, Position3D, Range1D, Vector3D, Visible};
@@ -72,6 +74,15 @@ impl View {
                 "TimeAxis",
                 &a::TimeAxis::new().with_link(c::LinkAxis::LinkToGlobal),
             )
+    }
+
+    /// With a legend, where the title cannot name all curves.
+    pub fn legend(mut self) -> Self {
+        self.properties.retain(|(name, _)| *name != "PlotLegend");
+        self.with(
+            "PlotLegend",
+            &a::PlotLegend::new().with_visible(Visible::from(true)),
+        )
     }
 
     /// Only so many seconds before and after the cursor, whatever the other plots show.
@@ -206,7 +217,7 @@ const LINKED: Uuid = Uuid::from_u128(0x5C0D_CA6A_E63F_9CF7_F657_2602_5904_74CC);
 pub fn send(sink: &mut dyn Sink, id: &str, root: &Node, play: Play) -> anyhow::Result<()> {
     let mut out = Writer {
         store: Store::blueprint(sink, id)?,
-        nodes: 0,
+        nodes: BTreeMap::new(),
     };
     let collapsed = a::PanelBlueprint::new().with_state(c::PanelState::Collapsed);
     let root = match root {
@@ -241,17 +252,25 @@ pub fn send(sink: &mut dyn Sink, id: &str, root: &Node, play: Play) -> anyhow::R
 
 struct Writer<'s> {
     store: Store<'s>,
-    nodes: u128,
+    /// How many nodes there are so far of every kind.
+    nodes: BTreeMap<u64, u64>,
 }
 
 /// Where a node is in the blueprint, and its id.
 type Place = (String, Uuid);
 
 impl Writer<'_> {
-    fn id(&mut self) -> Uuid {
-        self.nodes += 1;
-        // Any fixed number will do; the version bits of UUID are left as they are.
-        Uuid::from_u128((0x7261_7468_u128 << 96) | self.nodes)
+    /// The id of the next node of a kind. The viewer keeps what it knows of a view under its id, also when another layout follows: there the same id has to be
+    /// of a view of the same class, and where its origin is the same, the user's zoom stays.
+    fn id(&mut self, kind: &[&str]) -> Uuid {
+        // FNV-1a, 64 bits; the version bits of UUID are left as they are.
+        let bytes = kind.iter().flat_map(|word| word.bytes().chain([0]));
+        let hash = bytes.fold(0xcbf2_9ce4_8422_2325_u64, |hash, byte| {
+            (hash ^ u64::from(byte)).wrapping_mul(0x0100_0000_01b3)
+        });
+        let nodes = self.nodes.entry(hash).or_default();
+        *nodes += 1;
+        Uuid::from_u64_pair(hash, *nodes)
     }
 
     fn node(&mut self, node: &Node, name: Option<&str>) -> anyhow::Result<Place> {
@@ -279,7 +298,7 @@ impl Writer<'_> {
         name: Option<&str>,
         children: &[(f32, &Node)],
     ) -> anyhow::Result<Place> {
-        let id = self.id();
+        let id = self.id(&["container", &format!("{kind:?}")]);
         let mut contents = Vec::new();
         for (_, child) in children {
             contents.push(c::IncludedContent(self.node(child, None)?.0.into()));
@@ -310,7 +329,7 @@ impl Writer<'_> {
     }
 
     fn view(&mut self, view: &View) -> anyhow::Result<Place> {
-        let id = self.id();
+        let id = self.id(&["view", view.class, &view.origin]);
         let path = format!("view/{id}");
         let contents = a::ViewContents::new(
             view.contents
@@ -355,5 +374,24 @@ mod tests {
         send(&mut kept, "id", &root, Play::Playing).unwrap();
         let shared = "view/5c0dca6a-e63f-9cf7-f657-2602590474cc/TimeAxis";
         assert_eq!(kept.lengths(shared, "TimeAxis:view_range"), [1]);
+    }
+
+    #[test]
+    fn an_id_is_of_one_class_and_origin_in_every_layout() {
+        let [mut one, mut other] = [Kept::default(), Kept::default()];
+        let writer = |kept| Writer {
+            store: Store::blueprint(kept, "id").unwrap(),
+            nodes: BTreeMap::new(),
+        };
+        let (mut first, mut next) = (writer(&mut one), writer(&mut other));
+        let [text, plot, twin] = [
+            ("TextDocument", "/a"),
+            ("TimeSeries", "/a"),
+            ("TimeSeries", "/a"),
+        ]
+        .map(|(class, origin)| first.id(&["view", class, origin]));
+        assert!(text != plot && plot != twin);
+        assert_eq!(next.id(&["view", "TimeSeries", "/a"]), plot);
+        assert_ne!(next.id(&["view", "TimeSeries", "/b"]), text);
     }
 }

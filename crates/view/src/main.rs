@@ -59,7 +59,7 @@ Exit codes: 0 done; 1 it could not; 2 wrong usage; 3 done, but the input was dam
 fn main() -> ExitCode {
     let arguments = Arguments::parse();
     match run(&arguments) {
-        Ok(findings) => report(&name(&arguments.file), &findings),
+        Ok(findings) => report(&label(&arguments.file), &findings),
         Err(error) => {
             recording::note!("view: {error:#}");
             match error.is::<Usage>() {
@@ -121,7 +121,15 @@ fn open(file: &Path) -> anyhow::Result<Recording> {
     Ok(Recording::from_stream(&mut input, STDIN, &options())?)
 }
 
-/// Name for people: the file's, without folders.
+/// What messages call the input: as it was given.
+fn label(file: &Path) -> String {
+    if is_stdin(file) {
+        return STDIN.to_owned();
+    }
+    file.display().to_string()
+}
+
+/// Name for people: the file's, without folders and ending.
 fn name(file: &Path) -> String {
     if is_stdin(file) {
         return STDIN.to_owned();
@@ -210,8 +218,8 @@ fn check(file: &Path, take: &Take, findings: &[Finding]) -> anyhow::Result<()> {
         let why = lost.or(findings.first());
         let why = why.map_or(String::new(), |f| format!(". And {f}"));
         bail!(
-            "{}: has no signal that can be shown; expected numbers in protobuf, CDR, ROS 1 or JSON messages of more than one moment (`analyze` lists what is in it){why}",
-            name(file)
+            "{}: has nothing that can be shown by itself; expected a pose, forces, phases, an inertial sensor, or other numbers of more than one moment in protobuf, CDR, ROS 1 or JSON messages (`analyze` lists what is in it){why}",
+            label(file)
         );
     }
     Ok(())
@@ -303,6 +311,18 @@ fn show(file: &Path, kind: Kind) -> anyhow::Result<Vec<Finding>> {
         encoded.finish()?.flush()?;
         Ok(findings)
     });
+    let is_gone = |error: &anyhow::Error| {
+        let io = error
+            .chain()
+            .filter_map(|c| c.downcast_ref::<std::io::Error>());
+        io.into_iter().any(|e| e.kind() == ErrorKind::BrokenPipe)
+    };
+    if sent.as_ref().is_err_and(is_gone) {
+        let status = child.wait()?;
+        bail!(
+            "the Rerun viewer ended with {status} before it had taken everything; what it says itself stands above"
+        );
+    }
     if sent.is_err() && child.try_wait()?.is_none() {
         recording::note!(
             "view: not all could be read; the viewer shows what came before, until it is closed"

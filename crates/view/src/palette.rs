@@ -60,6 +60,7 @@ pub fn load(load: Load) -> u32 {
         Load::Loaded => DEEP,
         Load::NearlyUnloaded => YELLOW,
         Load::Slack => VERMILION,
+        Load::Pulled => PURPLE,
     }
 }
 

@@ -22,6 +22,8 @@ pub struct Take {
     pub height_ns: Vec<i64>,
     /// Log times of the forces, ns.
     pub force_ns: Vec<i64>,
+    /// Sideways force on the body at each handle, x and y of the world, N, at the times of the forces; empty where that is not recorded.
+    pub tangential_n: Vec<Vec<[f64; 2]>>,
     /// How far each handle is pressed into its shoulder, m, at the times of the forces; empty where that is not recorded.
     pub compression_m: Vec<Vec<f64>>,
     /// Log times of the phases, ns.
@@ -251,6 +253,7 @@ impl Default for Take {
             state_ns: Vec::new(),
             height_ns: Vec::new(),
             force_ns: Vec::new(),
+            tangential_n: Vec::new(),
             compression_m: Vec::new(),
             phase_ns: Vec::new(),
             window: Window::ALL,

@@ -64,6 +64,12 @@ fn compatible(version: &str) -> bool {
     minor(version) == minor(VERSION)
 }
 
+/// How many threads the viewer computes with: it reads the pipe in one of them, and with that one alone it would show nothing before the end.
+fn threads() -> usize {
+    const LEAST: usize = 4;
+    std::thread::available_parallelism().map_or(LEAST, |n| n.get().max(LEAST))
+}
+
 /// Starts the viewer; it shows what comes through the pipe.
 ///
 /// # Errors
@@ -72,7 +78,13 @@ pub fn start(program: &Path, kind: Kind) -> anyhow::Result<(Child, ChildStdin)> 
     let mut command = Command::new(program);
     // What is shown is nobody else's: only this machine may ask for it.
     command
-        .args(["-", "--bind", "127.0.0.1"])
+        .args([
+            "-",
+            "--bind",
+            "127.0.0.1",
+            "--threads",
+            &threads().to_string(),
+        ])
         .stdin(Stdio::piped())
         .stdout(Stdio::null());
     match kind {

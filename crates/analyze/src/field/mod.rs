@@ -488,6 +488,7 @@ impl Field {
                 inputs.sources.forces = "imu".into();
             }
             inputs.sources.attitude = "imu".into();
+            inputs.sources.levelled = seen.sources.levelled;
             inputs.sources.height = "imu".into();
             // With the same corner as the body's height, so that their difference is a compression.
             let corner_hz = motion.settings.height_corner_hz;

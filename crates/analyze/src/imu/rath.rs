@@ -342,6 +342,7 @@ fn of_even(
         ..Inputs::default()
     };
     inputs.sources.attitude = "imu".into();
+    inputs.sources.levelled = settings.mounting == Mounting::Levelled;
     inputs.sources.height = "imu".into();
     inputs.sources.forces = "imu".into();
     Ok(Motion {

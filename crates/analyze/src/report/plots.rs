@@ -195,7 +195,12 @@ pub fn plots(a: &Analysis) -> Vec<Plot> {
             ""
         }
     };
-    let title = format!("Roll and tilt{}", imu(&i.sources.attitude));
+    let about = if i.sources.levelled {
+        " about their means"
+    } else {
+        ""
+    };
+    let title = format!("Roll and tilt{about}{}", imu(&i.sources.attitude));
     let mut roll = Panel::over_time("roll", &title, "angle, deg", a);
     roll.note = "Roll turns about the pole; tilt, where it is positive, lowers its front (REP-103). The shaded stretch is the analysis window.".into();
     roll.line("roll", &i.t_s, &degrees(&i.roll_rad));

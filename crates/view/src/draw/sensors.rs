@@ -163,6 +163,9 @@ fn gait_line(spectra: &[Spectrum]) -> Option<f64> {
     })
 }
 
+/// A title names no more curves than this; a legend names the others.
+const NAMED: usize = 4;
+
 fn topic(store: &mut Store<'_>, topic: &take::Topic, growing: bool) -> anyhow::Result<Panel> {
     let mut plots = Vec::new();
     for (k, (unit, curves)) in topic.plots.iter().enumerate() {
@@ -186,7 +189,7 @@ fn topic(store: &mut Store<'_>, topic: &take::Topic, growing: bool) -> anyhow::R
             .map(|l| format!("{path}/{}", l.entity))
             .collect();
         let shown = match names.len() {
-            0..=4 => names.join(", "),
+            0..=NAMED => names.join(", "),
             n => format!("{n} fields"),
         };
         let unit = if unit.is_empty() {
@@ -196,7 +199,11 @@ fn topic(store: &mut Store<'_>, topic: &take::Topic, growing: bool) -> anyhow::R
         };
         let title = format!("{}: {shown}{unit}", topic.name);
         let range = spread(&made, growing);
-        plots.push(plot(store, title, &path, made, range)?.contents(paths));
+        let view = plot(store, title, &path, made, range)?.contents(paths);
+        plots.push(match names.len() {
+            0..=NAMED => view,
+            _ => view.legend(),
+        });
     }
     Ok(Panel {
         name: topic.name.clone(),

@@ -383,15 +383,19 @@ fn angles(take: &Take) -> Option<(String, Vec<Line<'_>>)> {
         deg(tilt),
     )
     .map(Line::parted);
-    let title = match (&roll, &tilt) {
-        (Some(_), Some(_)) => "Roll (vermilion) and tilt (blue) [deg]",
-        (Some(_), None) => "Roll [deg]",
-        (None, Some(_)) => "Tilt of the pole [deg]",
+    let (title, mean) = match (&roll, &tilt) {
+        (Some(_), Some(_)) => ("Roll (vermilion) and tilt (blue)", "their means"),
+        (Some(_), None) => ("Roll", "its mean"),
+        (None, Some(_)) => ("Tilt of the pole", "its mean"),
         (None, None) => return None,
+    };
+    let about = match take.inputs.sources.levelled {
+        true => format!(" about {mean}"),
+        false => String::new(),
     };
     let from = estimated(&take.inputs.sources.attitude);
     Some((
-        format!("{title}{from}"),
+        format!("{title}{about} [deg]{from}"),
         roll.into_iter().chain(tilt).collect(),
     ))
 }

@@ -58,8 +58,12 @@ pub fn draw(store: &mut Store<'_>, take: &Take) -> anyhow::Result<Option<View>> 
     let eye = [0, 1, 2].map(|i| eye[i] as f32 + target[i]);
     let title = match forces {
         Some((unit, any_beyond)) => format!(
-            "Scene: {share_m} m of arrow = {unit}/{}; blue loaded, yellow nearly unloaded, vermilion slack{}",
+            "Scene: {share_m} m of arrow = {unit}/{}; blue loaded, yellow nearly unloaded, vermilion slack{}{}",
             take.inputs.normal_n.len(),
+            match take.inputs.pulled_n() {
+                Some(_) => ", purple pulled down",
+                None => "",
+            },
             match any_beyond {
                 true => format!(", white > {} m", MOST_SHARES * share_m),
                 false => String::new(),
@@ -268,6 +272,9 @@ fn bent(take: &Take, pose: &Pose) -> Option<Vec<Vec<[f64; 3]>>> {
     (STRAIGHT_M..APART_M).contains(&most_m).then_some(places)
 }
 
+/// Places along a pole that lie no farther apart are one: no direction can be told from them, m.
+const SAME_M: f64 = 0.01;
+
 /// A pole through its middle, where the body holds it, and through the places of its handles, a little longer than they need.
 fn strip(
     handles_m: &[[f64; 3]],
@@ -286,14 +293,18 @@ fn strip(
         })
         .map(|(h, place)| (h[0], *place))
         .collect();
-    points.push((0.5 * (low + high), middle));
+    let x = 0.5 * (low + high);
+    // A handle at the middle is where the body holds the pole.
+    points.retain(|(handle_x, _)| (handle_x - x).abs() > SAME_M);
+    points.push((x, middle));
     points.sort_by(|a, b| a.0.total_cmp(&b.0));
     let beyond = |(x0, p0): (f64, [f64; 3]), (x1, p1): (f64, [f64; 3]), x: f64| {
         let share = (x - x0) / (x1 - x0);
         f32s(&[0, 1, 2].map(|i| p0[i] + share * (p1[i] - p0[i])))
     };
+    points.dedup_by(|a, b| (a.0 - b.0).abs() <= SAME_M);
     let n = points.len();
-    if n < 2 || points[0].0 == points[1].0 || points[n - 2].0 == points[n - 1].0 {
+    if n < 2 {
         return points.iter().map(|(_, p)| f32s(p)).collect();
     }
     let first = beyond(points[0], points[1], low);
@@ -304,7 +315,7 @@ fn strip(
         .collect()
 }
 
-/// One pole along x for every (y, z) at which there are handles, a little longer than they need.
+/// One pole along x for every (y, z) at which there are handles, a little longer than they need; one with a single handle reaches to the middle of the body.
 fn poles(handles_m: &[[f64; 3]]) -> Vec<[[f32; 3]; 2]> {
     let mut poles: Vec<[f64; 4]> = Vec::new();
     for &[x, y, z] in handles_m {
@@ -317,9 +328,13 @@ fn poles(handles_m: &[[f64; 3]]) -> Vec<[[f32; 3]; 2]> {
         }
     }
     let end = |x: f64, y: f64, z: f64| f32s(&[x, y, z]);
-    poles
-        .iter()
-        .map(|&[y, z, from, to]| [end(from - 0.3, y, z), end(to + 0.3, y, z)])
+    let alone = |from: f64, to: f64| to - from <= SAME_M;
+    let reaching = poles.iter().map(|&[y, z, from, to]| match alone(from, to) {
+        true => [y, z, from.min(0.0), to.max(0.0)],
+        false => [y, z, from, to],
+    });
+    reaching
+        .map(|[y, z, from, to]| [end(from - 0.3, y, z), end(to + 0.3, y, z)])
         .collect()
 }
 
@@ -372,26 +387,29 @@ fn forces(
         let straight =
             || pose.places_in_world(pose.moment(take.force_ns[k]), &take.shape.handles_m);
         let places = bent.map_or_else(straight, |bent| bent[k].clone());
-        for (place, force) in places.iter().zip(normal_n) {
+        for (i, (place, force)) in places.iter().zip(normal_n).enumerate() {
             let load = Load::of(force[k], scale_n, handles);
             let radius = match load {
-                Load::Loaded => 0.06f32,
+                Load::Loaded | Load::Pulled => 0.06f32,
                 Load::NearlyUnloaded => 0.085,
                 Load::Slack => 0.12,
             };
             radii.push(thick * radius);
-            let shares = match force[k].is_finite() {
-                true => force[k].max(0.0) * shares_per_newton,
-                false => 0.0,
+            let sideways = take.tangential_n.get(i).map_or([0.0; 2], |n| n[k]);
+            let force_n = [sideways[0], sideways[1], force[k]];
+            let shares = match force_n.iter().all(|n| n.is_finite()) {
+                true => force_n.map(|n| n * shares_per_newton),
+                false => [0.0; 3],
             };
-            let beyond = shares > MOST_SHARES;
+            let length = shares.iter().map(|x| x * x).sum::<f64>().sqrt();
+            let beyond = length > MOST_SHARES;
             any_beyond |= beyond;
             colors.push(match beyond {
                 true => palette::WHITE,
                 false => palette::load(load),
             });
-            let length = share_m * shares.min(MOST_SHARES);
-            vectors.push([0.0f32, 0.0, length as f32]);
+            let fits = share_m * (MOST_SHARES / length).min(1.0);
+            vectors.push(f32s(&shares.map(|x| fits * x)));
             origins.push(f32s(place));
         }
     }
@@ -608,6 +626,13 @@ mod tests {
         for (got, expected) in heights.iter().zip([0.929, 0.92, 0.8, 0.92, 0.929]) {
             assert!((got - expected).abs() < 1e-5, "{heights:?}");
         }
+        // A pole with one handle, at its middle but for rounding, has no direction, and one beside it goes there.
+        let one = |x: f64| {
+            let handle = [[x, 0.3, 0.1]];
+            let ends = [[x as f32 - 0.3, 0.3, 0.1], [x as f32 + 0.3, 0.3, 0.1]];
+            super::strip(&handle, &[[2.4, 0.3, 0.7]], &ends, [2.4, 0.3, 0.8])
+        };
+        assert_eq!(one(2.4), [[2.4, 0.3, 0.8]]);
         // As far below the shoulder as the body holds it: a straight pole.
         take.compression_m = vec![vec![0.22]; 2];
         assert_eq!(bent(&take, &pose), None);
@@ -627,6 +652,11 @@ mod tests {
             })
             .collect();
         assert_eq!(poles(&eight).len(), 2);
+        // One alone is held by the body.
+        assert_eq!(
+            poles(&[[2.4, 0.3, 0.1]]),
+            [[[-0.3, 0.3, 0.1], [2.7, 0.3, 0.1]]]
+        );
         assert!(poles(&[]).is_empty());
     }
 }

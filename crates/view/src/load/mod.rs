@@ -75,6 +75,7 @@ pub fn load(
         take.pose = scene::pose(&signals);
         take.carriers = scene::carriers(&signals);
         take.energy = scene::energy(&signals);
+        take.tangential_n = scene::tangentials(&signals, &take);
         take.compression_m = scene::compressions(&signals, &take);
         take.shape = scene::shape(recording, &take);
         let people = take.shape.handles_m.len();
@@ -204,13 +205,14 @@ impl<'a> Plan<'a> {
         self.ours.contains(&topic)
     }
 
-    /// Collected whole: the pose, the carriers' frames, the handles' compressions and the ledger.
+    /// Collected whole: the pose, the carriers' frames, the handles' sideways forces and compressions, and the ledger.
     fn is_whole(&self, path: &str) -> bool {
         let pose = ["position_m", "orientation"]
             .iter()
             .any(|f| within(path, topics::STATE, f));
         pose || within(path, topics::ENERGY, "")
             || within(path, topics::FORCES, "compression_m")
+            || (within(path, topics::FORCES, "tangential_n") && !path.ends_with(".z"))
             || (within(path, topics::TF, "") && path.contains(".transform.translation."))
     }
 

@@ -94,6 +94,24 @@ pub fn compressions(signals: &BTreeMap<&str, &Signal>, take: &Take) -> Vec<Vec<f
     found.iter().map(|signal| signal.values.to_vec()).collect()
 }
 
+/// Sideways forces of the handles, at the times of the forces.
+pub fn tangentials(signals: &BTreeMap<&str, &Signal>, take: &Take) -> Vec<Vec<[f64; 2]>> {
+    let axis = |name: &str| {
+        let pattern = format!("{}.tangential_n[*].{name}", topics::FORCES);
+        numbered(signals, &pattern)
+    };
+    let [x, y] = ["x", "y"].map(axis);
+    let on_time = |s: &&Signal| s.times_ns[..] == take.force_ns[..];
+    if x.len() != y.len() || !x.iter().chain(&y).all(on_time) {
+        return Vec::new();
+    }
+    let pairs = |(x, y): (&&Signal, &&Signal)| {
+        let each = x.values.iter().zip(y.values.iter());
+        each.map(|(x, y)| [*x, *y]).collect()
+    };
+    x.iter().zip(&y).map(pairs).collect()
+}
+
 /// Handles as the attached scene gives them; otherwise where the carriers are beside the body, at the middle of what they do.
 pub fn shape(recording: &Recording, take: &Take) -> Shape {
     let from_scene = || -> Option<Vec<[f64; 3]>> {
