@@ -36,6 +36,7 @@ pub mod spline;
 pub mod steps;
 pub mod summary;
 pub mod table;
+pub mod window;
 
 pub use inputs::{Inputs, Window};
 pub use metrics::{Metrics, metrics, metrics_of};

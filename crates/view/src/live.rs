@@ -7,6 +7,7 @@ use std::io::Read;
 use std::sync::mpsc::{RecvTimeoutError, channel};
 use std::time::{Duration, Instant};
 
+use analyze::examine::Request;
 use recording::Finding;
 use recording::read::{ReadError, Recording, STDIN};
 
@@ -32,6 +33,7 @@ const SETTLE_S: f64 = 10.0;
 pub fn follow(
     input: impl Read + Send + 'static,
     sink: &mut dyn Sink,
+    asked: &Request,
 ) -> anyhow::Result<(Take, Vec<Finding>)> {
     let (sender, receiver) = channel::<std::io::Result<Vec<u8>>>();
     std::thread::spawn(move || read_pieces(input, &sender));
@@ -47,11 +49,11 @@ pub fn follow(
                 }
             }
             Err(RecvTimeoutError::Timeout) => {}
-            Err(RecvTimeoutError::Disconnected) => return shown.last(bytes, sink),
+            Err(RecvTimeoutError::Disconnected) => return shown.last(bytes, sink, asked),
         }
         let began = Instant::now();
         if bytes.len() > shown.bytes {
-            shown.more(&bytes, sink)?;
+            shown.more(&bytes, sink, asked)?;
         }
         next = Instant::now() + PAUSE.max(EFFORT * began.elapsed());
     }
@@ -91,9 +93,9 @@ struct Shown {
 
 impl Shown {
     /// Shows what is new while there is more to come. A beginning too short to be read is left for later.
-    fn more(&mut self, bytes: &[u8], sink: &mut dyn Sink) -> anyhow::Result<()> {
+    fn more(&mut self, bytes: &[u8], sink: &mut dyn Sink, asked: &Request) -> anyhow::Result<()> {
         self.bytes = bytes.len();
-        let recording = match Recording::from_bytes(bytes.to_vec(), &options()) {
+        let recording = match Recording::from_bytes(bytes.to_vec(), &options(asked)) {
             Ok(recording) => recording,
             Err(ReadError::Empty { .. }) => return Ok(()),
             // The magic number is 8 bytes long.
@@ -103,7 +105,7 @@ impl Shown {
         if recording.info().messages == 0 {
             return Ok(());
         }
-        let (mut take, _) = load(STDIN, &recording, Detail::Whole)?;
+        let (mut take, _) = load(STDIN, &recording, Detail::Whole, asked)?;
         let settled_s = whole_s(take.duration_s() - SETTLE_S);
         take.events.retain(|event| event.t_s < settled_s);
         take.keep_settled(take.start_ns.saturating_add((settled_s * 1e9) as i64));
@@ -112,9 +114,14 @@ impl Shown {
         self.show(&recording, &take, sink)
     }
 
-    fn last(mut self, bytes: Vec<u8>, sink: &mut dyn Sink) -> anyhow::Result<(Take, Vec<Finding>)> {
-        let recording = Recording::from_bytes(bytes, &options())?;
-        let (take, findings) = load(STDIN, &recording, Detail::Whole)?;
+    fn last(
+        mut self,
+        bytes: Vec<u8>,
+        sink: &mut dyn Sink,
+        asked: &Request,
+    ) -> anyhow::Result<(Take, Vec<Finding>)> {
+        let recording = Recording::from_bytes(bytes, &options(asked))?;
+        let (take, findings) = load(STDIN, &recording, Detail::Whole, asked)?;
         self.show(&recording, &take, sink)?;
         Ok((take, findings))
     }

@@ -6,6 +6,8 @@ use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 use std::time::Duration;
 
+use analyze::examine::Request;
+use analyze::roles::RolesFile;
 use anyhow::{Context, anyhow, bail};
 use clap::Parser;
 use recording::Finding;
@@ -23,6 +25,12 @@ struct Arguments {
     /// The recording (MCAP), or - for one that comes through standard input and is shown while it grows
     #[arg(value_name = "FILE.mcap|-")]
     file: PathBuf,
+    /// A TOML file that says which signal plays which role, as for `analyze`
+    #[arg(long, value_name = "FILE.toml")]
+    roles: Option<PathBuf>,
+    /// Metrics and spectra from A to B, seconds after the first message: 15..60, 15.. or ..60
+    #[arg(long, value_name = "A..B", value_parser = analyze::window::parse, allow_hyphen_values = true)]
+    window: Option<(Option<f64>, Option<f64>)>,
     /// Write what would be shown as a Rerun file, and open nothing
     #[arg(long, value_name = "FILE.rrd", group = "target")]
     save: Option<PathBuf>,
@@ -46,6 +54,7 @@ fn help() -> String {
         "Examples:
   view music.mcap                         open it in the Rerun viewer
   view music.mcap --save music.rrd        write a file for the viewer; needs no viewer
+  view walk.mcap --roles roles.toml       a field log, with what `analyze` is told of it, too
   view music.mcap --web                   in a browser: the viewer says the address
   sim record music --out - | view -       watch a run while it is computed
 
@@ -84,6 +93,7 @@ fn report(name: &str, findings: &[Finding]) -> ExitCode {
 }
 
 fn run(arguments: &Arguments) -> anyhow::Result<Vec<Finding>> {
+    let asked = asked(arguments)?;
     if let Some(path) = &arguments.save {
         if path.as_os_str() == "-" {
             let said = "--save -: an .rrd is written to a file; give it a name";
@@ -95,17 +105,27 @@ fn run(arguments: &Arguments) -> anyhow::Result<Vec<Finding>> {
             endings: &["rrd"],
         };
         may_write(&[output], [arguments.file.as_path()])?;
-        return save(&arguments.file, path);
+        return save(&arguments.file, path, &asked);
     }
     if let Some(url) = &arguments.connect {
-        return connect(&arguments.file, url);
+        return connect(&arguments.file, url, &asked);
     }
     let kind = if arguments.web {
         Kind::Web
     } else {
         Kind::Window
     };
-    show(&arguments.file, kind)
+    show(&arguments.file, kind, &asked)
+}
+
+/// What the user says of the recording.
+fn asked(arguments: &Arguments) -> anyhow::Result<Request> {
+    let roles = arguments.roles.as_deref().map(RolesFile::read);
+    Ok(Request {
+        roles: roles.transpose().map_err(anyhow::Error::msg)?,
+        window: arguments.window.unwrap_or_default(),
+        ..Request::default()
+    })
 }
 
 fn is_stdin(file: &Path) -> bool {
@@ -113,12 +133,12 @@ fn is_stdin(file: &Path) -> bool {
 }
 
 /// Opens a recording that is complete.
-fn open(file: &Path) -> anyhow::Result<Recording> {
+fn open(file: &Path, asked: &Request) -> anyhow::Result<Recording> {
     if !is_stdin(file) {
-        return Ok(Recording::open(file, &options())?);
+        return Ok(Recording::open(file, &options(asked))?);
     }
     let mut input = std::io::stdin().lock();
-    Ok(Recording::from_stream(&mut input, STDIN, &options())?)
+    Ok(Recording::from_stream(&mut input, STDIN, &options(asked))?)
 }
 
 /// What messages call the input: as it was given.
@@ -160,7 +180,7 @@ enum Source {
 const MAGIC_BYTES: u64 = 8;
 
 /// Opens a file, or reads the beginning of standard input.
-fn input(file: &Path) -> anyhow::Result<Input> {
+fn input(file: &Path, asked: &Request) -> anyhow::Result<Input> {
     if is_stdin(file) {
         let mut begin = Vec::new();
         std::io::stdin()
@@ -168,37 +188,42 @@ fn input(file: &Path) -> anyhow::Result<Input> {
             .take(MAGIC_BYTES)
             .read_to_end(&mut begin)
             .with_context(|| format!("{STDIN}: cannot be read"))?;
-        match Recording::from_bytes(begin.clone(), &options()) {
+        match Recording::from_bytes(begin.clone(), &options(asked)) {
             Err(error @ ReadError::NotMcap { .. }) => return Err(error.into()),
             Err(error) if begin.is_empty() => return Err(error.into()),
             _ => {}
         }
         return Ok(Input::Growing(Cursor::new(begin).chain(std::io::stdin())));
     }
-    Ok(Input::Whole(Box::new(open(file)?)))
+    Ok(Input::Whole(Box::new(open(file, asked)?)))
 }
 
 /// Reads a file.
-fn source(file: &Path, input: Input) -> anyhow::Result<Source> {
+fn source(file: &Path, input: Input, asked: &Request) -> anyhow::Result<Source> {
     let recording = match input {
         Input::Whole(recording) => recording,
         Input::Growing(input) => return Ok(Source::Growing(input)),
     };
-    let (take, findings) = load(&name(file), &recording, Detail::Thinned)?;
+    let (take, findings) = load(&name(file), &recording, Detail::Thinned, asked)?;
     check(file, &take, &findings)?;
     let id = view::recording_id(&take.name, &recording);
     Ok(Source::Whole(Box::new(take), id, findings))
 }
 
 /// Sends a recording that is complete, or one that comes through standard input as it comes.
-fn send(file: &Path, source: Source, sink: &mut dyn Sink) -> anyhow::Result<Vec<Finding>> {
+fn send(
+    file: &Path,
+    source: Source,
+    sink: &mut dyn Sink,
+    asked: &Request,
+) -> anyhow::Result<Vec<Finding>> {
     match source {
         Source::Whole(take, id, findings) => {
             view::send(sink, &id, &take)?;
             Ok(findings)
         }
         Source::Growing(input) => {
-            let (take, findings) = view::live::follow(input, sink)?;
+            let (take, findings) = view::live::follow(input, sink, asked)?;
             check(file, &take, &findings)?;
             Ok(findings)
         }
@@ -226,11 +251,11 @@ fn check(file: &Path, take: &Take, findings: &[Finding]) -> anyhow::Result<()> {
 }
 
 /// Writes an .rrd that appears whole or not at all.
-fn save(file: &Path, path: &Path) -> anyhow::Result<Vec<Finding>> {
+fn save(file: &Path, path: &Path, asked: &Request) -> anyhow::Result<Vec<Finding>> {
     let cannot =
         |error: &dyn std::fmt::Display| anyhow!("{}: cannot be written: {error}", path.display());
-    let recording = open(file)?;
-    let (take, findings) = load(&name(file), &recording, Detail::Thinned)?;
+    let recording = open(file, asked)?;
+    let (take, findings) = load(&name(file), &recording, Detail::Thinned, asked)?;
     check(file, &take, &findings)?;
     write_whole(path, |file| {
         let mut encoded = Encoded::new(file)?;
@@ -247,16 +272,16 @@ fn save(file: &Path, path: &Path) -> anyhow::Result<Vec<Finding>> {
 }
 
 /// Sends to a viewer or server that runs already.
-fn connect(file: &Path, url: &str) -> anyhow::Result<Vec<Finding>> {
+fn connect(file: &Path, url: &str, asked: &Request) -> anyhow::Result<Vec<Finding>> {
     let parsed = url
         .parse()
         .map_err(|error| anyhow!("--connect: {url:?} is no address of Rerun ({error}); expected one such as rerun+http://127.0.0.1:9876/proxy"))?;
-    let input = input(file)?;
+    let input = input(file, asked)?;
     let mut client = re_grpc_client::write::Client::new(
         answering(parsed, url)?,
         re_grpc_client::write::Options::default(),
     );
-    let findings = send(file, source(file, input)?, &mut client)?;
+    let findings = send(file, source(file, input, asked)?, &mut client, asked)?;
     client
         .flush_blocking(Duration::from_secs(20))
         .map_err(|error| {
@@ -300,14 +325,14 @@ fn greeted(mut peer: TcpStream) -> std::io::Result<()> {
 }
 
 /// Starts the viewer, sends the recording into it and waits until it is closed.
-fn show(file: &Path, kind: Kind) -> anyhow::Result<Vec<Finding>> {
-    let input = input(file)?;
+fn show(file: &Path, kind: Kind, asked: &Request) -> anyhow::Result<Vec<Finding>> {
+    let input = input(file, asked)?;
     let program = viewer::find()?;
     // What cannot be read should not open a window first.
-    let source = source(file, input)?;
+    let source = source(file, input, asked)?;
     let (mut child, stdin) = viewer::start(&program, kind)?;
     let sent = Encoded::stream(BufWriter::with_capacity(1 << 16, stdin)).and_then(|mut encoded| {
-        let findings = send(file, source, &mut encoded)?;
+        let findings = send(file, source, &mut encoded, asked)?;
         encoded.finish()?.flush()?;
         Ok(findings)
     });

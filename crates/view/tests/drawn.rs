@@ -2,6 +2,7 @@
 
 mod common;
 
+use analyze::examine::Request;
 use common::{ROWS, imus, imus_logged, run, run_logged, taken};
 use recording::cdr::Imu;
 use recording::read::Recording;
@@ -171,8 +172,8 @@ fn a_sensor_of_one_moment_is_no_sensor() {
         let drawn = sent.rows();
         let curve = drawn.iter().find(|(e, _)| e.starts_with("/topics/imu/s0/"));
         assert_eq!(curve, None, "{drawn:?}");
-        let recording = Recording::open(&path, &options()).unwrap();
-        let (take, _) = load("imu", &recording, Detail::Thinned).unwrap();
+        let recording = Recording::open(&path, &options(&Request::default())).unwrap();
+        let (take, _) = load("imu", &recording, Detail::Thinned, &Request::default()).unwrap();
         let said = |note: &String| note.contains("/imu/s0: all 300 messages are of one moment");
         assert_eq!(
             take.notes.iter().any(said),
@@ -316,8 +317,8 @@ fn values_that_are_none_are_counted() {
             .unwrap();
     }
     writer.finish().unwrap();
-    let recording = Recording::open(&path, &options()).unwrap();
-    let (take, _) = load("arm", &recording, Detail::Thinned).unwrap();
+    let recording = Recording::open(&path, &options(&Request::default())).unwrap();
+    let (take, _) = load("arm", &recording, Detail::Thinned, &Request::default()).unwrap();
     let expected = (
         Some(3.0),
         "/arm: 40 values of x are NaN or infinite, first at 3.000 s".to_owned(),

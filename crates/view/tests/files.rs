@@ -5,6 +5,7 @@ mod common;
 use std::collections::BTreeMap;
 use std::process::Command;
 
+use analyze::examine::Request;
 use recording::read::Recording;
 use recording::write::{RawChannel, RecordingWriter, WriterOptions};
 use view::load::{Detail, load, options};
@@ -18,8 +19,8 @@ fn the_same_recording_gives_the_same_bytes() {
     let mcap = folder.path().join("run.mcap");
     run(&mcap, 2);
     let bytes = || {
-        let recording = Recording::open(&mcap, &options()).unwrap();
-        let (take, _) = load("run", &recording, Detail::Thinned).unwrap();
+        let recording = Recording::open(&mcap, &options(&Request::default())).unwrap();
+        let (take, _) = load("run", &recording, Detail::Thinned, &Request::default()).unwrap();
         let mut encoded = Encoded::stream(Vec::new()).unwrap();
         view::send(&mut encoded, "id", &take).unwrap();
         encoded.finish().unwrap()
@@ -207,7 +208,12 @@ fn what_comes_in_pieces_is_shown_once_and_whole() {
     let (whole, _) = taken(&path);
     let mut live = Taken::default();
     let bytes = std::fs::read(&path).unwrap();
-    view::live::follow(Slow(std::io::Cursor::new(bytes)), &mut live).unwrap();
+    view::live::follow(
+        Slow(std::io::Cursor::new(bytes)),
+        &mut live,
+        &Request::default(),
+    )
+    .unwrap();
     let (mut a, mut b) = (live.rows(), whole.rows());
     // A level is drawn from the first to the last moment known, so it grows by a row with every piece.
     for rows in [&mut a, &mut b] {
@@ -234,7 +240,12 @@ fn estimates_of_what_grows_are_sent_when_they_are_settled() {
     let (whole, _) = taken(&path);
     let mut live = Taken::default();
     let bytes = std::fs::read(&path).unwrap();
-    view::live::follow(Slow(std::io::Cursor::new(bytes)), &mut live).unwrap();
+    view::live::follow(
+        Slow(std::io::Cursor::new(bytes)),
+        &mut live,
+        &Request::default(),
+    )
+    .unwrap();
     assert!(live.0.len() > whole.0.len(), "it came in one piece");
     for (curve, off) in [("/plots/height/z", 1e-3), ("/plots/angles/roll", 0.02)] {
         let (live, whole) = (live.scalars(curve), whole.scalars(curve));
@@ -278,7 +289,7 @@ fn what_differs_has_another_id() {
         writer.finish().unwrap();
         view::recording_id(
             "music, seed 1",
-            &Recording::open(&path, &options()).unwrap(),
+            &Recording::open(&path, &options(&Request::default())).unwrap(),
         )
     };
     assert_eq!(id("a.mcap", 2.15), id("b.mcap", 2.15));
@@ -338,4 +349,56 @@ fn reruns_own_tools_agree() {
             assert!(printed.contains(part), "{part}");
         }
     }
+}
+
+/// A log of somebody's own, in which nothing tells what is a roll.
+#[test]
+fn a_roles_file_and_a_window_hold_for_the_pictures() {
+    let folder = tempfile::tempdir().unwrap();
+    let [mcap, toml, rrd] = ["own.mcap", "roles.toml", "own.rrd"].map(|n| folder.path().join(n));
+    let mut writer = RecordingWriter::create(&mcap, &WriterOptions::default()).unwrap();
+    let raw = RawChannel {
+        topic: "/load",
+        message_encoding: "json",
+        schema_name: "",
+        schema_encoding: "",
+        schema_data: &[],
+        metadata: &BTreeMap::new(),
+    };
+    let own = writer.raw_channel(&raw).unwrap();
+    for k in 0..600_u32 {
+        let angle = 0.2 * (0.3 * f64::from(k)).sin();
+        let text = format!("{{\"items\":[{{\"name\":\"lean\",\"value\":{angle}}}]}}");
+        let t_ns = 33_000_000 * i64::from(k);
+        writer.message(own, t_ns, text.as_bytes()).unwrap();
+    }
+    writer.finish().unwrap();
+    std::fs::write(
+        &toml,
+        "roll = \"/load.items[lean].value\"\nangle_unit = \"rad\"\n",
+    )
+    .unwrap();
+
+    let asked = Request {
+        roles: Some(analyze::roles::RolesFile::read(&toml).unwrap()),
+        window: (Some(5.0), Some(15.0)),
+        ..Request::default()
+    };
+    let recording = Recording::open(&mcap, &options(&asked)).unwrap();
+    let (take, _) = load("own", &recording, Detail::Thinned, &asked).unwrap();
+    assert_eq!(take.inputs.roll_rad.len(), 600);
+    assert_eq!((take.window.start_s, take.window.end_s), (5.0, 15.0));
+    let (bare, _) = load("own", &recording, Detail::Thinned, &Request::default()).unwrap();
+    assert!(bare.inputs.roll_rad.is_empty());
+
+    let [mcap, toml, rrd] = [&mcap, &toml, &rrd].map(|p| p.to_str().unwrap());
+    let arguments = [mcap, "--roles", toml, "--window", "5..15", "--save", rrd];
+    assert!(view(&arguments).status.success());
+    std::fs::write(toml, "rol = \"/load.x\"\n").unwrap();
+    let said = String::from_utf8(view(&arguments).stderr).unwrap();
+    assert!(
+        said.contains("roles.toml:1:1: is not a roles file: unknown field `rol`"),
+        "{said}"
+    );
+    assert!(said.contains("Did you mean `roll`?"), "{said}");
 }

@@ -23,9 +23,10 @@ const MAX_EXAMINED: u64 = 10_000_000;
 /// Transforms that a message of `/tf` may have: the body's, and one for each of as many people as the project's own lists may hold.
 const MOST_TRANSFORMS: usize = 1 + 4096;
 
-/// How recordings are opened.
-pub fn options() -> ReadOptions {
+/// How recordings are opened of which `asked` is asked.
+pub fn options(asked: &Request) -> ReadOptions {
     ReadOptions {
+        by_name: asked.names_items(),
         max_items: MOST_TRANSFORMS,
         ..ReadOptions::default()
     }
@@ -40,11 +41,12 @@ pub enum Detail {
     Whole,
 }
 
-/// Reads what there is to draw. Returns what the reader found odd beside it.
+/// Reads what there is to draw; of `asked`, roles and window count. Returns what the reader found odd beside it.
 pub fn load(
     name: &str,
     recording: &Recording,
     detail: Detail,
+    asked: &Request,
 ) -> Result<(Take, Vec<Finding>), ReadError> {
     let info = recording.info();
     let mut take = Take {
@@ -59,7 +61,7 @@ pub fn load(
     let plan = Plan::new(info, whole);
     let mut findings = Vec::new();
     if whole {
-        examined(&mut take, recording)?;
+        examined(&mut take, recording, asked)?;
     } else {
         take.notes.push(format!(
             "{} messages: curves and spectra only, at the times of the log; `analyze` computes the metrics.",
@@ -112,11 +114,11 @@ fn at_ns(start_ns: i64, t_s: &[f64]) -> Vec<i64> {
 }
 
 /// Metrics, events, remarks and the columns behind them, as `analyze` finds them.
-fn examined(take: &mut Take, recording: &Recording) -> Result<(), ReadError> {
+fn examined(take: &mut Take, recording: &Recording, asked: &Request) -> Result<(), ReadError> {
     // No list of signals is asked for: no topic has the empty name. (To name no signal would switch the estimates off.)
     let request = Request {
         topics: vec![String::new()],
-        ..Request::default()
+        ..asked.clone()
     };
     let analysis = examine(&take.name, recording, &request)?;
     let start_ns = take.start_ns;

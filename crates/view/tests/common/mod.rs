@@ -5,6 +5,7 @@ use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
 use std::process::Command;
 
+use analyze::examine::Request;
 use re_chunk::Chunk;
 use re_log_types::LogMsg;
 use recording::cdr::{Header, Imu, Quaternion, TfMessage, Time, Transform, TransformStamped};
@@ -258,8 +259,8 @@ impl Taken {
 
 /// Sends the file as `view` does; gives the titles of the views too.
 pub fn taken(path: &Path) -> (Taken, Vec<String>) {
-    let recording = Recording::open(path, &options()).unwrap();
-    let (take, _) = load("file", &recording, Detail::Thinned).unwrap();
+    let recording = Recording::open(path, &options(&Request::default())).unwrap();
+    let (take, _) = load("file", &recording, Detail::Thinned, &Request::default()).unwrap();
     let mut sink = Taken::default();
     let sent = view::send_part(&mut sink, "id", &take, None).unwrap();
     let titles = view::blueprint::titles(&sent.layout)

@@ -1,6 +1,9 @@
-//! `A..B` in seconds.
+//! A window as people write it: `A..B` in seconds.
 
 /// `15..60`, `15..`, `..60`, `..`: first and last moment, each optional.
+///
+/// # Errors
+/// What is no such text, or ends before it begins.
 pub fn parse(text: &str) -> Result<(Option<f64>, Option<f64>), String> {
     let (a, b) = text
         .split_once("..")
