@@ -65,7 +65,7 @@ struct AnalyzeArgs {
     #[arg(long, value_enum, default_value = "table")]
     format: Format,
     /// Analyse from A to B, seconds after the first message: 15..60, 15.. or ..60
-    #[arg(long, value_name = "A..B", value_parser = analyze::window::parse, allow_hyphen_values = true)]
+    #[arg(long, value_name = "A..B", value_parser = ::analyze::window::parse, allow_hyphen_values = true)]
     window: Option<(Option<f64>, Option<f64>)>,
     /// A TOML file that says which signal plays which role
     #[arg(long, value_name = "FILE.toml")]
