@@ -135,6 +135,9 @@ pub struct RolesFile {
     /// Standard deviation of the scale error of a gyroscope's axis (relative).
     #[serde(default, deserialize_with = "not_negative")]
     pub gyro_scale_error: Option<f64>,
+    /// Standard deviation of how far the axes of the load's sensor stand otherwise on it (degrees).
+    #[serde(default, deserialize_with = "not_negative")]
+    pub imu_mounting_error_deg: Option<f64>,
 }
 
 /// Unit of an angle.
@@ -347,6 +350,8 @@ pub struct Sensors {
     pub accel_bias_m_per_s2: Option<f64>,
     /// Standard deviation of the scale error of its gyroscope, relative.
     pub gyro_scale_error: Option<f64>,
+    /// Standard deviation of how far its axes stand otherwise, degrees.
+    pub mounting_error_deg: Option<f64>,
 }
 
 impl Roles {
@@ -443,6 +448,7 @@ impl Roles {
                 accel_age_s: user.accel_age_s,
                 accel_bias_m_per_s2: user.accel_bias_m_per_s2,
                 gyro_scale_error: user.gyro_scale_error,
+                mounting_error_deg: user.imu_mounting_error_deg,
             };
             let motion = [Role::Height, Role::Roll, Role::Pitch, Role::Yaw];
             let says = |role: &Role| !user.patterns(*role).is_empty();

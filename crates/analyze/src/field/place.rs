@@ -1,6 +1,7 @@
 //! Where sensors sit: as the user says, or from the scene that a simulated recording carries.
 
 use std::collections::HashMap;
+use std::f64::consts::SQRT_2;
 
 use nalgebra::UnitQuaternion;
 use recording::read::Recording;
@@ -22,6 +23,8 @@ pub struct Place {
     pub accel_bias_m_per_s2: Option<f64>,
     /// Standard deviation of its gyroscope's scale error, relative, where somebody says.
     pub gyro_scale_error: Option<f64>,
+    /// Standard deviation of how far its axes stand otherwise, rad, where somebody says.
+    pub mounting_error_rad: Option<f64>,
 }
 
 impl Place {
@@ -40,6 +43,8 @@ impl Place {
             budget: Budget {
                 accel_bias_m_per_s2: said.accel_bias_m_per_s2.or(self.accel_bias_m_per_s2),
                 gyro_scale_error: said.gyro_scale_error.or(self.gyro_scale_error),
+                mounting_error_rad: (said.mounting_error_deg.map(f64::to_radians))
+                    .or(self.mounting_error_rad),
                 ..Budget::default()
             },
             ..Settings::default()
@@ -62,7 +67,7 @@ pub fn is_put_together(recording: &Recording) -> bool {
 }
 
 /// Places by topic, from the attachment `scene.toml` (`effects.imu.sensors`: `on`, `name`, `place_m`, `mounting_roll_pitch_yaw_deg`; of all of them
-/// `accel_bias_sd_m_per_s2`, `scale_error_sd`).
+/// `accel_bias_sd_m_per_s2`, `scale_error_sd`, `misalignment_sd_deg`).
 ///
 /// Empty where there is no such attachment or it cannot be read; sensors then count as levelled and at the centre of mass.
 pub fn places(recording: &Recording) -> HashMap<String, Place> {
@@ -82,6 +87,8 @@ fn from_scene(text: &str) -> HashMap<String, Place> {
     let of_all = |key: &str| imu.and_then(|i| i.get(key)).and_then(number).unwrap_or(0.0);
     let accel_bias_m_per_s2 = of_all("accel_bias_sd_m_per_s2");
     let gyro_scale_error = of_all("scale_error_sd");
+    // Both triads are askew, each on its own.
+    let mounting_error_rad = SQRT_2 * of_all("misalignment_sd_deg").to_radians();
     let sensors = imu
         .and_then(|i| i.get("sensors"))
         .and_then(|s| s.as_array());
@@ -108,6 +115,7 @@ fn from_scene(text: &str) -> HashMap<String, Place> {
             body_from_sensor: Some(UnitQuaternion::from_euler_angles(roll, pitch, yaw)),
             accel_bias_m_per_s2: Some(accel_bias_m_per_s2),
             gyro_scale_error: Some(gyro_scale_error),
+            mounting_error_rad: Some(mounting_error_rad),
         };
         out.entry(format!("/imu/{name}")).or_insert(place);
     }
@@ -132,16 +140,21 @@ mod tests {
             let said = Sensors {
                 accel_bias_m_per_s2: said,
                 gyro_scale_error: said,
+                mounting_error_deg: said.map(f64::to_degrees),
                 ..nothing
             };
             let place = from_scene(text).get("/imu/rath").copied();
             let budget = place.unwrap_or_default().or_as_said(&said).budget;
-            [budget.accel_bias_m_per_s2, budget.gyro_scale_error]
+            [
+                budget.accel_bias_m_per_s2,
+                budget.gyro_scale_error,
+                budget.mounting_error_rad,
+            ]
         };
         let scene = "[effects.imu]\naccel_bias_sd_m_per_s2 = 0.02\nscale_error_sd = 0.01\n[[effects.imu.sensors]]\n";
-        assert_eq!(errors(scene, None), [Some(0.02), Some(0.01)]);
-        assert_eq!(errors(scene, Some(0.1)), [Some(0.1); 2]);
-        assert_eq!(errors("", None), [None; 2]);
+        assert_eq!(errors(scene, None), [Some(0.02), Some(0.01), Some(0.0)]);
+        assert_eq!(errors(scene, Some(0.125)), [Some(0.125); 3]);
+        assert_eq!(errors("", None), [None; 3]);
         assert!(from_scene("no toml [").is_empty());
     }
 }

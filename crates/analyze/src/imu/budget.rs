@@ -8,6 +8,10 @@ pub const UNCALIBRATED_M_PER_S2: f64 = 0.1;
 /// "sensitivity tolerance"; ±0.4 to ±0.5 % of the BMI270 and ICM-42688-P), read as two of them; older ones ±3 % (MPU-6050, MPU-9250).
 pub const UNCALIBRATED_GYRO_SCALE: f64 = 0.005;
 
+/// How far a sensor's axes may stand otherwise on the load than they are taken to, rad (one standard deviation), where nobody measured it: 1°, a case that
+/// was laid along a pole by eye, with its edges as they are.
+pub const BY_EYE_RAD: f64 = std::f64::consts::PI / 180.0;
+
 /// What the sensor and the method leave uncertain, one standard deviation each.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Budget {
@@ -16,6 +20,9 @@ pub struct Budget {
     pub accel_bias_m_per_s2: Option<f64>,
     /// Scale error of each axis of the gyroscope, relative, where that is known; else [`UNCALIBRATED_GYRO_SCALE`].
     pub gyro_scale_error: Option<f64>,
+    /// About each axis, by how much the sensor stands otherwise on the load, rad, where that is known; else [`BY_EYE_RAD`]. Turned about the vertical it takes
+    /// a part of the roll for pitch and the reverse; about the others it tilts what stands on a known mounting.
+    pub mounting_error_rad: Option<f64>,
     /// Roll and pitch: what a bias walks besides, and the method, rad.
     pub tilt_offset_rad: f64,
     /// Roll and pitch: part that wanders over seconds, rad.
@@ -42,6 +49,7 @@ impl Default for Budget {
         Self {
             accel_bias_m_per_s2: None,
             gyro_scale_error: None,
+            mounting_error_rad: None,
             tilt_offset_rad: 0.11f64.to_radians(),
             tilt_wander_rad: 0.05f64.to_radians(),
             // 0.003 m/s³/√Hz (ADIS16448, as Burri et al. 2016 give it for the EuRoC recordings) over g.

@@ -4,7 +4,7 @@
 //! at the paper's 30 Hz with a random phase; the metric's spread over the draws is its standard error, 1.96 of which are given. Where short holes were
 //! drawn through, what as many holes again would change counts as one more.
 
-use super::budget::{Budget, UNCALIBRATED_GYRO_SCALE, UNCALIBRATED_M_PER_S2};
+use super::budget::{BY_EYE_RAD, Budget, UNCALIBRATED_GYRO_SCALE, UNCALIBRATED_M_PER_S2};
 use super::floating::floating;
 use super::rath::{Motion, Mounting};
 use super::track::Instrument;
@@ -154,13 +154,17 @@ pub fn metrics(motion: &Motion, window: Window) -> Metrics {
         // About the estimate, not about the draws' mean: what the draws add on average is theirs.
         if MEAN_SQUARES.contains(name) {
             let (root, ci95) = without_noise(x, &drawn);
-            let angle = match *name {
-                "rms_roll_deg" => &motion.inputs.roll_rad[range.clone()],
-                _ => &motion.inputs.pitch_rad[range.clone()],
-            };
+            let (roll, pitch) = (&motion.inputs.roll_rad, &motion.inputs.pitch_rad);
+            let [angle, other] = match *name {
+                "rms_roll_deg" => [roll, pitch],
+                _ => [pitch, roll],
+            }
+            .map(|x| &x[range.clone()]);
             let mean_deg = angle.iter().sum::<f64>().to_degrees() / angle.len() as f64;
             value.datum = Datum::Number(root);
             let ends = tilted(root, ci95, mean_deg, 1.96 * tilt_rad.to_degrees());
+            let most = 1.96 * mounting_error_rad(&motion.settings.budget);
+            let ends = mixed(root, ends, angle, other, most);
             // Of what is left out nothing is known but how the rest varies.
             let square = root.to_radians().powi(2);
             let rest = (square + unseen * spread_of_parts(angle, lost)).sqrt() - square.sqrt();
@@ -388,14 +392,24 @@ fn uncalibrated(motion: &Motion) -> Option<String> {
         "as if nobody had calibrated the gyroscope (a scale off by {} %, SD); gyro_scale_error in a roles file says otherwise",
         100.0 * UNCALIBRATED_GYRO_SCALE
     ));
-    let both: Vec<String> = mounting.into_iter().chain(scale).collect();
-    (!both.is_empty()).then(|| both.join("; "))
+    let placed = budget.mounting_error_rad.is_none().then(|| format!(
+        "as if it was mounted by eye ({:.0}° off about each axis, SD); imu_mounting_error_deg in a roles file says otherwise",
+        BY_EYE_RAD.to_degrees()
+    ));
+    let all: Vec<String> = mounting.into_iter().chain(scale).chain(placed).collect();
+    (!all.is_empty()).then(|| all.join("; "))
 }
 
-/// By how much such a bias tilts up for good, rad (one standard deviation).
+/// How far the sensor may stand otherwise on the load, rad (one standard deviation): as said, or by eye.
+fn mounting_error_rad(budget: &Budget) -> f64 {
+    budget.mounting_error_rad.unwrap_or(BY_EYE_RAD)
+}
+
+/// By how much such a bias, and such a mounting, tilts up for good, rad (one standard deviation).
 fn constant_tilt_rad(motion: &Motion) -> f64 {
     match motion.settings.mounting {
-        Mounting::Known(_) => accel_bias_m_per_s2(motion) / motion.settings.gravity_m_per_s2,
+        Mounting::Known(_) => (accel_bias_m_per_s2(motion) / motion.settings.gravity_m_per_s2)
+            .hypot(mounting_error_rad(&motion.settings.budget)),
         // What is up is found with the same bias.
         Mounting::Levelled => 0.0,
     }
@@ -413,6 +427,27 @@ fn tilted(root: f64, [low, high]: [f64; 2], mean: f64, most: f64) -> [f64; 2] {
     let down = mean * mean - (mean - most).max(0.0).powi(2);
     let up = (mean + most).powi(2) - mean * mean;
     let low = square - (square - low * low).hypot(down);
+    let high = square + (high * high - square).hypot(up);
+    [low.max(0.0).sqrt(), high.sqrt()]
+}
+
+/// The interval of the root mean square of an angle x whose sensor may be turned about the vertical by up to `most` (rad) each way, so that a part of the
+/// other angle y is taken for it:
+///
+/// ```text
+/// x' = x − ε y,    ⟨x'²⟩ − ⟨x²⟩ = ε² ⟨y²⟩ − 2 ε ⟨x y⟩        |ε| ≤ most
+/// ```
+/// Small angles; of ε the least and the most count. What may be y's is a known part of the square, and so is a lean ([`tilted`]): both may
+/// have to go, so that downwards they add up; upwards errors add by squares.
+fn mixed(root: f64, [low, high]: [f64; 2], x: &[f64], y: &[f64], most: f64) -> [f64; 2] {
+    let count = x.len() as f64;
+    let of_y = y.iter().map(|y| y * y).sum::<f64>() / count;
+    let of_both = x.iter().zip(y).map(|(x, y)| x * y).sum::<f64>() / count;
+    let change = |e: f64| (e * e * of_y - 2.0 * e * of_both) * 1f64.to_degrees().powi(2);
+    let least = (of_both / of_y.max(f64::MIN_POSITIVE)).clamp(-most, most);
+    let (down, up) = (-change(least), change(most).max(change(-most)));
+    let square = root * root;
+    let low = low * low - down;
     let high = square + (high * high - square).hypot(up);
     [low.max(0.0).sqrt(), high.sqrt()]
 }
