@@ -17,8 +17,8 @@
 //! | [`floating`] | for what part of the time it is there |
 //! | [`saturation`] | where a sensor came to the end of its range |
 //! | [`gravity`] | how well rates keep gravity where it is |
-//! | [`unit`] | whether a gyroscope's unit is another than it is said to be |
-//! | [`bias`] | a gyroscope that is far off |
+//! | [`mod@unit`] | whether a gyroscope's unit is another than it is said to be |
+//! | [`mod@bias`] | a gyroscope that is far off |
 //! | [`axes`] | whether a gyroscope stands on its accelerometer's axes |
 //! | [`frozen`] | where a sensor stands still in moving hands |
 //! | [`turned`] | whether a sensor slipped in its mounting |
@@ -30,7 +30,7 @@ pub mod bridge;
 pub mod budget;
 pub mod floating;
 pub mod frozen;
-mod gravity;
+pub mod gravity;
 pub mod interval;
 pub mod orientation;
 pub mod rath;
