@@ -57,16 +57,13 @@ fn contact(inputs: &Inputs, out: &mut Vec<Event>) {
         return;
     }
     let t_s = inputs.force_times();
-    let begin: Vec<usize> = stretches(t_s, 0.0).iter().map(|s| s.start).collect();
-    for (handle, force) in inputs.normal_n.iter().enumerate() {
+    let parts = stretches(t_s, 0.0);
+    let handles = inputs.normal_n.iter().enumerate();
+    for (handle, force, part) in handles.flat_map(|(i, n)| parts.iter().map(move |p| (i, n, p))) {
         let mut held: Option<bool> = None;
-        for (k, (t_s, n)) in t_s.iter().zip(force).enumerate() {
-            if begin.binary_search(&k).is_ok() {
-                held = None;
-            }
-            if !n.is_finite() {
-                continue;
-            }
+        let all = t_s.iter().zip(force);
+        let samples = all.skip(part.start).take(part.len());
+        for (t_s, n) in samples.filter(|(_, n)| n.is_finite()) {
             let holds = *n > 0.0;
             if held.is_some_and(|h| h != holds) {
                 let number = handle + 1;

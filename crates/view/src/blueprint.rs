@@ -3,6 +3,7 @@
 //! The SDK's own builder has no axes, eye or visible range, and numbers views at random.
 
 use std::collections::BTreeMap;
+use std::hash::{DefaultHasher, Hash, Hasher};
 
 use re_log_types::EntityPath;
 use re_sdk_types::blueprint::{archetypes as a, components as c, datatypes as d};
@@ -263,13 +264,12 @@ impl Writer<'_> {
     /// The id of the next node of a kind. The viewer keeps what it knows of a view under its id, also when another layout follows: there the same id has to be
     /// of a view of the same class, and where its origin is the same, the user's zoom stays.
     fn id(&mut self, kind: &[&str]) -> Uuid {
-        // FNV-1a, 64 bits; the version bits of UUID are left as they are.
-        let bytes = kind.iter().flat_map(|word| word.bytes().chain([0]));
-        let hash = bytes.fold(0xcbf2_9ce4_8422_2325_u64, |hash, byte| {
-            (hash ^ u64::from(byte)).wrapping_mul(0x0100_0000_01b3)
-        });
+        let mut hasher = DefaultHasher::new();
+        kind.hash(&mut hasher);
+        let hash = hasher.finish();
         let nodes = self.nodes.entry(hash).or_default();
         *nodes += 1;
+        // The version bits of UUID are left as they are.
         Uuid::from_u64_pair(hash, *nodes)
     }
 

@@ -337,10 +337,8 @@ fn show(file: &Path, kind: Kind, asked: &Request) -> anyhow::Result<Vec<Finding>
         Ok(findings)
     });
     let is_gone = |error: &anyhow::Error| {
-        let io = error
-            .chain()
-            .filter_map(|c| c.downcast_ref::<std::io::Error>());
-        io.into_iter().any(|e| e.kind() == ErrorKind::BrokenPipe)
+        let mut io = error.chain().filter_map(|c| c.downcast_ref());
+        io.any(|e: &std::io::Error| e.kind() == ErrorKind::BrokenPipe)
     };
     if sent.as_ref().is_err_and(is_gone) {
         let status = child.wait()?;

@@ -3,11 +3,11 @@
 mod common;
 
 use analyze::examine::Request;
-use common::{ROWS, imus, imus_logged, run, run_logged, taken};
+use common::{ROWS, imus, imus_logged, json_channel, run, run_logged, taken};
 use recording::cdr::Imu;
 use recording::read::Recording;
 use recording::topics::MessageKind;
-use recording::write::{ChannelId, RawChannel, RecordingWriter, WriterOptions};
+use recording::write::{RecordingWriter, WriterOptions};
 use view::load::{Detail, load, options};
 
 #[test]
@@ -280,23 +280,6 @@ fn a_sensor_without_a_rate_is_named_too() {
     let (_, titles) = taken(&path);
     let named = |title: &String| title.starts_with("/imu/s0 specific force");
     assert!(titles.iter().any(named), "{titles:?}");
-}
-
-/// A channel of JSON messages without a schema, or with an empty one of this name.
-fn json_channel(writer: &mut RecordingWriter, topic: &str, schema_name: &str) -> ChannelId {
-    let schema: (&str, &[u8]) = match schema_name {
-        "" => ("", b""),
-        _ => ("jsonschema", b"{\"type\":\"object\"}"),
-    };
-    let channel = RawChannel {
-        topic,
-        message_encoding: "json",
-        schema_name,
-        schema_encoding: schema.0,
-        schema_data: schema.1,
-        metadata: &Default::default(),
-    };
-    writer.raw_channel(&channel).unwrap()
 }
 
 #[test]

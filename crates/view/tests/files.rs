@@ -2,16 +2,15 @@
 
 mod common;
 
-use std::collections::BTreeMap;
 use std::process::Command;
 
 use analyze::examine::Request;
 use recording::read::Recording;
-use recording::write::{RawChannel, RecordingWriter, WriterOptions};
+use recording::write::{RecordingWriter, WriterOptions};
 use view::load::{Detail, load, options};
 use view::store::Encoded;
 
-use common::{ROWS, Taken, imus, rerun, run, taken, view};
+use common::{ROWS, Taken, imus, json_channel, rerun, run, taken, view};
 
 #[test]
 fn the_same_recording_gives_the_same_bytes() {
@@ -43,15 +42,7 @@ fn no_option_is_named_that_view_does_not_have() {
     let folder = tempfile::tempdir().unwrap();
     let mcap = folder.path().join("long.mcap");
     let mut writer = RecordingWriter::create(&mcap, &WriterOptions::default()).unwrap();
-    let raw = RawChannel {
-        topic: "/big",
-        message_encoding: "json",
-        schema_name: "",
-        schema_encoding: "",
-        schema_data: &[],
-        metadata: &BTreeMap::new(),
-    };
-    let big = writer.raw_channel(&raw).unwrap();
+    let big = json_channel(&mut writer, "/big", "");
     for t_ns in [0, 1] {
         let list = format!("{{\"a\":{:?}}}", vec![1.5; 5000]);
         writer.message(big, t_ns, list.as_bytes()).unwrap();
@@ -357,15 +348,7 @@ fn a_roles_file_and_a_window_hold_for_the_pictures() {
     let folder = tempfile::tempdir().unwrap();
     let [mcap, toml, rrd] = ["own.mcap", "roles.toml", "own.rrd"].map(|n| folder.path().join(n));
     let mut writer = RecordingWriter::create(&mcap, &WriterOptions::default()).unwrap();
-    let raw = RawChannel {
-        topic: "/load",
-        message_encoding: "json",
-        schema_name: "",
-        schema_encoding: "",
-        schema_data: &[],
-        metadata: &BTreeMap::new(),
-    };
-    let own = writer.raw_channel(&raw).unwrap();
+    let own = json_channel(&mut writer, "/load", "");
     for k in 0..600_u32 {
         let angle = 0.2 * (0.3 * f64::from(k)).sin();
         let text = format!("{{\"items\":[{{\"name\":\"lean\",\"value\":{angle}}}]}}");

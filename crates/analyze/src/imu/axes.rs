@@ -7,26 +7,13 @@
 //! one axis alone leaves several P alike: then the one nearest to the axes as read is named.
 
 use super::Track;
-use super::gravity::{Block, Fit, Known, mean_rate, windows};
+use super::gravity::{Block, FEWEST, Fit, Known, WANDERS_M_PER_S2, WINDOW_S, windows};
 use nalgebra::{Matrix3, Vector3};
 
-const WINDOW_S: f64 = 4.0;
-/// Only windows in which it turns faster than this count, rad/s RMS, and so many of them.
+/// Only windows in which it turns faster than this count, rad/s RMS.
 const TURNS_RAD_PER_S: f64 = 0.1;
-const FEWEST: usize = 3;
-/// Gravity that wanders by less than this is as it should be, m/s² RMS: 2°, more than an uncalibrated sensor and a first step make.
-const WANDERS_M_PER_S2: f64 = 0.4;
-/// So many times better have other axes to fit, on the whole, and better at all in this share of the windows.
-const TIMES: f64 = 3.0;
-const MOSTLY: f64 = 0.75;
 /// Within this factor two ways fit alike.
 const ALIKE: f64 = 1.3;
-/// No bias is known beforehand.
-const ANY: Known = Known {
-    around: Vector3::new(0.0, 0.0, 0.0),
-    sd: 0.1,
-};
-
 /// Axes that do not agree.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Misfit {
@@ -68,17 +55,12 @@ pub fn misfit(track: &Track, gravity_m_per_s2: f64) -> Option<Misfit> {
     if windows.len() < FEWEST {
         return None;
     }
-    let still = Vector3::zeros();
-    let of = |axes: &Matrix3<f64>, bias| Fit::of(&windows, axes, bias, ANY, gravity_m_per_s2);
-    if of(&Matrix3::identity(), still).rms() < WANDERS_M_PER_S2 {
+    let g = gravity_m_per_s2;
+    let (as_read, still) = (Matrix3::identity(), Vector3::zeros());
+    if Fit::of(&windows, &as_read, still, Known::ANY, g).rms() < WANDERS_M_PER_S2 {
         return None;
     }
-    // A large bias is not found from none: what hardly turns shows it as its mean.
-    let mean = mean_rate(&windows);
-    let fit = |axes: &Matrix3<f64>| {
-        let [a, b] = [still, axes * mean].map(|bias| of(axes, bias));
-        if a.rms() < b.rms() { a } else { b }
-    };
+    let fit = |axes: &Matrix3<f64>| Fit::best(&windows, axes, Known::ANY, g);
     let fits: Vec<(Matrix3<f64>, Fit)> = signed_permutations()
         .map(|axes| (axes, fit(&axes)))
         .collect();
@@ -88,9 +70,7 @@ pub fn misfit(track: &Track, gravity_m_per_s2: f64) -> Option<Misfit> {
     // Axes that stay come first, then signs.
     let kept = |axes: &Matrix3<f64>| 8.0 * axes.trace() + axes.sum();
     let (axes, fit) = alike().max_by(|a, b| kept(&a.0).total_cmp(&kept(&b.0)))?;
-    let each = fit.squares.iter().zip(&as_read.squares);
-    let better = each.filter(|(fit, as_read)| fit < as_read).count();
-    if as_read.rms() < TIMES * fit.rms() || (better as f64) < MOSTLY * windows.len() as f64 {
+    if !fit.refutes(as_read) {
         return None;
     }
     Some(Misfit {

@@ -5,13 +5,12 @@
 //! the vertical by no more than a turn on the whole. The orientation filter follows what is left, but for itself it believes no more than 2°/s.
 
 use super::Track;
-use super::gravity::{Fit, Known, mean_rate, windows};
+use super::gravity::{FEWEST, Fit, Known, WINDOW_S, mean_rate, windows};
 use nalgebra::{Matrix3, Vector3};
 use std::f64::consts::TAU;
 
-/// Windows, s, one round of fits after the other; of each at least so many.
-const WINDOWS_S: [f64; 2] = [4.0, 16.0];
-const FEWEST: usize = 3;
+/// Windows, s, one round of fits after the other.
+const WINDOWS_S: [f64; 2] = [WINDOW_S, 16.0];
 /// Less than this across gravity the filter finds by itself, rad/s; and it has to be so many standard deviations.
 const LEAST_RAD_PER_S: f64 = 0.5 * TAU / 360.0;
 const SURE: f64 = 5.0;
@@ -67,16 +66,10 @@ pub fn far_off(track: &Track, gravity_m_per_s2: f64) -> Option<FarOff> {
             around: mean * w_mean / (w + w_mean),
             sd: (w + w_mean).powf(-0.5),
         };
-        let from = |bias| {
-            let axes = Matrix3::identity();
-            Fit::of(&windows, &axes, bias, known, gravity_m_per_s2)
-        };
+        let (axes, g) = (Matrix3::identity(), gravity_m_per_s2);
         found = Some(match &found {
-            Some(fit) => from(fit.bias),
-            None => [Vector3::zeros(), mean]
-                .map(from)
-                .into_iter()
-                .min_by(|a, b| a.rms().total_cmp(&b.rms()))?,
+            Some(fit) => Fit::of(&windows, &axes, fit.bias, known, g),
+            None => Fit::best(&windows, &axes, known, g),
         });
     }
     let Fit { bias, sure, .. } = found?;

@@ -16,6 +16,14 @@ const BLOCK_S: f64 = 0.04;
 /// Standard deviation of a window's residual, m/s².
 const RESIDUAL_M_PER_S2: f64 = 0.2;
 const ROUNDS: usize = 3;
+/// How long windows are that tell whether rates are right, s, and how many of them it takes.
+pub(super) const WINDOW_S: f64 = 4.0;
+pub(super) const FEWEST: usize = 3;
+/// Gravity that wanders by less than this is as it should be, m/s² RMS: 2°, more than an uncalibrated sensor and a first step make.
+pub(super) const WANDERS_M_PER_S2: f64 = 0.4;
+/// So many times better have other rates to fit, on the whole, and better at all in this share of the windows.
+const TIMES: f64 = 3.0;
+const MOSTLY: f64 = 0.75;
 
 /// Mean of some samples.
 pub(super) struct Block {
@@ -76,6 +84,14 @@ pub(super) struct Known {
     pub sd: f64,
 }
 
+impl Known {
+    /// No bias is known.
+    pub const ANY: Self = Self {
+        around: Vector3::new(0.0, 0.0, 0.0),
+        sd: 0.1,
+    };
+}
+
 /// How well a way to read the axes fits, with the bias that fits best.
 pub(super) struct Fit {
     /// b, rad/s.
@@ -124,6 +140,25 @@ impl Fit {
             sure,
             squares,
         }
+    }
+
+    /// The better of two: from no bias on, and from the mean rate as one. A large bias is not found from none: what hardly turns shows it as its mean.
+    pub fn best(
+        windows: &[Vec<Block>],
+        axes: &Matrix3<f64>,
+        known: Known,
+        gravity_m_per_s2: f64,
+    ) -> Self {
+        let from = |bias| Self::of(windows, axes, bias, known, gravity_m_per_s2);
+        let [none, mean] = [Vector3::zeros(), axes * mean_rate(windows)].map(from);
+        if none.rms() < mean.rms() { none } else { mean }
+    }
+
+    /// Whether it fits the same windows so much better than `other` that this one is wrong.
+    pub fn refutes(&self, other: &Self) -> bool {
+        let each = self.squares.iter().zip(&other.squares);
+        let better = each.filter(|(own, other)| own < other).count();
+        other.rms() >= TIMES * self.rms() && better as f64 >= MOSTLY * self.squares.len() as f64
     }
 
     /// Root of the mean of the squares, m/s².

@@ -5,18 +5,8 @@
 //! as a free pendulum about its pivot feels no sideways force, so that rates read too small fit it as well.
 
 use super::Track;
-use super::gravity::{Fit, Known, mean_rate, windows};
-use nalgebra::{Matrix3, Vector3};
-
-const WINDOW_S: f64 = 4.0;
-const FEWEST: usize = 3;
-/// Gravity that wanders by less than this is as it should be, m/s² RMS.
-const WANDERS_M_PER_S2: f64 = 0.4;
-/// So many times better has another unit to fit, on the whole, and better at all in this share of the windows.
-const TIMES: f64 = 3.0;
-const MOSTLY: f64 = 0.75;
-/// Of a bias, in the unit that is tried.
-const BIAS_RAD_PER_S: f64 = 0.1;
+use super::gravity::{FEWEST, Fit, Known, WANDERS_M_PER_S2, WINDOW_S, windows};
+use nalgebra::Matrix3;
 
 /// A unit that does not fit.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -49,17 +39,9 @@ pub fn other_unit(track: &Track, gravity_m_per_s2: f64) -> Option<OtherUnit> {
     if windows.len() < FEWEST {
         return None;
     }
-    let mean = mean_rate(&windows);
-    let known = Known {
-        around: Vector3::zeros(),
-        sd: BIAS_RAD_PER_S,
-    };
-    // A large bias is not found from none: what hardly turns shows it as its mean.
     let fit = |factor: f64| {
         let axes = Matrix3::from_diagonal_element(factor);
-        let [a, b] = [Vector3::zeros(), axes * mean]
-            .map(|bias| Fit::of(&windows, &axes, bias, known, gravity_m_per_s2));
-        if a.rms() < b.rms() { a } else { b }
+        Fit::best(&windows, &axes, Known::ANY, gravity_m_per_s2)
     };
     let as_read = fit(1.0);
     if as_read.rms() < WANDERS_M_PER_S2 {
@@ -68,10 +50,7 @@ pub fn other_unit(track: &Track, gravity_m_per_s2: f64) -> Option<OtherUnit> {
     let factors = [1f64.to_radians(), 1f64.to_degrees()];
     let fits = factors.map(|factor| (factor, fit(factor)));
     let (factor, fit) = (fits.iter()).min_by(|(_, a), (_, b)| a.rms().total_cmp(&b.rms()))?;
-    let each = fit.squares.iter().zip(&as_read.squares);
-    let better = each.filter(|(fit, as_read)| fit < as_read).count() as f64;
-    let fits = as_read.rms() >= TIMES * fit.rms() && better >= MOSTLY * windows.len() as f64;
-    fits.then(|| OtherUnit {
+    fit.refutes(&as_read).then(|| OtherUnit {
         factor: *factor,
         wanders_m_per_s2: as_read.rms(),
         fits_m_per_s2: fit.rms(),
@@ -82,7 +61,7 @@ pub fn other_unit(track: &Track, gravity_m_per_s2: f64) -> Option<OtherUnit> {
 mod tests {
     use super::*;
     use crate::random::Random;
-    use nalgebra::UnitQuaternion;
+    use nalgebra::{UnitQuaternion, Vector3};
     use std::f64::consts::{SQRT_2, TAU};
 
     const G: f64 = 9.80665;

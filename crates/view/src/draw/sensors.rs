@@ -188,9 +188,10 @@ fn topic(store: &mut Store<'_>, topic: &take::Topic, growing: bool) -> anyhow::R
             .iter()
             .map(|l| format!("{path}/{}", l.entity))
             .collect();
-        let shown = match names.len() {
-            0..=NAMED => names.join(", "),
-            n => format!("{n} fields"),
+        let named = names.len() <= NAMED;
+        let shown = match named {
+            true => names.join(", "),
+            false => format!("{} fields", names.len()),
         };
         let unit = if unit.is_empty() {
             String::new()
@@ -200,10 +201,7 @@ fn topic(store: &mut Store<'_>, topic: &take::Topic, growing: bool) -> anyhow::R
         let title = format!("{}: {shown}{unit}", topic.name);
         let range = spread(&made, growing);
         let view = plot(store, title, &path, made, range)?.contents(paths);
-        plots.push(match names.len() {
-            0..=NAMED => view,
-            _ => view.legend(),
-        });
+        plots.push(if named { view } else { view.legend() });
     }
     Ok(Panel {
         name: topic.name.clone(),

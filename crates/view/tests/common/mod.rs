@@ -12,7 +12,7 @@ use recording::cdr::{Header, Imu, Quaternion, TfMessage, Time, Transform, Transf
 use recording::read::Recording;
 use recording::schema::rath;
 use recording::topics::{self, MessageKind};
-use recording::write::{RecordingWriter, WriterOptions};
+use recording::write::{ChannelId, RawChannel, RecordingWriter, WriterOptions};
 use view::load::{Detail, load, options};
 use view::store::Sink;
 
@@ -287,4 +287,21 @@ pub fn rerun() -> Option<PathBuf> {
             None
         }
     }
+}
+
+/// A channel of JSON messages without a schema, or with an empty one of this name.
+pub fn json_channel(writer: &mut RecordingWriter, topic: &str, schema_name: &str) -> ChannelId {
+    let schema: (&str, &[u8]) = match schema_name {
+        "" => ("", b""),
+        _ => ("jsonschema", b"{\"type\":\"object\"}"),
+    };
+    let channel = RawChannel {
+        topic,
+        message_encoding: "json",
+        schema_name,
+        schema_encoding: schema.0,
+        schema_data: schema.1,
+        metadata: &Default::default(),
+    };
+    writer.raw_channel(&channel).unwrap()
 }
