@@ -2440,3 +2440,61 @@ fn carriers_of_an_unknown_type_are_told_with_their_remedy() {
     let named = with_roles(folder.path(), &file, &roles);
     assert!(!kinds(&named).contains(&"unknown_type".to_owned()));
 }
+
+#[test]
+fn the_parts_of_a_bag_are_merged() {
+    let folder = tempfile::tempdir().unwrap();
+    std::fs::create_dir(folder.path().join("bag")).unwrap();
+    let path = |name: &str| folder.path().join(name).to_str().unwrap().to_owned();
+    for part in 0..3 {
+        let file = path(&format!("bag/bag_{part}.mcap"));
+        let mut w = RecordingWriter::create(Path::new(&file), &WriterOptions::default()).unwrap();
+        let x = w.channel("/x", MessageKind::Float64).unwrap();
+        for k in 0..1000 {
+            let tick = 1000 * part + k;
+            let data = (0.02 * tick as f64).sin();
+            w.message(x, tick * 10_000_000, &Float64 { data }).unwrap();
+        }
+        w.finish().unwrap();
+    }
+    let bag = path("bag");
+    let told = analyze(&[&bag]);
+    assert_eq!(told.status.code(), Some(1));
+    let advice =
+        format!("`analyze merge {bag} --out FILE.mcap` makes one recording of the 3 in it");
+    assert!(
+        text(&told.stderr).contains(&advice),
+        "{}",
+        text(&told.stderr)
+    );
+
+    let whole = path("whole.mcap");
+    let refused = analyze(&["merge", &bag, "--out", &path("bag/bag_0.mcap")]);
+    assert_eq!(refused.status.code(), Some(2), "it lies in the folder");
+    let merged = analyze(&["merge", &bag, "--out", &whole]);
+    let said = text(&merged.stderr);
+    assert_eq!(
+        said,
+        format!("analyze: {whole} written: 3000 messages of 3 recordings\n")
+    );
+    assert!(merged.status.success());
+    let found = json(&[&whole, "--signal", "/x.data", "--format", "json"]);
+    assert_eq!(found["recording"]["messages"], 3000);
+    assert!(
+        found["quality"].as_array().unwrap().is_empty(),
+        "no hole, nothing late"
+    );
+    let piped = analyze(&["merge", &bag, "--out", "-"]);
+    assert!(piped.stdout == std::fs::read(&whole).unwrap());
+
+    let last = path("bag/bag_2.mcap");
+    let bytes = std::fs::read(&last).unwrap();
+    std::fs::write(&last, &bytes[..bytes.len() / 2]).unwrap();
+    let merged = analyze(&["merge", &bag, "--out", &whole]);
+    assert_eq!(merged.status.code(), Some(3));
+    assert!(
+        text(&merged.stderr).contains("bag_2.mcap: "),
+        "{}",
+        text(&merged.stderr)
+    );
+}

@@ -3,13 +3,14 @@
 //!
 //! * [`mod@write`] makes a recording: [`write::RecordingWriter`], the topics in [`topics`], the messages in [`schema`] and [`cdr`].
 //! * [`read`] opens any MCAP: [`read::Recording`] gives what is in it, its numbers as [`Signal`]s, and every oddity as a [`Finding`].
-//! * [`mod@import`] turns logs of other formats into recordings.
+//! * [`mod@import`] turns logs of other formats into recordings, [`merge`] several recordings into one.
 
 pub mod cdr;
 pub mod finding;
 mod foreign;
 pub mod import;
 pub mod load;
+pub mod merge;
 pub mod read;
 pub mod schema;
 pub mod signal;

@@ -709,19 +709,29 @@ fn what_is_no_recording_is_refused_in_a_sentence() {
         .expect_err("refused")
         .to_string();
     assert_eq!(error, ".: cannot be read: it is a folder");
-    // As ROS 2 leaves a bag.
+    // As ROS 2 leaves a bag, cut or not.
     let bag = tempfile::tempdir().expect("a folder");
-    for name in ["bag_0.mcap", "bag_1.mcap", "metadata.yaml"] {
+    let told = |name: &str| {
         std::fs::write(bag.path().join(name), "").expect("writes");
-    }
-    let error = Recording::open(bag.path(), &options()).expect_err("refused");
-    let inside = |name| bag.path().join(name).display().to_string();
-    let expected = format!(
-        "give what is in it: {} {}",
-        inside("bag_0.mcap"),
-        inside("bag_1.mcap")
+        let error = Recording::open(bag.path(), &options()).expect_err("refused");
+        error.to_string()
+    };
+    let (bare, one, two) = (
+        told("metadata.yaml"),
+        told("bag_0.mcap"),
+        told("bag_1.mcap"),
     );
-    assert!(error.to_string().ends_with(&expected), "{error}");
+    assert!(bare.ends_with("it is a folder"), "{bare}");
+    let inside = bag.path().join("bag_0.mcap").display().to_string();
+    assert!(
+        one.ends_with(&format!("give what is in it: {inside}")),
+        "{one}"
+    );
+    let merge = format!(
+        "`analyze merge {} --out FILE.mcap` makes one recording of the 2 in it",
+        bag.path().display()
+    );
+    assert!(two.ends_with(&merge), "{two}");
 }
 
 /// A sound file but for its summary, which holds the records given.

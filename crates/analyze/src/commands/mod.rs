@@ -3,6 +3,7 @@
 mod analyze;
 mod annotate;
 mod ingest;
+mod merge;
 
 use std::io::Write;
 use std::path::PathBuf;
@@ -25,6 +26,7 @@ Examples:
   analyze run.mcap --figures pictures             the same plots as SVG and PNG
   analyze run.mcap --annotate seen.mcap           the recording with what was found, for any viewer
   analyze ingest logs.npz --out run.mcap          a log of another format becomes a recording
+  analyze merge bag/ --out whole.mcap             the parts of a split bag become one recording
   sim record --out - | analyze -                  from standard input
 
 Exit codes: 0 done; 1 it could not; 2 wrong usage; 3 done, but the input was damaged.";
@@ -43,6 +45,8 @@ struct Cli {
 enum Command {
     /// Turn logs of other formats into one recording
     Ingest(ingest::IngestArgs),
+    /// Put the parts of a recording together, or recordings of one time
+    Merge(merge::MergeArgs),
 }
 
 /// How the result is printed.
@@ -157,6 +161,7 @@ pub fn run() -> ExitCode {
     let cli = Cli::parse();
     let result = match &cli.command {
         Some(Command::Ingest(args)) => ingest::run(args),
+        Some(Command::Merge(args)) => merge::run(args),
         None => analyze::run(&cli.args),
     };
     match result {

@@ -18,6 +18,7 @@ mod json;
 mod layout;
 mod names;
 mod protobuf;
+mod raw;
 mod ros1;
 mod ros2msg;
 mod rows;
@@ -29,7 +30,7 @@ use std::{
     fs::File,
     io::Read,
     ops::Range,
-    path::Path,
+    path::{Path, PathBuf},
     sync::{
         Arc, Mutex, MutexGuard, PoisonError,
         atomic::{AtomicU64, Ordering},
@@ -43,7 +44,9 @@ use protobuf::Pools;
 
 pub use container::ends_whole;
 pub use decoders::supported;
-pub use stream::{Batch, Column, RawMessage};
+pub use raw::RawMessage;
+pub(crate) use raw::RawMessages;
+pub use stream::{Batch, Column};
 
 use crate::{Finding, Kind, Signal};
 
@@ -491,7 +494,16 @@ impl Recording {
         select: &dyn Fn(&str) -> bool,
         sink: &mut dyn FnMut(&RawMessage<'_>),
     ) -> Result<(), ReadError> {
-        stream::raw(self, select, sink)
+        let channels = &self.info.channels;
+        let wanted: Vec<bool> = channels.iter().map(|c| select(&c.topic)).collect();
+        let mut each = |message: &RawMessage<'_>| {
+            if wanted[message.channel] {
+                sink(message);
+            }
+        };
+        let mut messages = RawMessages::of(self);
+        while messages.give(&mut each) {}
+        Ok(())
     }
 
     fn damage(&self) -> &[Damage] {
@@ -499,24 +511,27 @@ impl Recording {
     }
 }
 
-/// That a folder is one, and which recordings are in it: a bag of ROS 2 is a folder of them.
-fn folder(path: &Path) -> String {
-    let entries = path.read_dir().into_iter().flatten().flatten();
-    let mut inside: Vec<String> = entries
+/// The recordings in a folder, not deeper, by name: a bag of ROS 2 is a folder of them.
+pub(crate) fn recordings_in(folder: &Path) -> Vec<PathBuf> {
+    let entries = folder.read_dir().into_iter().flatten().flatten();
+    let mut inside: Vec<PathBuf> = entries
         .map(|entry| entry.path())
         .filter(|path| path.extension().is_some_and(|end| end == "mcap"))
-        .map(|path| path.display().to_string())
         .collect();
     inside.sort();
-    let more = inside.len().saturating_sub(3);
-    inside.truncate(3);
-    match inside.is_empty() {
-        true => "it is a folder".to_owned(),
-        false if more > 0 => format!(
-            "it is a folder; give what is in it: {} and {more} more",
-            inside.join(" ")
+    inside
+}
+
+/// That a folder is one, and what to do with the recordings in it.
+fn folder(path: &Path) -> String {
+    match &recordings_in(path)[..] {
+        [] => "it is a folder".to_owned(),
+        [one] => format!("it is a folder; give what is in it: {}", one.display()),
+        several => format!(
+            "it is a folder; `analyze merge {} --out FILE.mcap` makes one recording of the {} in it",
+            path.display(),
+            several.len()
         ),
-        false => format!("it is a folder; give what is in it: {}", inside.join(" ")),
     }
 }
 

@@ -7,10 +7,9 @@ use std::{
 
 use super::{
     ReadError, Recording,
-    block::{BlockResult, ChannelBatch, Records, Worker},
-    chunk::{self, Unpacker},
+    block::{BlockResult, ChannelBatch, Worker},
     clock::{Clocks, Order, seconds, unset},
-    container::{Block, op},
+    container::Block,
     json::MAX_KEYS,
     names::Called,
     rows::{
@@ -50,23 +49,6 @@ pub struct Column<'a> {
     pub values: &'a [f64],
     /// Whether none of them is NaN or infinite.
     pub finite: bool,
-}
-
-/// A message as it is in the file.
-#[derive(Clone, Copy, Debug)]
-pub struct RawMessage<'a> {
-    /// Index into [`Info::channels`](super::Info::channels).
-    pub channel: usize,
-    /// Topic.
-    pub topic: &'a str,
-    /// Sequence number.
-    pub sequence: u32,
-    /// Log time, ns.
-    pub log_time_ns: i64,
-    /// Publish time as it stands there, ns.
-    pub publish_time_ns: u64,
-    /// The encoded message.
-    pub data: &'a [u8],
 }
 
 /// How far blocks may be ahead of the one that is taken: the bound on memory.
@@ -782,58 +764,6 @@ impl<'a> Taker<'a> {
 
 /// More troubles than this are counted, not listed.
 const MAX_TROUBLES: usize = 1000;
-
-/// Messages as they are.
-pub(super) fn raw(
-    recording: &Recording,
-    select: &dyn Fn(&str) -> bool,
-    sink: &mut dyn FnMut(&RawMessage<'_>),
-) -> Result<(), ReadError> {
-    let wanted: Vec<bool> = recording
-        .info
-        .channels
-        .iter()
-        .map(|channel| select(&channel.topic))
-        .collect();
-    let mut give = |bytes: &[u8]| {
-        for (opcode, body) in Records::new(bytes) {
-            let (true, Some((header, data))) =
-                (opcode == op::MESSAGE, body.split_first_chunk::<22>())
-            else {
-                continue;
-            };
-            let id = u16::from_le_bytes([header[0], header[1]]);
-            let Some(channel) = recording.by_id[usize::from(id)].filter(|&index| wanted[index])
-            else {
-                continue;
-            };
-            let time = |at: usize| u64::from_le_bytes(std::array::from_fn(|i| header[at + i]));
-            let Ok(log_time_ns) = i64::try_from(time(6)) else {
-                continue;
-            };
-            sink(&RawMessage {
-                channel,
-                topic: &recording.info.channels[channel].topic,
-                sequence: u32::from_le_bytes(std::array::from_fn(|i| header[2 + i])),
-                log_time_ns,
-                publish_time_ns: time(14),
-                data,
-            });
-        }
-    };
-    let mut unpacker = Unpacker::new();
-    for block in &recording.container.blocks {
-        // A damaged chunk is left out, as `stream` says it is.
-        chunk::records(
-            &recording.data,
-            block,
-            &recording.options,
-            &mut unpacker,
-            &mut give,
-        );
-    }
-    Ok(())
-}
 
 /// Items of one list, or one field, with values that are no numbers.
 struct Odd {

@@ -1,0 +1,74 @@
+//! `analyze merge FILE... --out FILE.mcap`
+
+use std::path::PathBuf;
+
+use clap::Args;
+use recording::merge::{MergeError, Parts, files};
+use recording::read::ReadOptions;
+use recording::text::counted;
+use recording::whole::{Output, may_write};
+use recording::write::{RecordingWriter, WriterOptions};
+
+use super::Done;
+
+const EXAMPLES: &str = "\
+Examples:
+  analyze merge bag_0.mcap bag_1.mcap --out whole.mcap   the parts that a recorder cut a bag into
+  analyze merge bag/ --out whole.mcap                    those in a folder, as ROS 2 leaves them
+  analyze merge robot.mcap phones.mcap --out both.mcap   two recorders at one time, by one clock
+  analyze merge bag/ --out - | analyze -                 nothing is kept
+
+Messages, metadata and attachments are taken over as they are, times too. Recordings that hold one topic at one time are refused: afterwards nothing could tell their messages apart.";
+
+#[derive(Args)]
+#[command(after_help = EXAMPLES)]
+pub(super) struct MergeArgs {
+    /// Recordings (MCAP), or folders of them, in any order
+    #[arg(required = true, value_name = "FILE|FOLDER")]
+    files: Vec<PathBuf>,
+    /// The recording to write; `-` is standard output
+    #[arg(short, long, value_name = "FILE.mcap")]
+    out: PathBuf,
+}
+
+pub(super) fn run(args: &MergeArgs) -> anyhow::Result<Done> {
+    match merge(args) {
+        Err(error) if matches!(error.downcast_ref(), Some(MergeError::Write(e)) if e.reader_left()) => {
+            Ok(Done::Well)
+        }
+        outcome => outcome,
+    }
+}
+
+fn merge(args: &MergeArgs) -> anyhow::Result<Done> {
+    let output = Output {
+        option: "--out",
+        path: &args.out,
+        endings: &["mcap"],
+    };
+    let files = files(&args.files)?;
+    may_write(&[output], files.iter().map(AsRef::as_ref))?;
+    let parts = Parts::open(&files, &ReadOptions::default())?;
+    let options = WriterOptions {
+        profile: parts.profile().to_owned(),
+        ..WriterOptions::default()
+    };
+    let mut writer = RecordingWriter::to(&args.out, &options).map_err(MergeError::Write)?;
+    let messages = parts.write(&mut writer)?;
+    writer.finish().map_err(MergeError::Write)?;
+    let losses: Vec<String> = parts.losses().collect();
+    for note in parts.notes().iter().chain(&losses) {
+        recording::note!("analyze: {note}");
+    }
+    let out = match args.out.as_os_str() == "-" {
+        true => "standard output".into(),
+        false => args.out.to_string_lossy(),
+    };
+    let messages = counted(messages, "message", "messages");
+    recording::note!("analyze: {out} written: {messages} of {parts}");
+    Ok(if losses.is_empty() {
+        Done::Well
+    } else {
+        Done::WithLoss
+    })
+}

@@ -1,0 +1,271 @@
+//! Several recordings put together into one: the parts that a recorder cut a bag into, or what several recorders took down of one walk.
+//!
+//! Everything is taken over as it is. Stretches of the files (chunks) come in the order of the times that they begin at, so that no more than
+//! one of each file is unpacked at a time.
+
+use std::path::{Path, PathBuf};
+
+use crate::{
+    Finding, Kind,
+    read::{RawMessages, ReadError, ReadOptions, Recording, recordings_in},
+    text::counted,
+    write::{RawChannel, RecordingWriter, WriteError},
+};
+
+/// A recorder may begin a part before the last one ends, by no more than this, ns.
+const MOST_OVERLAP_NS: i64 = 1_000_000_000;
+
+/// A longer pause between parts is remarked on, ns.
+const PAUSE_NS: i64 = 10_000_000_000;
+
+/// Why recordings could not be put together. No file is made or changed.
+#[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
+pub enum MergeError {
+    /// One of them cannot be read.
+    #[error(transparent)]
+    Read(#[from] ReadError),
+    /// A folder holds no recording.
+    #[error("{folder}: has no recording in it; expected files that end in .mcap")]
+    NoneInside {
+        /// The folder.
+        folder: String,
+    },
+    /// One of them is given twice.
+    #[error("{name}: is given twice; expected each recording once")]
+    Twice {
+        /// The file.
+        name: String,
+    },
+    /// Two have messages on one topic at one time, which could not be told apart afterwards.
+    #[error(
+        "{name}: holds {topic} at a time when {other} does, too (for {overlap_s:.1} s); expected parts of one recording one after the other, or \
+         recordings of different topics (`analyze {other} {name}` compares two)"
+    )]
+    Overlap {
+        /// The later one.
+        name: String,
+        /// The other one.
+        other: String,
+        /// The topic.
+        topic: String,
+        /// For how long, s.
+        overlap_s: f64,
+    },
+    /// The recording cannot be written.
+    #[error(transparent)]
+    Write(#[from] WriteError),
+}
+
+/// One of the recordings.
+struct Part {
+    name: String,
+    recording: Recording,
+    losses: Vec<Finding>,
+}
+
+impl Part {
+    fn open(path: &Path, options: &ReadOptions) -> Result<Self, ReadError> {
+        let mut recording = Recording::open(path, options)?;
+        let nothing = |_: &str| false;
+        let mut findings = recording.stream(&nothing, &mut |_| {})?;
+        if recording.contradicts_its_summary() {
+            recording = recording.searched();
+            findings = recording.stream(&nothing, &mut |_| {})?;
+        }
+        // Messages that nobody here can decode are taken over all the same.
+        let is_lost =
+            |kind: Kind| kind.is_loss() && !matches!(kind, Kind::Undecodable | Kind::BadSchema);
+        findings.retain(|finding| is_lost(finding.kind));
+        Ok(Part {
+            name: path.display().to_string(),
+            recording,
+            losses: findings,
+        })
+    }
+
+    /// Log times of the first and the last message, ns; `None` without any.
+    fn span_ns(&self) -> Option<(i64, i64)> {
+        let info = self.recording.info();
+        (info.messages > 0).then_some((info.earliest_ns, info.end_ns))
+    }
+
+    /// Topics with messages.
+    fn topics(&self) -> impl Iterator<Item = &str> {
+        let channels = self.recording.info().channels.iter();
+        let used = channels.filter(|channel| channel.messages > 0);
+        used.map(|channel| channel.topic.as_str())
+    }
+
+    /// A topic on which both have messages.
+    fn shares(&self, other: &Part) -> Option<&str> {
+        self.topics()
+            .find(|topic| other.topics().any(|t| t == *topic))
+    }
+}
+
+/// The files that are meant: of a folder, the recordings in it.
+pub fn files(paths: &[PathBuf]) -> Result<Vec<PathBuf>, MergeError> {
+    let mut files = Vec::new();
+    for path in paths {
+        if !path.is_dir() {
+            files.push(path.clone());
+            continue;
+        }
+        let inside = recordings_in(path);
+        if inside.is_empty() {
+            let folder = path.display().to_string();
+            return Err(MergeError::NoneInside { folder });
+        }
+        files.extend(inside);
+    }
+    Ok(files)
+}
+
+/// Recordings to be put together, in the order of time.
+pub struct Parts(Vec<Part>);
+
+impl Parts {
+    /// Opens recordings, reads each once for its damage, and sees that they fit together.
+    pub fn open(files: &[PathBuf], options: &ReadOptions) -> Result<Self, MergeError> {
+        let mut seen = Vec::new();
+        let mut parts = Vec::new();
+        for file in files {
+            let part = Part::open(file, options)?;
+            let place = file.canonicalize().unwrap_or_else(|_| file.clone());
+            if seen.contains(&place) {
+                return Err(MergeError::Twice { name: part.name });
+            }
+            seen.push(place);
+            parts.push(part);
+        }
+        // Those without a message come first, and say nothing about time.
+        parts.sort_by_key(Part::span_ns);
+        let parts = Parts(parts);
+        parts.fit()?;
+        Ok(parts)
+    }
+
+    fn fit(&self) -> Result<(), MergeError> {
+        for (k, part) in self.0.iter().enumerate() {
+            for other in &self.0[..k] {
+                let (Some(own), Some(before)) = (part.span_ns(), other.span_ns()) else {
+                    continue;
+                };
+                let overlap_ns = own.1.min(before.1) - own.0;
+                if overlap_ns <= MOST_OVERLAP_NS {
+                    continue;
+                }
+                if let Some(topic) = part.shares(other) {
+                    return Err(MergeError::Overlap {
+                        name: part.name.clone(),
+                        other: other.name.clone(),
+                        topic: topic.to_owned(),
+                        overlap_s: overlap_ns as f64 * 1e-9,
+                    });
+                }
+            }
+        }
+        Ok(())
+    }
+
+    /// The profile that all have; empty where they differ.
+    pub fn profile(&self) -> &str {
+        let mut profiles = self.0.iter().map(|p| p.recording.info().profile.as_str());
+        let first = profiles.next().unwrap_or_default();
+        match profiles.all(|profile| profile == first) {
+            true => first,
+            false => "",
+        }
+    }
+
+    /// What is lost in them, one line each.
+    pub fn losses(&self) -> impl Iterator<Item = String> {
+        let of = |part: &Part| {
+            part.losses
+                .iter()
+                .map(|loss| format!("{}: {loss}", part.name))
+                .collect::<Vec<_>>()
+        };
+        self.0.iter().flat_map(of)
+    }
+
+    /// Which are empty, and where time passes between them that none recorded, one line each.
+    pub fn notes(&self) -> Vec<String> {
+        let mut notes = Vec::new();
+        let mut last: Option<(i64, &Part)> = None;
+        for part in &self.0 {
+            let Some((start_ns, end_ns)) = part.span_ns() else {
+                notes.push(format!("{}: holds no messages", part.name));
+                continue;
+            };
+            if let Some((before_ns, before)) = last
+                && start_ns - before_ns > PAUSE_NS
+            {
+                let pause_s = (start_ns - before_ns) as f64 * 1e-9;
+                let (name, before) = (&part.name, &before.name);
+                notes.push(format!("{name}: begins {pause_s:.1} s after {before} ends"));
+            }
+            if last.is_none_or(|(before_ns, _)| end_ns > before_ns) {
+                last = Some((end_ns, part));
+            }
+        }
+        notes
+    }
+
+    /// Writes everything that they hold: metadata and attachments that several have alike once, messages in the order of time but within a stretch of
+    /// a file, where they come as they are there. Returns how many messages there are.
+    pub fn write(&self, writer: &mut RecordingWriter) -> Result<u64, MergeError> {
+        let mut records = Vec::new();
+        let mut attached = Vec::new();
+        for part in &self.0 {
+            for record in part.recording.metadata_records() {
+                if !records.contains(&record) {
+                    records.push(record);
+                    writer.metadata(&record.0, &record.1)?;
+                }
+            }
+            for attachment in part.recording.attachments() {
+                let same = (attachment.name, attachment.media_type, attachment.data);
+                if !attached.contains(&same) {
+                    attached.push(same);
+                    writer.copy_attachment(&attachment)?;
+                }
+            }
+        }
+        let mut sources = Vec::new();
+        for part in &self.0 {
+            let channels = part.recording.info().channels.iter();
+            let channels: Vec<_> = channels
+                .map(|channel| writer.raw_channel(&RawChannel::from(channel)))
+                .collect::<Result<_, _>>()?;
+            sources.push((RawMessages::of(&part.recording), channels));
+        }
+        let mut count = 0;
+        let mut outcome = Ok(());
+        loop {
+            // Of several that begin together, the first in order.
+            let begun = sources
+                .iter_mut()
+                .filter(|(source, _)| source.next_ns().is_some());
+            let Some((source, channels)) = begun.min_by_key(|(source, _)| source.next_ns()) else {
+                break;
+            };
+            source.give(&mut |message| {
+                if outcome.is_ok() {
+                    count += 1;
+                    outcome = writer.copy(channels[message.channel], message);
+                }
+            });
+            std::mem::replace(&mut outcome, Ok(()))?;
+        }
+        Ok(count)
+    }
+}
+
+/// "3 recordings".
+impl std::fmt::Display for Parts {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.write_str(&counted(self.0.len() as u64, "recording", "recordings"))
+    }
+}

@@ -1,0 +1,262 @@
+//! Recordings put together: everything is there, once, in order; what could not be told apart afterwards is refused.
+
+use std::{
+    fs,
+    path::{Path, PathBuf},
+};
+
+use recording::{
+    merge::{MergeError, Parts, files},
+    read::{RawAttachment, ReadOptions, Recording},
+    write::{RawChannel, RecordingWriter, WriterOptions},
+};
+use tempfile::TempDir;
+
+const SECOND_NS: i64 = 1_000_000_000;
+
+/// A recording with one message every 10 ms on each topic, in an encoding that nothing here decodes; `small` chunks hold a few each.
+fn record(path: &Path, topics: &[&str], from_s: f64, to_s: f64) {
+    let options = WriterOptions {
+        profile: "x-test".into(),
+        chunk_bytes: 256,
+        ..WriterOptions::default()
+    };
+    let mut writer = RecordingWriter::create(path, &options).expect("begins");
+    let name = path
+        .file_name()
+        .and_then(|name| name.to_str())
+        .expect("a name");
+    for (record, value) in [("walk", "Kullu"), ("part", name)] {
+        let values = [("is".to_owned(), value.to_owned())].into();
+        writer.metadata(record, &values).expect("takes it");
+    }
+    for (name, data) in [("map.txt", "everywhere the same"), ("note.txt", name)] {
+        let attachment = RawAttachment {
+            name,
+            media_type: "text/plain",
+            log_time_ns: 3,
+            create_time_ns: 4,
+            data: data.as_bytes(),
+        };
+        writer.copy_attachment(&attachment).expect("takes it");
+    }
+    let channels: Vec<_> = (topics.iter())
+        .map(|topic| {
+            let channel = RawChannel {
+                topic,
+                message_encoding: "x-own",
+                schema_name: "own",
+                schema_encoding: "x-own",
+                schema_data: b"text",
+                metadata: &[("of".to_owned(), (*topic).to_owned())].into(),
+            };
+            writer.raw_channel(&channel).expect("takes it")
+        })
+        .collect();
+    let ticks = |t_s: f64| (100.0 * t_s).round() as i64;
+    for tick in ticks(from_s)..ticks(to_s) {
+        for (channel, topic) in channels.iter().zip(topics) {
+            let data = format!("{topic} {tick}");
+            let t_ns = tick * SECOND_NS / 100;
+            writer
+                .message(*channel, t_ns, data.as_bytes())
+                .expect("takes it");
+        }
+    }
+    writer.finish().expect("ends");
+}
+
+fn open(paths: &[PathBuf]) -> Result<Parts, MergeError> {
+    Parts::open(&files(paths)?, &ReadOptions::default())
+}
+
+fn merge(parts: &Parts, out: &Path) -> Recording {
+    let options = WriterOptions {
+        profile: parts.profile().into(),
+        ..WriterOptions::default()
+    };
+    let mut writer = RecordingWriter::create(out, &options).expect("begins");
+    let count = parts.write(&mut writer).expect("writes");
+    writer.finish().expect("ends");
+    let recording = Recording::open(out, &ReadOptions::default()).expect("opens");
+    assert_eq!(recording.info().messages, count);
+    recording
+}
+
+/// Time, sequence number and text of every message, in the order of the file.
+fn messages(recording: &Recording) -> Vec<(i64, u32, String)> {
+    let mut all = Vec::new();
+    let keep = |text: &[u8]| String::from_utf8(text.to_vec()).expect("text");
+    recording
+        .messages(&|_| true, &mut |m| {
+            assert_eq!(m.publish_time_ns, m.log_time_ns.cast_unsigned());
+            all.push((m.log_time_ns, m.sequence, keep(m.data)));
+        })
+        .expect("reads");
+    all
+}
+
+fn folder() -> TempDir {
+    tempfile::tempdir().expect("a folder")
+}
+
+#[test]
+fn the_parts_of_a_bag_are_one_recording_whatever_their_order() {
+    let folder = folder();
+    let bag = folder.path().join("bag");
+    fs::create_dir(&bag).expect("a folder");
+    let names = ["bag_10.mcap", "bag_8.mcap", "bag_9.mcap"].map(|name| bag.join(name));
+    // The recorder begins a part half a second before it ends the last one.
+    record(&names[1], &["/a", "/b"], 1000.0, 1003.5);
+    record(&names[2], &["/a", "/b"], 1003.0, 1006.0);
+    record(&names[0], &["/a", "/b", "/c"], 1006.0, 1009.0);
+    fs::write(bag.join("metadata.yaml"), "of ROS 2").expect("writes");
+    let out = |name: &str| folder.path().join(name);
+    let parts = open(&[bag]).expect("fits");
+    assert_eq!(parts.to_string(), "3 recordings");
+    assert_eq!((parts.notes(), parts.losses().count()), (Vec::new(), 0));
+    let whole = merge(&parts, &out("whole.mcap"));
+    merge(&open(&names).expect("fits"), &out("again.mcap"));
+    let bytes = |name| fs::read(out(name)).expect("reads");
+    assert!(bytes("whole.mcap") == bytes("again.mcap"));
+
+    let info = whole.info();
+    assert_eq!((&info.profile[..], info.channels.len()), ("x-test", 3));
+    let c = &info.channels[2];
+    assert_eq!(
+        (&c.topic[..], &c.schema[..], &*c.schema_data),
+        ("/c", "own", &b"text"[..])
+    );
+    assert_eq!(c.metadata["of"], "/c");
+    let mut expected = Vec::new();
+    for name in [&names[1], &names[2], &names[0]] {
+        let part = Recording::open(name, &ReadOptions::default()).expect("opens");
+        expected.extend(messages(&part));
+    }
+    let mut found = messages(&whole);
+    assert_eq!(found.len(), 2 * 950 + 300);
+    // A chunk holds less than a tenth of a second.
+    let latest = |upto: &[(i64, u32, String)]| upto.iter().map(|m| m.0).max();
+    for (k, (t_ns, ..)) in found.iter().enumerate() {
+        assert!(latest(&found[..k]).is_none_or(|last| *t_ns > last - SECOND_NS / 10));
+    }
+    found.sort();
+    expected.sort();
+    assert_eq!(found, expected);
+
+    let attached: Vec<_> = whole
+        .attachments()
+        .map(|a| (a.name, a.data, a.create_time_ns))
+        .collect();
+    let note = |name: &'static str| ("note.txt", name.as_bytes(), 4);
+    assert_eq!(
+        attached,
+        [
+            ("map.txt", &b"everywhere the same"[..], 4),
+            note("bag_8.mcap"),
+            note("bag_9.mcap"),
+            note("bag_10.mcap")
+        ]
+    );
+    let records = whole.metadata_records().iter();
+    let records: Vec<_> = records
+        .map(|(name, values)| (&name[..], &values["is"][..]))
+        .collect();
+    assert_eq!(
+        records,
+        [
+            ("walk", "Kullu"),
+            ("part", "bag_8.mcap"),
+            ("part", "bag_9.mcap"),
+            ("part", "bag_10.mcap")
+        ]
+    );
+}
+
+#[test]
+fn recorders_of_one_time_are_woven_together() {
+    let folder = folder();
+    let [robot, phones, empty, out] = ["robot.mcap", "phones.mcap", "empty.mcap", "both.mcap"]
+        .map(|name| folder.path().join(name));
+    record(&robot, &["/odom"], 10.0, 20.0);
+    record(&phones, &["/imu"], 12.0, 40.0);
+    // It names a topic of the others and has no message of it.
+    record(&empty, &["/imu"], 15.0, 15.0);
+    let parts = open(&[phones, robot, empty.clone()]).expect("fits");
+    assert_eq!(
+        parts.notes(),
+        [format!("{}: holds no messages", empty.display())]
+    );
+    let found = messages(&merge(&parts, &out));
+    assert_eq!(found.len(), 1000 + 2800);
+    let swaps = found
+        .windows(2)
+        .filter(|pair| pair[0].2[..4] != pair[1].2[..4]);
+    assert!(swaps.count() > 100, "they are not one behind the other");
+    let back_ns = found.windows(2).map(|pair| pair[0].0 - pair[1].0).max();
+    assert!(
+        back_ns.is_some_and(|back_ns| back_ns < SECOND_NS / 10),
+        "{back_ns:?}"
+    );
+}
+
+#[test]
+fn what_could_not_be_told_apart_is_refused() {
+    let folder = folder();
+    let [a, b, later, none] =
+        ["a.mcap", "b.mcap", "later.mcap", "none"].map(|name| folder.path().join(name));
+    record(&a, &["/x", "/imu"], 0.0, 10.0);
+    record(&b, &["/imu"], 5.0, 15.0);
+    record(&later, &["/imu"], 40.0, 41.0);
+    fs::create_dir(&none).expect("a folder");
+    let error = |paths: &[&PathBuf]| {
+        let paths: Vec<PathBuf> = paths.iter().map(|path| (*path).clone()).collect();
+        open(&paths).err().expect("refused").to_string()
+    };
+    let (a_name, b_name) = (a.display(), b.display());
+    assert_eq!(
+        error(&[&b, &a]),
+        format!(
+            "{b_name}: holds /imu at a time when {a_name} does, too (for 5.0 s); expected parts of one recording one after the other, or \
+             recordings of different topics (`analyze {a_name} {b_name}` compares two)"
+        )
+    );
+    assert_eq!(
+        error(&[&a, &a]),
+        format!("{a_name}: is given twice; expected each recording once")
+    );
+    assert!(
+        error(&[&none]).ends_with("none: has no recording in it; expected files that end in .mcap")
+    );
+    assert!(error(&[&a, &folder.path().join("no.mcap")]).contains("no.mcap: cannot be read"));
+    let apart = open(&[later.clone(), a.clone()]).expect("fits");
+    let pause = format!("{}: begins 30.0 s after {a_name} ends", later.display());
+    assert_eq!(apart.notes(), [pause]);
+}
+
+#[test]
+fn what_is_left_of_a_damaged_part_is_taken_and_what_is_lost_is_said() {
+    let folder = folder();
+    let [whole, cut, out] =
+        ["whole.mcap", "cut.mcap", "out.mcap"].map(|name| folder.path().join(name));
+    record(&whole, &["/imu"], 0.0, 5.0);
+    record(&cut, &["/imu"], 5.0, 10.0);
+    let bytes = fs::read(&cut).expect("reads");
+    fs::write(&cut, &bytes[..bytes.len() / 3]).expect("writes");
+    let parts = open(&[cut.clone(), whole]).expect("fits");
+    let losses: Vec<String> = parts.losses().collect();
+    assert!(
+        !losses.is_empty()
+            && losses
+                .iter()
+                .all(|loss| loss.starts_with(&cut.display().to_string())),
+        "{losses:?}"
+    );
+    let found = messages(&merge(&parts, &out));
+    assert!((501..1000).contains(&found.len()), "{}", found.len());
+    let ticks = found.iter().map(|(t_ns, ..)| *t_ns * 100 / SECOND_NS);
+    assert!(
+        ticks.eq(0..found.len() as i64),
+        "from the beginning to where the cut is"
+    );
+}
