@@ -2161,6 +2161,8 @@ fn a_sensor_that_came_to_its_end_gives_no_interval() {
             .contains("the gyroscope came to the end of its range"),
         "{roll}"
     );
+    let doubt = "/s is in doubt (saturated, see the quality of the data): what hangs on it may be far off and has no interval";
+    assert_eq!(found["recording"]["warnings"], serde_json::json!([doubt]));
     let roles = folder.path().join("roles.toml").display().to_string();
     // Before it came there, nothing is missing.
     let calm = json(&[
@@ -2169,7 +2171,6 @@ fn a_sensor_that_came_to_its_end_gives_no_interval() {
     assert!(calm["metrics"]["rms_roll_deg"]["ci95"].is_array());
 }
 
-/// An accelerometer that stops at 30 s, a gyroscope whose y has died: both are told, and the first leaves no interval.
 /// Messages of a load that sways by 17° (RMS) and heaves, its sensor turned over its x by so much at a time.
 fn swaying(turned_rad: impl Fn(f64) -> f64) -> Vec<(f64, String)> {
     let (w, g) = (std::f64::consts::TAU, 9.80665);
@@ -2253,6 +2254,7 @@ fn a_sensor_that_slips_in_its_mounting_is_told() {
     }
 }
 
+/// An accelerometer that stops at 30 s, a gyroscope whose y has died: both are told, and the first leaves no interval.
 #[test]
 fn a_sensor_that_stands_still_in_motion_is_told() {
     let folder = tempfile::tempdir().unwrap();

@@ -11,6 +11,7 @@ use analyze::imu::bias::far_off;
 use analyze::imu::orientation::{Options, batch};
 use analyze::imu::rath::{Settings, motion};
 use analyze::imu::unit::other_unit;
+use analyze::metrics::Datum;
 use analyze::quality::Quality;
 use nalgebra::{Matrix3, UnitQuaternion, Vector3};
 use recording::cdr::Imu;
@@ -445,17 +446,18 @@ fn a_device_on_two_topics_is_one_sensor() {
     }
 }
 
-/// A driver that publishes deg/s, and a gyroscope that nobody has calibrated: of a roll of 5°.
+/// A driver that publishes deg/s, one that makes radians of radians, and a gyroscope that nobody has calibrated.
 #[test]
 fn a_gyroscope_of_another_unit_or_far_off_is_told() {
-    let (amplitude, w) = (0.1_f64, TAU);
-    let truth_deg = (amplitude / 2.0_f64.sqrt()).to_degrees();
+    let w = TAU;
     let folder = tempfile::tempdir().unwrap();
-    for (times, off_rad_per_s, told) in [
-        (1.0, 0.0, None),
-        (1.0, 0.15, Some("bias")),
-        (1f64.to_degrees(), 0.0, Some("unit")),
+    for (amplitude, times, off_rad_per_s, told) in [
+        (0.1_f64, 1.0, 0.0, None),
+        (0.1, 1.0, 0.15, Some("bias")),
+        (0.1, 1f64.to_degrees(), 0.0, Some("unit")),
+        (0.5, 1f64.to_radians(), 0.0, Some("unit")),
     ] {
+        let truth_deg = (amplitude / 2.0_f64.sqrt()).to_degrees();
         let path = folder.path().join("rath.mcap");
         let mut writer = RecordingWriter::create(&path, &WriterOptions::default()).unwrap();
         let channel = writer.channel("/imu/rath", MessageKind::Imu).unwrap();
@@ -479,8 +481,16 @@ fn a_gyroscope_of_another_unit_or_far_off_is_told() {
         let mut said = found.quality.iter().map(|q| q.kind);
         assert_eq!(said.find(|kind| kinds.contains(kind)), told);
         let roll = found.metrics.get("rms_roll_deg").unwrap();
+        // Rates that are too large leave no motion, those that are too small one that is too little.
+        let doubtful = told == Some("unit") && times < 1.0;
+        let doubt = "/imu/rath is in doubt (unit, ";
+        let warned = found.warnings.iter().filter(|w| w.starts_with(doubt));
+        assert_eq!(warned.count(), usize::from(doubtful), "{roll:?}");
         match told {
-            Some("unit") => assert_eq!(roll.ci95, None, "{roll:?}"),
+            Some("unit") => {
+                assert_eq!(roll.ci95, None, "{roll:?}");
+                assert_eq!(roll.datum != Datum::Missing, doubtful, "{roll:?}");
+            }
             _ => {
                 let [low, high] = roll.ci95.unwrap();
                 assert!((low..=high).contains(&truth_deg), "{roll:?}");

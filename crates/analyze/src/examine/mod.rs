@@ -91,6 +91,7 @@ pub fn examine(
         warnings.push("no truth is known in the recording: estimates are judged by the pose of a topic whose name holds \"truth\", or of truth = \"TOPIC\" in a file for --roles".into());
     }
     let window = until(field.last_s(), &mut warnings);
+    warnings.extend(field.warnings());
     field.fill(&mut inputs);
     field.hold_against_pose(&inputs, &roles, window);
     quality.extend(remarks);

@@ -16,7 +16,7 @@ mod thin;
 
 #[cfg(test)]
 pub(crate) use judge::wants as is_of_truth;
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 use std::f64::consts::FRAC_PI_2;
 
 use recording::read::{ReadError, Recording};
@@ -73,6 +73,8 @@ pub struct Field {
     lost: Vec<Lost>,
     /// What those of the carriers did not.
     carriers_lost: Vec<Lost>,
+    /// The sensors that these are, and the kinds of the remarks that say why.
+    doubts: BTreeSet<(String, &'static str)>,
     carriers: Carriers,
     beat_s: Vec<f64>,
     /// Their numbers, where they have some.
@@ -269,6 +271,9 @@ impl Field {
                     ..Quality::remark(topic, kind, told)
                 });
                 if samples.iter().any(|k| within.contains(k)) {
+                    if what.is_some() && (is_rath || carries) {
+                        field.doubts.insert((topic.clone(), kind));
+                    }
                     match is_rath {
                         true => field.lost.extend(what),
                         false if carries => field.carriers_lost.extend(what),
@@ -303,7 +308,10 @@ impl Field {
                 };
                 if let Some((kind, told, lost)) = said {
                     field.quality.push(Quality::remark(topic, kind, told));
-                    field.lost.extend(lost.filter(|_| is_rath));
+                    if let Some(lost) = lost.filter(|_| is_rath) {
+                        field.doubts.insert((topic.clone(), kind));
+                        field.lost.push(lost);
+                    }
                 }
             }
             if !is_rath && roles.patterns(Role::Imu).contains(topic) {
@@ -449,6 +457,7 @@ impl Field {
                         "mounting",
                         format!("as it is declared to be mounted, the load leans by {lean_deg:.0}° on average: it lies on its side or its back, or the sensor sits otherwise; what rests on its motion has no interval"),
                     ));
+                    self.doubts.insert((topic.to_owned(), "mounting"));
                     self.lost.push(Lost::Mounting);
                 }
                 if let Some(turned) = motion.turned() {
@@ -456,12 +465,26 @@ impl Field {
                         t_s: Some(turned.t_s),
                         ..Quality::remark(topic, "turned", turned.told())
                     });
+                    self.doubts.insert((topic.to_owned(), "turned"));
                     self.lost.push(Lost::Turned);
                 }
                 self.motion = Some(motion);
             }
             Err(error) => self.no_motion = Some(error.to_string()),
         }
+    }
+
+    /// Which sensors are in doubt, one sentence each: for whoever looks at the numbers and not at the remarks.
+    pub fn warnings(&self) -> impl Iterator<Item = String> {
+        // Where there is no motion, it is said why.
+        let silent = self.topic.as_ref().filter(|_| self.motion.is_none());
+        let speaking = self
+            .doubts
+            .iter()
+            .filter(move |(topic, _)| Some(topic) != silent);
+        speaking.map(|(topic, kind)| {
+            format!("{topic} is in doubt ({kind}, see the quality of the data): what hangs on it may be far off and has no interval")
+        })
     }
 
     /// Puts the carriers' clocks on each other, by the motion of the rath that they all drive, or says how with `leave`.
