@@ -478,6 +478,40 @@ fn several_devices_by_layout() {
     assert_eq!(got.values("/imu/belt.linear_acceleration.z"), [9.81]);
 }
 
+#[test]
+fn units_of_a_layout_are_read_as_people_spell_them() {
+    let folder = folder();
+    let log = file(
+        folder.path(),
+        "log.csv",
+        "t,ax,ay,az,gx,gy,gz\n1,0,0,9.81,180,0,0\n",
+    );
+    let read = |force: &str, rate: &str| {
+        let text = format!(
+            "[time]\ncolumn = \"t\"\nunit = \"s\"\n\
+            [acceleration]\ncolumns = [\"ax\", \"ay\", \"az\"]\nunit = \"{force}\"\n\
+            [angular_velocity]\ncolumns = [\"gx\", \"gy\", \"gz\"]\nunit = \"{rate}\"\n"
+        );
+        let layout = file(folder.path(), "layout.toml", &text);
+        ingest(folder.path(), std::slice::from_ref(&log), layout.to_str())
+    };
+    for force in ["m/s^2", "m/s²", "m/s2"] {
+        for rate in ["deg/s", "°/s", "dps"] {
+            let got = read(force, rate).unwrap_or_else(|e| panic!("{force} {rate}: {e}"));
+            assert_eq!(got.values("/imu/log.linear_acceleration.z"), [9.81]);
+            assert_eq!(
+                got.values("/imu/log.angular_velocity.x"),
+                [std::f64::consts::PI]
+            );
+        }
+    }
+    let error = read("m/s^2", "rpm").err().expect("refused").to_string();
+    assert!(
+        error.ends_with("the layout has the unit \"rpm\"; expected rad/s or deg/s"),
+        "{error}"
+    );
+}
+
 /// As the app writes it where a comma is the decimal sign: an empty line first, the minus of typography, the last value held between samples.
 #[test]
 fn physics_toolbox_holds_each_sensor_between_its_samples() {

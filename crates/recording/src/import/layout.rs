@@ -147,8 +147,20 @@ pub(super) fn fits(layout: &Layout, text: &str) -> bool {
         .is_ok_and(|table| needed.all(|column| table.find(column).is_some()))
 }
 
+/// Other spellings of units, and the one that is meant.
+const SPELLINGS: [(&str, &str); 5] = [
+    ("m/s²", "m/s^2"),
+    ("m/s2", "m/s^2"),
+    ("°/s", "deg/s"),
+    ("º/s", "deg/s"),
+    ("dps", "deg/s"),
+];
+
 fn factor(vector: &Vector, units: &[(&str, f64)], name: &str) -> Result<f64, ImportError> {
-    match units.iter().find(|(unit, _)| *unit == vector.unit) {
+    let given = vector.unit.as_str();
+    let meant = SPELLINGS.iter().find(|(other, _)| *other == given);
+    let meant = meant.map_or(given, |(_, unit)| unit);
+    match units.iter().find(|(unit, _)| *unit == meant) {
         Some((_, factor)) => Ok(factor * vector.sign),
         None => {
             let known: Vec<&str> = units.iter().map(|(unit, _)| *unit).collect();
