@@ -84,10 +84,10 @@ impl Part {
         })
     }
 
-    /// Log times of the first and the last message, ns; `None` without any.
+    /// Log times of the first and the last message, ns, but for a few that are dated long before all others; `None` without any.
     fn span_ns(&self) -> Option<(i64, i64)> {
         let info = self.recording.info();
-        (info.messages > 0).then_some((info.earliest_ns, info.end_ns))
+        (info.messages > 0).then_some((info.start_ns, info.end_ns))
     }
 
     /// Topics with messages.
@@ -180,14 +180,16 @@ impl Parts {
     }
 
     /// What is lost in them, one line each.
-    pub fn losses(&self) -> impl Iterator<Item = String> {
-        let of = |part: &Part| {
-            part.losses
+    pub fn losses(&self) -> Vec<String> {
+        let mut losses = Vec::new();
+        for part in &self.0 {
+            let told = part
+                .losses
                 .iter()
-                .map(|loss| format!("{}: {loss}", part.name))
-                .collect::<Vec<_>>()
-        };
-        self.0.iter().flat_map(of)
+                .map(|loss| format!("{}: {loss}", part.name));
+            losses.extend(told);
+        }
+        losses
     }
 
     /// Which are empty, and where time passes between them that none recorded, one line each.
@@ -213,9 +215,19 @@ impl Parts {
         notes
     }
 
+    /// Bytes of the files that hold messages.
+    pub fn bytes(&self) -> u64 {
+        let sources = self.0.iter().map(|part| RawMessages::of(&part.recording));
+        sources.map(|source| source.bytes_left()).sum()
+    }
+
     /// Writes everything that they hold: metadata and attachments that several have alike once, messages in the order of time but within a stretch of
-    /// a file, where they come as they are there. Returns how many messages there are.
-    pub fn write(&self, writer: &mut RecordingWriter) -> Result<u64, MergeError> {
+    /// a file, where they come as they are there. Returns how many messages there are; `each` hears of bytes of the files as they are done.
+    pub fn write(
+        &self,
+        writer: &mut RecordingWriter,
+        mut each: impl FnMut(u64),
+    ) -> Result<u64, MergeError> {
         let mut records = Vec::new();
         let mut attached = Vec::new();
         for part in &self.0 {
@@ -251,13 +263,14 @@ impl Parts {
             let Some((source, channels)) = begun.min_by_key(|(source, _)| source.next_ns()) else {
                 break;
             };
-            source.give(&mut |message| {
+            let bytes = source.give(&mut |message| {
                 if outcome.is_ok() {
                     count += 1;
                     outcome = writer.copy(channels[message.channel], message);
                 }
             });
             std::mem::replace(&mut outcome, Ok(()))?;
+            bytes.into_iter().for_each(&mut each);
         }
         Ok(count)
     }

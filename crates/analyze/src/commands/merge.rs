@@ -3,6 +3,7 @@
 use std::path::PathBuf;
 
 use clap::Args;
+use indicatif::{ProgressBar, ProgressStyle};
 use recording::merge::{MergeError, Parts, files};
 use recording::read::ReadOptions;
 use recording::text::counted;
@@ -51,12 +52,18 @@ fn merge(args: &MergeArgs) -> anyhow::Result<Done> {
     let parts = Parts::open(&files, &ReadOptions::default())?;
     let options = WriterOptions {
         profile: parts.profile().to_owned(),
-        ..WriterOptions::default()
+        ..WriterOptions::beside()
     };
     let mut writer = RecordingWriter::to(&args.out, &options).map_err(MergeError::Write)?;
-    let messages = parts.write(&mut writer)?;
+    // On a terminal only.
+    let bar = ProgressBar::new(parts.bytes());
+    bar.set_style(ProgressStyle::with_template(
+        "{wide_bar} {bytes}/{total_bytes}, {eta} left",
+    )?);
+    let messages = parts.write(&mut writer, |bytes| bar.inc(bytes))?;
     writer.finish().map_err(MergeError::Write)?;
-    let losses: Vec<String> = parts.losses().collect();
+    bar.finish_and_clear();
+    let losses = parts.losses();
     for note in parts.notes().iter().chain(&losses) {
         recording::note!("analyze: {note}");
     }

@@ -502,7 +502,7 @@ impl Recording {
             }
         };
         let mut messages = RawMessages::of(self);
-        while messages.give(&mut each) {}
+        while messages.give(&mut each).is_some() {}
         Ok(())
     }
 

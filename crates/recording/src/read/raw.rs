@@ -74,11 +74,18 @@ impl<'a> RawMessages<'a> {
         })
     }
 
-    /// Gives the messages of the next stretch; `false` behind the last one. A damaged chunk is left out, as `stream` says it is.
-    pub fn give(&mut self, sink: &mut dyn FnMut(&RawMessage<'_>)) -> bool {
-        let Some((block, rest)) = self.blocks.split_first() else {
-            return false;
-        };
+    /// Bytes of file that are left.
+    pub fn bytes_left(&self) -> u64 {
+        self.blocks
+            .iter()
+            .map(|block| block.range().len() as u64)
+            .sum()
+    }
+
+    /// Gives the messages of the next stretch, and how many bytes of file it takes; `None` behind the last one. A damaged chunk is left
+    /// out, as `stream` says it is.
+    pub fn give(&mut self, sink: &mut dyn FnMut(&RawMessage<'_>)) -> Option<u64> {
+        let (block, rest) = self.blocks.split_first()?;
         self.blocks = rest;
         let recording = self.recording;
         let mut each = |bytes: &[u8]| {
@@ -90,6 +97,6 @@ impl<'a> RawMessages<'a> {
         let (data, options) = (&recording.data, &recording.options);
         chunk::records(data, block, options, &mut self.unpacker, &mut each);
         data.forget(block.range());
-        true
+        Some(block.range().len() as u64)
     }
 }
