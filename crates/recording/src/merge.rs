@@ -3,7 +3,10 @@
 //! Everything is taken over as it is. Stretches of the files (chunks) come in the order of the times that they begin at, so that no more than
 //! one of each file is unpacked at a time.
 
-use std::path::{Path, PathBuf};
+use std::{
+    collections::{BTreeMap, BTreeSet},
+    path::{Path, PathBuf},
+};
 
 use crate::{
     Finding, Kind,
@@ -17,6 +20,9 @@ const MOST_OVERLAP_NS: i64 = 1_000_000_000;
 
 /// A longer pause between parts is remarked on, ns.
 const PAUSE_NS: i64 = 10_000_000_000;
+
+/// The metadata record that readers go by: of several all keys, with their last values.
+const OWN_RECORD: &str = "rath";
 
 /// Why recordings could not be put together. No file is made or changed.
 #[derive(Debug, thiserror::Error)]
@@ -192,9 +198,29 @@ impl Parts {
         losses
     }
 
-    /// Which are empty, and where time passes between them that none recorded, one line each.
+    /// Which are empty, where time passes between them that none recorded, and in which of the record `rath`'s keys they differ, one line each.
     pub fn notes(&self) -> Vec<String> {
         let mut notes = Vec::new();
+        let records = self
+            .0
+            .iter()
+            .flat_map(|part| part.recording.metadata_records());
+        let mut own: BTreeMap<&str, &str> = BTreeMap::new();
+        let mut differ = BTreeSet::new();
+        for (key, value) in records
+            .filter(|(name, _)| name == OWN_RECORD)
+            .flat_map(|record| &record.1)
+        {
+            if own.insert(key, value).is_some_and(|before| before != value) {
+                differ.insert(key.as_str());
+            }
+        }
+        if !differ.is_empty() {
+            let keys = Vec::from_iter(differ).join(", ");
+            notes.push(format!(
+                "the recordings say different things of {keys}; what the last one says will count"
+            ));
+        }
         let mut last: Option<(i64, &Part)> = None;
         for part in &self.0 {
             let Some((start_ns, end_ns)) = part.span_ns() else {

@@ -6,8 +6,10 @@ use std::{
 };
 
 use recording::{
+    cdr::Float64,
     merge::{MergeError, Parts, files},
     read::{RawAttachment, ReadOptions, Recording},
+    topics::MessageKind,
     write::{RawChannel, RecordingWriter, WriterOptions},
 };
 use tempfile::TempDir;
@@ -263,4 +265,38 @@ fn what_is_left_of_a_damaged_part_is_taken_and_what_is_lost_is_said() {
         ticks.eq(0..found.len() as i64),
         "from the beginning to where the cut is"
     );
+}
+
+/// What of `rath` two recordings say differently counts as the later one says it, and that is told.
+#[test]
+fn what_recordings_say_differently_is_told() {
+    let folder = folder();
+    let write = |name: &str, t_ns: i64, mass_kg: &str| {
+        let path = folder.path().join(name);
+        let mut writer = RecordingWriter::create(&path, &WriterOptions::default()).expect("begins");
+        let values =
+            [("mass_kg", mass_kg), ("source", "field")].map(|(k, v)| (k.to_owned(), v.to_owned()));
+        writer.metadata("rath", &values.into()).expect("takes it");
+        let x = writer
+            .channel("/x", MessageKind::Float64)
+            .expect("takes it");
+        writer
+            .message(x, t_ns, &Float64 { data: 1.0 })
+            .expect("takes it");
+        writer.finish().expect("ends");
+        path
+    };
+    let paths = [
+        write("late.mcap", 9 * SECOND_NS, "70"),
+        write("early.mcap", SECOND_NS, "60"),
+    ];
+    let parts = open(&paths).expect("fits");
+    assert_eq!(
+        parts.notes(),
+        ["the recordings say different things of mass_kg; what the last one says will count"]
+    );
+    let whole = merge(&parts, &folder.path().join("whole.mcap"));
+    assert_eq!(whole.info().metadata["rath"]["mass_kg"], "70");
+    let alike = [write("late.mcap", 9 * SECOND_NS, "60"), paths[1].clone()];
+    assert!(open(&alike).expect("fits").notes().is_empty());
 }
