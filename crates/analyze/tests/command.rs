@@ -2161,7 +2161,7 @@ fn a_sensor_that_came_to_its_end_gives_no_interval() {
             .contains("the gyroscope came to the end of its range"),
         "{roll}"
     );
-    let doubt = "/s is in doubt (saturated, see the quality of the data): what hangs on it may be far off and has no interval";
+    let doubt = "/s is in doubt (saturated, see the quality of the data): numbers that hang on that may be far off and have no interval";
     assert_eq!(found["recording"]["warnings"], serde_json::json!([doubt]));
     let roles = folder.path().join("roles.toml").display().to_string();
     // Before it came there, nothing is missing.

@@ -280,7 +280,6 @@ impl Parts {
             sources.push((RawMessages::of(&part.recording), channels));
         }
         let mut count = 0;
-        let mut outcome = Ok(());
         loop {
             // Of several that begin together, the first in order.
             let begun = sources
@@ -289,14 +288,15 @@ impl Parts {
             let Some((source, channels)) = begun.min_by_key(|(source, _)| source.next_ns()) else {
                 break;
             };
+            let mut outcome = Ok(());
             let bytes = source.give(&mut |message| {
                 if outcome.is_ok() {
                     count += 1;
                     outcome = writer.copy(channels[message.channel], message);
                 }
             });
-            std::mem::replace(&mut outcome, Ok(()))?;
-            bytes.into_iter().for_each(&mut each);
+            outcome?;
+            each(bytes.unwrap_or(0));
         }
         Ok(count)
     }

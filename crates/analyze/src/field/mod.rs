@@ -483,7 +483,7 @@ impl Field {
             .iter()
             .filter(move |(topic, _)| Some(topic) != silent);
         speaking.map(|(topic, kind)| {
-            format!("{topic} is in doubt ({kind}, see the quality of the data): what hangs on it may be far off and has no interval")
+            format!("{topic} is in doubt ({kind}, see the quality of the data): numbers that hang on that may be far off and have no interval")
         })
     }
 
