@@ -282,10 +282,10 @@ impl Parts {
         let mut count = 0;
         loop {
             // Of several that begin together, the first in order.
-            let begun = sources
+            let left = sources
                 .iter_mut()
-                .filter(|(source, _)| source.next_ns().is_some());
-            let Some((source, channels)) = begun.min_by_key(|(source, _)| source.next_ns()) else {
+                .filter_map(|(source, channels)| Some((source.next_ns()?, source, channels)));
+            let Some((_, source, channels)) = left.min_by_key(|(begins_ns, ..)| *begins_ns) else {
                 break;
             };
             let mut outcome = Ok(());

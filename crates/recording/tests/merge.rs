@@ -16,7 +16,7 @@ use tempfile::TempDir;
 
 const SECOND_NS: i64 = 1_000_000_000;
 
-/// A recording with one message every 10 ms on each topic, in an encoding that nothing here decodes; `small` chunks hold a few each.
+/// A recording with one message every 10 ms on each topic, in an encoding that nothing here decodes; a chunk holds a few.
 fn record(path: &Path, topics: &[&str], from_s: f64, to_s: f64) {
     let options = WriterOptions {
         profile: "x-test".into(),
@@ -265,6 +265,31 @@ fn what_is_left_of_a_damaged_part_is_taken_and_what_is_lost_is_said() {
         ticks.eq(0..found.len() as i64),
         "from the beginning to where the cut is"
     );
+}
+
+/// Parts that begin with what was kept from before the clock was set lie one after the other all the same.
+#[test]
+fn a_message_dated_long_before_all_others_makes_no_overlap() {
+    let folder = folder();
+    let write = |name: &str, from_s: i64| {
+        let path = folder.path().join(name);
+        let mut writer = RecordingWriter::create(&path, &WriterOptions::default()).expect("begins");
+        let x = writer
+            .channel("/x", MessageKind::Float64)
+            .expect("takes it");
+        let ticks = (0..1000).map(|k| from_s * SECOND_NS + k * SECOND_NS / 100);
+        for t_ns in [0].into_iter().chain(ticks) {
+            writer
+                .message(x, t_ns, &Float64 { data: 1.0 })
+                .expect("takes it");
+        }
+        writer.finish().expect("ends");
+        path
+    };
+    let parts = open(&[write("a.mcap", 1000), write("b.mcap", 1010)]).expect("fits");
+    assert!(parts.notes().is_empty(), "{:?}", parts.notes());
+    let whole = merge(&parts, &folder.path().join("whole.mcap"));
+    assert_eq!(whole.info().messages, 2002);
 }
 
 /// What of `rath` two recordings say differently counts as the later one says it, and that is told.

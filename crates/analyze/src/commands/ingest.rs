@@ -8,7 +8,7 @@ use recording::import::{self, ImportError};
 use recording::whole::{Output, may_write};
 use recording::write::{RecordingWriter, WriterOptions};
 
-use super::Done;
+use super::{Done, written};
 
 const EXAMPLES: &str = "\
 Examples:
@@ -76,22 +76,15 @@ fn ingest(args: &IngestArgs) -> anyhow::Result<Done> {
     let mut writer = RecordingWriter::to(&args.out, &WriterOptions::default())?;
     let done = import::ingest(&args.files, &options, &mut writer)?;
     writer.finish().map_err(ImportError::Write)?;
-    for note in done.notes.iter().chain(&done.losses) {
-        recording::note!("analyze: {note}");
-    }
     let topics: Vec<String> = done
         .topics
         .iter()
         .map(|(topic, messages)| format!("{topic} ({messages})"))
         .collect();
-    let out = match args.out.as_os_str() == "-" {
-        true => "standard output".into(),
-        false => args.out.to_string_lossy(),
-    };
-    recording::note!("analyze: {out} written: {}", topics.join(", "));
-    Ok(if done.losses.is_empty() {
-        Done::Well
-    } else {
-        Done::WithLoss
-    })
+    Ok(written(
+        &args.out,
+        &topics.join(", "),
+        &done.notes,
+        &done.losses,
+    ))
 }

@@ -10,7 +10,7 @@ use recording::text::counted;
 use recording::whole::{Output, may_write};
 use recording::write::{RecordingWriter, WriterOptions};
 
-use super::Done;
+use super::{Done, written};
 
 const EXAMPLES: &str = "\
 Examples:
@@ -63,19 +63,7 @@ fn merge(args: &MergeArgs) -> anyhow::Result<Done> {
     let messages = parts.write(&mut writer, |bytes| bar.inc(bytes))?;
     writer.finish().map_err(MergeError::Write)?;
     bar.finish_and_clear();
-    let losses = parts.losses();
-    for note in parts.notes().iter().chain(&losses) {
-        recording::note!("analyze: {note}");
-    }
-    let out = match args.out.as_os_str() == "-" {
-        true => "standard output".into(),
-        false => args.out.to_string_lossy(),
-    };
     let messages = counted(messages, "message", "messages");
-    recording::note!("analyze: {out} written: {messages} of {parts}");
-    Ok(if losses.is_empty() {
-        Done::Well
-    } else {
-        Done::WithLoss
-    })
+    let what = format!("{messages} of {parts}");
+    Ok(written(&args.out, &what, &parts.notes(), &parts.losses()))
 }

@@ -6,7 +6,7 @@ mod ingest;
 mod merge;
 
 use std::io::Write;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
 use clap::{Args, Parser, Subcommand, ValueEnum};
@@ -149,6 +149,22 @@ enum Done {
     WithLoss,
     /// Some of the files could not be used; the messages are out.
     Partly,
+}
+
+/// Says what a new recording holds, after what there is to say of where it comes from.
+fn written(out: &Path, what: &str, notes: &[String], losses: &[String]) -> Done {
+    for note in notes.iter().chain(losses) {
+        recording::note!("analyze: {note}");
+    }
+    let out = match out.as_os_str() == "-" {
+        true => "standard output".into(),
+        false => out.to_string_lossy(),
+    };
+    recording::note!("analyze: {out} written: {what}");
+    match losses.is_empty() {
+        true => Done::Well,
+        false => Done::WithLoss,
+    }
 }
 
 /// Parses the command line and runs the command; the exit code is the contract's.

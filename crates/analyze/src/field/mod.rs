@@ -271,13 +271,8 @@ impl Field {
                     ..Quality::remark(topic, kind, told)
                 });
                 if samples.iter().any(|k| within.contains(k)) {
-                    if what.is_some() && (is_rath || carries) {
-                        field.doubts.insert((topic.clone(), kind));
-                    }
-                    match is_rath {
-                        true => field.lost.extend(what),
-                        false if carries => field.carriers_lost.extend(what),
-                        false => {}
+                    if let Some(what) = what.filter(|_| is_rath || carries) {
+                        field.lose(topic, kind, what, is_rath);
                     }
                 }
             };
@@ -309,8 +304,7 @@ impl Field {
                 if let Some((kind, told, lost)) = said {
                     field.quality.push(Quality::remark(topic, kind, told));
                     if let Some(lost) = lost.filter(|_| is_rath) {
-                        field.doubts.insert((topic.clone(), kind));
-                        field.lost.push(lost);
+                        field.lose(topic, kind, lost, true);
                     }
                 }
             }
@@ -457,20 +451,27 @@ impl Field {
                         "mounting",
                         format!("as it is declared to be mounted, the load leans by {lean_deg:.0}° on average: it lies on its side or its back, or the sensor sits otherwise; what rests on its motion has no interval"),
                     ));
-                    self.doubts.insert((topic.to_owned(), "mounting"));
-                    self.lost.push(Lost::Mounting);
+                    self.lose(topic, "mounting", Lost::Mounting, true);
                 }
                 if let Some(turned) = motion.turned() {
                     self.quality.push(Quality {
                         t_s: Some(turned.t_s),
                         ..Quality::remark(topic, "turned", turned.told())
                     });
-                    self.doubts.insert((topic.to_owned(), "turned"));
-                    self.lost.push(Lost::Turned);
+                    self.lose(topic, "turned", Lost::Turned, true);
                 }
                 self.motion = Some(motion);
             }
             Err(error) => self.no_motion = Some(error.to_string()),
+        }
+    }
+
+    /// Takes note of what a sensor, the rath's or a carrier's, did not tell, as a remark of this kind says.
+    fn lose(&mut self, topic: &str, kind: &'static str, what: Lost, is_rath: bool) {
+        self.doubts.insert((topic.to_owned(), kind));
+        match is_rath {
+            true => self.lost.push(what),
+            false => self.carriers_lost.push(what),
         }
     }
 
