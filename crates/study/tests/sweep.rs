@@ -4,6 +4,7 @@ use std::io::Write;
 use std::path::Path;
 use std::sync::atomic::AtomicBool;
 use study::statistics::about_their_mean;
+use study::sweep::known::Known;
 use study::sweep::parts::{Store, write_whole};
 use study::sweep::shard::Shard;
 use study::sweep::summary::{Found, Summary};
@@ -374,5 +375,86 @@ fn what_cannot_be_written_is_named_as_it_is() {
             said,
             "/dev/full: cannot be written: No space left on device (os error 28)"
         );
+    }
+}
+
+/// Of a study that grows only what is new is computed, and its table is, byte for byte, the one of computing it all.
+#[test]
+fn a_study_that_grows_keeps_what_it_has() {
+    let short = "set = { duration_s = 2.0, analysis_start_s = 0.0, solver.tolerance = 1e-6 }";
+    let study = |name: &str, rest: &str| plan(&format!("name = \"{name}\"\n{rest}\n{short}"));
+    let pull = |values: &str| {
+        format!("{{ key = \"effects.music.strength_rad_per_s\", values = {values} }}")
+    };
+    let never = AtomicBool::new(false);
+    let folder = tempfile::tempdir().unwrap();
+    let place = |name: &str| folder.path().join(name);
+    let table = |plan: &Plan, name: &str, known: Option<&Known>| {
+        let path = place(name);
+        let store = Store::new(plan, &path).reusing(known);
+        let _claim = store.create().unwrap();
+        let blocks: Vec<u64> = (0..plan.blocks()).collect();
+        store.compute(&blocks, 2, &never, || ()).unwrap();
+        store.merge().unwrap();
+        std::fs::read(store.table()).unwrap()
+    };
+    let pilot = study(
+        "pilot",
+        &format!(
+            "seeds = 10\nmetrics = [\"rms_z_m\", \"rms_roll_deg\", \"dz_pp_m\"]\naxes = [{}]",
+            pull("[1.0, 2.0]")
+        ),
+    );
+    table(&pilot.unwrap(), "pilot", None);
+    // More seeds from another first one, a point more, in another order, an axis more, a metric less.
+    let bilateral = "{ key = \"effects.contact.bilateral\", values = [true, false] }";
+    let larger = format!(
+        "seeds = 12\nfirst_seed = 1004\nmetrics = [\"dz_pp_m\", \"rms_z_m\"]\naxes = [{}, {bilateral}]",
+        pull("[2.0, 3.0, 1.0]")
+    );
+    let larger = study("larger", &larger).unwrap();
+    let anew = table(&larger, "anew", None);
+    let known = Known::load(&place("pilot"), &larger).unwrap();
+    assert!(table(&larger, "grown", Some(&known)) == anew);
+    // Two points, seeds 1004 to 1010.
+    assert_eq!(known.taken(), 14);
+
+    // What is lost is computed again: runs 16 to 19 are seeds 1007 to 1010 of the second point.
+    let part = place("pilot/parts/000000016-000000020.parquet");
+    let whole = std::fs::read(&part).unwrap();
+    std::fs::write(&part, &whole[..whole.len() - 9]).unwrap();
+    let known = Known::load(&place("pilot"), &larger).unwrap();
+    assert_eq!(known.progress.damaged.len(), 1, "{:?}", known.progress);
+    assert!(table(&larger, "again", Some(&known)) == anew);
+    assert_eq!(known.taken(), 10);
+
+    // Fewer than eight seeds are computed one by one, whose rows are others in the last bits.
+    let few = study(
+        "few",
+        &format!(
+            "seeds = 2\nmetrics = [\"rms_z_m\"]\naxes = [{}]",
+            pull("[1.0, 2.0]")
+        ),
+    );
+    let few = few.unwrap();
+    let known = Known::load(&place("pilot"), &few).unwrap();
+    table(&few, "few", Some(&known));
+    assert_eq!(known.taken(), 0);
+    assert!(
+        known
+            .says(4)
+            .contains("none was taken over: of the 16 runs")
+    );
+
+    for (rest, why) in [
+        ("metrics = [\"t_float\", \"rms_z_m\"]", "have no t_float"),
+        (
+            "metrics = [\"rms_z_m\"]\nrecordings = true",
+            "no recordings",
+        ),
+    ] {
+        let other = study("other", rest).unwrap();
+        let said = Known::load(&place("pilot"), &other).err().unwrap();
+        assert!(said.contains(why), "{said}");
     }
 }

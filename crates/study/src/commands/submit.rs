@@ -4,6 +4,7 @@ use super::{count, print, sweep, write_whole};
 use anyhow::{Context, Result, bail};
 use std::path::{Path, PathBuf};
 use std::process::Command;
+use study::sweep::known::Known;
 use study::sweep::parts::Store;
 
 /// Arguments of `study submit`.
@@ -24,6 +25,9 @@ pub struct Args {
     /// The study's folder, on a disk that all nodes share. Default: as for `study FILE.toml`.
     #[arg(long, value_name = "DIR")]
     out: Option<PathBuf>,
+    /// Take over the runs that another study has computed, as `study FILE.toml --reuse DIR` does.
+    #[arg(long, value_name = "DIR")]
+    reuse: Option<PathBuf>,
     /// Write the job and do not submit it.
     #[arg(long)]
     dry_run: bool,
@@ -67,6 +71,13 @@ pub fn run(args: &Args) -> Result<()> {
         .create()
         .map_err(anyhow::Error::msg)?;
     let out = std::path::absolute(&out)?;
+    let reuse = match &args.reuse {
+        Some(folder) => {
+            Known::load(folder, &plan).map_err(anyhow::Error::msg)?;
+            format!(" --reuse {}", shell(&std::path::absolute(folder)?))
+        }
+        None => String::new(),
+    };
     let study = std::env::current_exe().context("this program's own path is not known")?;
     let job = out.join("job.sh");
     let name: String = plan
@@ -85,7 +96,7 @@ pub fn run(args: &Args) -> Result<()> {
          #SBATCH --requeue\n\
          #SBATCH --open-mode=append\n\
          #SBATCH --output={}\n\
-         exec {} run {} --shard \"$SLURM_ARRAY_TASK_ID/{}\" --out {} --jobs \"${{SLURM_CPUS_PER_TASK:-{}}}\"\n",
+         exec {} run {} --shard \"$SLURM_ARRAY_TASK_ID/{}\" --out {} --jobs \"${{SLURM_CPUS_PER_TASK:-{}}}\"{reuse}\n",
         tasks,
         args.cpus,
         directive(&out.join("task-%a.log"))?,

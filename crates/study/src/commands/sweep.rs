@@ -7,6 +7,7 @@ use std::path::{Path, PathBuf};
 use std::sync::atomic::Ordering;
 use std::time::{Duration, Instant};
 use study::sweep::Plan;
+use study::sweep::known::Known;
 use study::sweep::parts::Store;
 use study::sweep::shard::Shard;
 use study::sweep::summary::Found;
@@ -36,6 +37,10 @@ pub struct Args {
     /// Go on where an earlier run of the same study stopped.
     #[arg(long)]
     resume: bool,
+    /// Take over the runs that another study has computed, from its folder: same scene, same seed, same row. So a study gets more seeds, points
+    /// or axes and computes only what is new.
+    #[arg(long, value_name = "DIR")]
+    reuse: Option<PathBuf>,
     /// Draw every metric into figures/ of the study's folder: over one axis, over two, or its distribution.
     #[arg(long)]
     figures: bool,
@@ -48,6 +53,7 @@ const EXAMPLES: &str = "Examples:
   study tongue.toml
   study tongue.toml --jobs 1 --out results
   study tongue.toml --resume
+  study tongue.toml --seeds 100 --out hundred --reuse tongue
   study tongue.toml --shard 3/8 --out /shared/tongue";
 
 /// The folder of a study where none is named.
@@ -76,8 +82,12 @@ pub fn run(args: &Args) -> Result<()> {
     let shard = args
         .shard
         .map_or_else(String::new, |s| format!(" --shard {s}"));
+    let reuse = args
+        .reuse
+        .as_ref()
+        .map_or_else(String::new, |dir| format!(" --reuse {}", dir.display()));
     let goes_on = format!(
-        "`study {} --resume --out {}{shard}` goes on",
+        "`study {} --resume --out {}{shard}{reuse}` goes on",
         out.join("study.toml").display(),
         out.display()
     );
@@ -89,8 +99,10 @@ pub fn run(args: &Args) -> Result<()> {
     if let Some(seeds) = args.seeds {
         plan = plan.with_seeds(seeds).map_err(anyhow::Error::msg)?;
     }
-    let store = Store::new(&plan, &out);
     let sentence = |e: String| anyhow!(e);
+    let known = args.reuse.as_ref().map(|dir| Known::load(dir, &plan));
+    let known = known.transpose().map_err(sentence)?;
+    let store = Store::new(&plan, &out).reusing(known.as_ref());
 
     let told = Shard::of_environment(args.shards, |name| std::env::var(name).ok());
     let shard = match &args.shard {
@@ -111,7 +123,13 @@ pub fn run(args: &Args) -> Result<()> {
         );
     }
     let _claim = store.create().map_err(sentence)?;
-    for damaged in there.damaged.iter().take(20) {
+    let lost = known.as_ref().map(|known| &known.progress.damaged);
+    for damaged in there
+        .damaged
+        .iter()
+        .chain(lost.into_iter().flatten())
+        .take(20)
+    {
         recording::note!("{damaged}: its runs are computed again");
     }
 
@@ -154,14 +172,17 @@ pub fn run(args: &Args) -> Result<()> {
     }
     let wall_s = began.elapsed().as_secs_f64();
     recording::note!(
-        "{} runs in {wall_s:.2} s ({:.1}/s), {} without a result{}",
+        "{} runs in {wall_s:.2} s ({:.1}/s), {} without a result{}{}",
         written.runs,
         written.runs as f64 / wall_s.max(1e-9),
         written.failed,
         match there.runs {
             0 => String::new(),
             n => format!("; {n} were there already"),
-        }
+        },
+        known
+            .as_ref()
+            .map_or_else(String::new, |known| known.says(written.runs))
     );
     if shard.is_some() {
         recording::note!(

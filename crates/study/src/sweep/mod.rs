@@ -2,6 +2,7 @@
 
 pub mod design;
 pub mod figures;
+pub mod known;
 pub mod parts;
 pub mod sensitivity;
 pub mod shard;
@@ -40,6 +41,9 @@ pub const FIXED_COLUMNS: &[&str] = &[
     "failed",
     "version",
 ];
+
+/// Of these, the columns behind the metrics.
+const AFTER_METRICS: usize = 7;
 
 /// What stands between two remarks of one run.
 const BETWEEN_REMARKS: &str = " | ";
@@ -293,10 +297,7 @@ impl Plan {
             std::panic::catch_unwind(AssertUnwindSafe(|| self.measure(runs, recordings)))
         };
         let mut rows = Vec::new();
-        let mut run = runs.start;
-        while run < runs.end {
-            let point = run..runs.end.min(run + self.spec.seeds - run % self.spec.seeds);
-            run = point.end;
+        for point in self.by_point(runs) {
             if let Ok(found) = measure(point.clone()) {
                 rows.extend(point.zip(found?).map(|(run, found)| self.row(run, found)));
                 continue;
@@ -319,15 +320,15 @@ impl Plan {
         Ok(rows)
     }
 
-    fn row(&self, run: u64, found: Measured) -> Vec<Cell> {
-        let Measured {
-            metrics,
-            stats,
-            remarks,
-            failed,
-        } = found;
-        // OK because all these counts are far below 2^63.
-        let whole = |n: u64| Cell::Whole(n as i64);
+    /// Runs, by the points that they are of.
+    fn by_point(&self, runs: Range<u64>) -> impl Iterator<Item = Range<u64>> {
+        let seeds = self.spec.seeds;
+        let points = runs.start / seeds..runs.end.div_ceil(seeds);
+        points.map(move |p| runs.start.max(p * seeds)..runs.end.min((p + 1) * seeds))
+    }
+
+    /// What stands before the metrics in the row of a run.
+    fn head(&self, run: u64) -> Vec<Cell> {
         let mut row = vec![whole(run), whole(run / self.spec.seeds)];
         for (value, column) in self
             .values(run / self.spec.seeds)
@@ -345,6 +346,17 @@ impl Plan {
             });
         }
         row.push(whole(self.seed(run)));
+        row
+    }
+
+    fn row(&self, run: u64, found: Measured) -> Vec<Cell> {
+        let Measured {
+            metrics,
+            stats,
+            remarks,
+            failed,
+        } = found;
+        let mut row = self.head(run);
         row.extend(metrics);
         row.resize(3 + self.spec.axes.len() + self.metrics.len(), Cell::Empty);
         let work = |of: fn(&Stats) -> u64| stats.as_ref().map_or(Cell::Empty, |s| whole(of(s)));
@@ -363,6 +375,18 @@ impl Plan {
         row
     }
 
+    /// How the runs of a scene are computed: by plan and scene alone, not by how many happen to be together, for a row is to be the same however
+    /// the runs are shared out.
+    fn way(&self, scene: &Scene) -> Way {
+        let samples = scene.duration_s * scene.log_rate_hz;
+        let auto = scene.solver.method == METHODS[0].name;
+        Way {
+            // A method that locates contacts keeps its tolerance without the account, and costs less. Others are judged by it alone.
+            unwatched: !self.keeps_account && scene.solver.energy && method_of(scene).locates,
+            abreast: self.goes_abreast() && auto && samples <= LONGEST_ABREAST,
+        }
+    }
+
     fn measure(
         &self,
         runs: Range<u64>,
@@ -372,13 +396,9 @@ impl Plan {
             Ok(scene) => scene,
             Err(reason) => return Ok(runs.map(|_| Measured::failed(reason.clone())).collect()),
         };
-        // A method that locates contacts keeps its tolerance without the account, and costs less. Others are judged by it alone.
-        let unwatched = !self.keeps_account && scene.solver.energy && method_of(&scene).locates;
+        let Way { unwatched, abreast } = self.way(&scene);
         scene.solver.energy &= !unwatched;
-        // By plan and scene alone, not by how many happen to be together: a row is to be the same however the runs are shared out.
-        let samples = scene.duration_s * scene.log_rate_hz;
-        let auto = scene.solver.method == METHODS[0].name;
-        if self.goes_abreast() && recordings.is_none() && auto && samples <= LONGEST_ABREAST {
+        if abreast && recordings.is_none() {
             let seeds = scene.seed..scene.seed + (runs.end - runs.start);
             let weigh = |columns: &Columns, stats: &Stats, outcome: &Result<(), Stopped>| {
                 let outcome = outcome.clone().map_err(|e| e.to_string());
@@ -499,6 +519,20 @@ fn with_its_account(scene: &Scene, seed: u64, measured: Measured) -> Measured {
             ..Measured::failed(reason.to_string())
         },
     }
+}
+
+/// How the runs of a point are computed.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+struct Way {
+    /// Without their energy account.
+    unwatched: bool,
+    /// Side by side.
+    abreast: bool,
+}
+
+/// A count in a table. OK because all these are far below 2^63.
+fn whole(n: u64) -> Cell {
+    Cell::Whole(n as i64)
 }
 
 /// Runs in the order in which threads are given them: shares of one size, then smaller ones.

@@ -8,6 +8,7 @@
 //! The blocks follow from the study alone, so the parts are the same files for any number of threads and any sharding.
 
 use super::Plan;
+use super::known::Known;
 use super::shard::Shard;
 use super::summary::{Found, Summary};
 use super::table::{Cell, Notes, Reader, Writer};
@@ -31,6 +32,7 @@ const LEFT: Duration = Duration::from_secs(3600);
 pub struct Store<'p> {
     plan: &'p Plan,
     folder: PathBuf,
+    known: Option<&'p Known>,
 }
 
 /// What there is of a study.
@@ -74,7 +76,14 @@ impl<'p> Store<'p> {
         Self {
             plan,
             folder: folder.into(),
+            known: None,
         }
+    }
+
+    /// The same, where runs that another study has are taken over from it.
+    #[must_use]
+    pub fn reusing(self, known: Option<&'p Known>) -> Self {
+        Self { known, ..self }
     }
 
     /// The merged table.
@@ -198,55 +207,25 @@ impl<'p> Store<'p> {
     /// A part that cannot be read, or that another study or another version of the program wrote.
     pub fn progress(&self, shard: Shard) -> Outcome<Progress> {
         self.parts(shard, self.plan.spec.recordings)
+            .map_err(elsewhere)
     }
 
-    fn parts(&self, shard: Shard, with_recordings: bool) -> Outcome<Progress> {
+    /// As [`Store::progress`], asking for recordings or not.
+    pub(super) fn parts(&self, shard: Shard, with_recordings: bool) -> Result<Progress, Foreign> {
         let mut found = Progress::default();
-        let notes = self.notes();
         for block in shard.of(self.plan.blocks()) {
-            let path = self.part(block);
-            if !path.exists() {
-                found.missing.push(block);
-                continue;
-            }
-            let say = |what: &str| {
-                format!(
-                    "{}: {what}; choose another --out, or delete it",
-                    path.display()
-                )
-            };
-            let mut damaged = |why: ParquetError| {
-                found.missing.push(block);
-                found
-                    .damaged
-                    .push(format!("{}: is damaged: {why}", path.display()));
-            };
-            let reader = match Reader::open(&path) {
-                Ok(reader) => reader,
-                Err(why) => {
-                    damaged(why);
+            let rows = match self.part_rows(block) {
+                Ok(Some(rows)) => rows,
+                Ok(None) => {
+                    found.missing.push(block);
                     continue;
                 }
-            };
-            for (name, expected) in &notes {
-                let there = reader.note(name).unwrap_or_default();
-                if there != expected {
-                    let differs = first_differences(there, expected);
-                    return Err(say(&match name.as_str() {
-                        "version" => {
-                            format!("was written by another version of this program, {there}")
-                        }
-                        "scene" => format!("is of the same study of another scene: {differs}"),
-                        _ => format!("is of another study: {differs}"),
-                    }));
-                }
-            }
-            let rows = match self.rows(block, &reader) {
-                Ok(rows) => rows,
-                Err(why) => {
-                    damaged(why);
+                Err(NoPart::Damaged(why)) => {
+                    found.missing.push(block);
+                    found.damaged.push(why);
                     continue;
                 }
+                Err(NoPart::Foreign(why)) => return Err(why),
             };
             if with_recordings && !self.recorded(&rows) {
                 found.missing.push(block);
@@ -256,6 +235,38 @@ impl<'p> Store<'p> {
             found.failed += rows.iter().filter(|row| !has_result(row)).count() as u64;
         }
         Ok(found)
+    }
+
+    /// The rows of a block's part; none where there is none.
+    ///
+    /// # Errors
+    /// Why the part is not taken.
+    pub(super) fn part_rows(&self, block: u64) -> Result<Option<Vec<Vec<Cell>>>, NoPart> {
+        let path = self.part(block);
+        if !path.exists() {
+            return Ok(None);
+        }
+        let damaged =
+            |why: ParquetError| NoPart::Damaged(format!("{}: is damaged: {why}", path.display()));
+        let part = Reader::open(&path).map_err(damaged)?;
+        for (name, expected) in &self.notes() {
+            let there = part.note(name).unwrap_or_default();
+            if there != expected {
+                let differs = first_differences(there, expected);
+                let path = path.display();
+                let foreign = match name.as_str() {
+                    "version" => Foreign::Version(format!(
+                        "{path}: was written by another version of this program, {there}"
+                    )),
+                    "scene" => Foreign::Study(format!(
+                        "{path}: is of the same study of another scene: {differs}"
+                    )),
+                    _ => Foreign::Study(format!("{path}: is of another study: {differs}")),
+                };
+                return Err(NoPart::Foreign(foreign));
+            }
+        }
+        self.rows(block, &part).map(Some).map_err(damaged)
     }
 
     fn recordings(&self) -> PathBuf {
@@ -341,7 +352,7 @@ impl<'p> Store<'p> {
             stop,
             |k| {
                 let pieces = self.pieces(blocks, shares.get(k)).into_iter();
-                let rows: Outcome<Vec<_>> = pieces.map(|p| self.plan.run(p, recordings)).collect();
+                let rows: Outcome<Vec<_>> = pieces.map(|p| self.rows_of(p, recordings)).collect();
                 rows.map(|rows| rows.concat())
             },
             |_, batch| {
@@ -362,6 +373,19 @@ impl<'p> Store<'p> {
             },
         )?;
         Ok(written)
+    }
+
+    /// The rows of some runs: computed, or taken over.
+    fn rows_of(&self, runs: Range<u64>, recordings: Option<&Path>) -> Outcome<Vec<Vec<Cell>>> {
+        let compute = |runs| self.plan.run(runs, recordings);
+        let Some(known) = self.known else {
+            return compute(runs);
+        };
+        let points = self.plan.by_point(runs);
+        let rows: Outcome<Vec<_>> = points
+            .map(|runs| known.complete(self.plan, runs, compute))
+            .collect();
+        Ok(rows?.concat())
     }
 
     /// The runs at some places in the row of all runs of `blocks`, where all blocks but the very last are of one size.
@@ -397,29 +421,6 @@ impl<'p> Store<'p> {
     /// # Errors
     /// Missing or unreadable parts; a table that cannot be written.
     pub fn merge(&self) -> Outcome<Found> {
-        let progress = self.parts(Shard::WHOLE, false)?;
-        if let Some(damaged) = progress.damaged.first() {
-            let further = match progress.damaged.len() - 1 {
-                0 => String::new(),
-                n => format!(", and so are {n} others"),
-            };
-            return Err(format!(
-                "{damaged}{further}; `study {} --resume` computes it again",
-                self.folder.join("study.toml").display()
-            ));
-        }
-        if let Some(first) = progress.missing.first() {
-            let runs = self.plan.block(*first);
-            return Err(format!(
-                "{}: {} of {} parts are missing, the first is that of runs {} to {}; `study {} --resume` computes them",
-                self.folder.display(),
-                progress.missing.len(),
-                self.plan.blocks(),
-                runs.start,
-                runs.end - 1,
-                self.folder.join("study.toml").display(),
-            ));
-        }
         let mut found = Err("nothing was merged".to_owned());
         let mut said = None;
         let written = write_whole(&self.folder.join("summary.csv"), |csv| {
@@ -437,26 +438,51 @@ impl<'p> Store<'p> {
         }
     }
 
+    /// Why the parts cannot be put together.
+    fn what_lacks(&self) -> String {
+        let progress = match self.parts(Shard::WHOLE, false) {
+            Ok(progress) => progress,
+            Err(why) => return elsewhere(why),
+        };
+        let again = format!(
+            "`study {} --resume` computes",
+            self.folder.join("study.toml").display()
+        );
+        if let Some(damaged) = progress.damaged.first() {
+            let further = match progress.damaged.len() - 1 {
+                0 => String::new(),
+                n => format!(", and so are {n} others"),
+            };
+            return format!("{damaged}{further}; {again} it again");
+        }
+        let folder = self.folder.display();
+        let Some(first) = progress.missing.first() else {
+            return format!("{folder}: a part was not whole a moment ago; merge again");
+        };
+        let runs = self.plan.block(*first);
+        format!(
+            "{folder}: {} of {} parts are missing, the first is that of runs {} to {}; {again} them",
+            progress.missing.len(),
+            self.plan.blocks(),
+            runs.start,
+            runs.end - 1,
+        )
+    }
+
     fn merge_into<W: Write>(
         &self,
         file: &mut Sink,
         summary: &mut Summary<W>,
-        damaged: &mut Option<String>,
+        lacks: &mut Option<String>,
     ) -> Result<(), ParquetError> {
         let mut writer = Writer::new(file, self.plan.columns(), &self.notes())?;
         let mut rows: Vec<Vec<Cell>> = Vec::new();
         for block in 0..self.plan.blocks() {
-            let path = self.part(block);
-            let mut named = |e: ParquetError| {
-                *damaged = Some(format!(
-                    "{}: is damaged: {e}; `study {} --resume` computes it again",
-                    path.display(),
-                    self.folder.join("study.toml").display()
-                ));
-                e
+            let Ok(Some(part)) = self.part_rows(block) else {
+                let why = lacks.insert(self.what_lacks());
+                return Err(ParquetError::General(why.clone()));
             };
-            let part = Reader::open(&path).map_err(&mut named)?;
-            for row in self.rows(block, &part).map_err(&mut named)? {
+            for row in part {
                 summary.row(&row)?;
                 rows.push(row);
                 if rows.len() == GROUP_ROWS {
@@ -469,6 +495,32 @@ impl<'p> Store<'p> {
             writer.group(&rows)?;
         }
         writer.close()
+    }
+}
+
+/// Why a part is not taken: a sentence.
+pub(super) enum NoPart {
+    /// It is not as it was written.
+    Damaged(String),
+    /// Somebody else wrote it.
+    Foreign(Foreign),
+}
+
+/// Who wrote a part that is not this study's, in a sentence.
+pub(super) enum Foreign {
+    /// Another study, or this one of another scene.
+    Study(String),
+    /// Another version of this program.
+    Version(String),
+}
+
+/// What to do about a part that is not this study's.
+fn elsewhere(foreign: Foreign) -> String {
+    match foreign {
+        Foreign::Study(why) => format!(
+            "{why}; choose another --out, where `--reuse` takes over the runs that both have, or delete it"
+        ),
+        Foreign::Version(why) => format!("{why}; choose another --out, or delete it"),
     }
 }
 
