@@ -204,3 +204,23 @@ pub const TOPICS: &[Topic] = &[
         frame: "",
     },
 ];
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn every_topic_stands_in_the_documentation() {
+        let page = concat!(env!("CARGO_MANIFEST_DIR"), "/../../docs/recording.md");
+        let text = std::fs::read_to_string(page).unwrap();
+        for topic in TOPICS {
+            let row = format!(
+                "| `{}` | `{}` | {} |",
+                topic.name,
+                topic.kind.schema(),
+                topic.content
+            );
+            assert!(text.lines().any(|line| line == row), "{row}");
+        }
+    }
+}
