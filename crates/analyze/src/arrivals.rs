@@ -30,6 +30,8 @@ pub struct Axis {
 
 /// Steps that scatter by more than this share of their mean are uneven.
 const UNEVEN: f64 = 0.25;
+/// More often than so no recorder takes down the messages of a topic.
+const MOST_COPIES: usize = 10;
 /// More than this share of messages that no time can be told of is worth a word.
 const MANY: f64 = 0.01;
 
@@ -60,12 +62,17 @@ impl Arrivals {
     /// Dates them, seconds since `start_ns`. Of those with one stamp the first counts; without useful stamps, of those with one log time whose
     /// content is the `same`.
     pub fn dated(&self, start_ns: i64, same: impl Fn(usize, usize) -> bool) -> Axis {
-        self.by_stamps(start_ns, &same)
-            .unwrap_or_else(|| self.by_log(start_ns, &same))
+        let once = self.once(&same);
+        let by_stamps = once.clone().and_then(|rows| self.by_stamps(start_ns, rows));
+        by_stamps.unwrap_or_else(|| {
+            let rows = once.unwrap_or_else(|| (0..self.len()).collect());
+            self.by_log(start_ns, rows, &same)
+        })
     }
 
-    /// By the stamps, where these are the better times. Stamps that many messages of other content share are those of packets.
-    fn by_stamps(&self, start_ns: i64, same: impl Fn(usize, usize) -> bool) -> Option<Axis> {
+    /// The messages in the order of their stamps, each once, where stamps tell them apart: a recorder may take one down twice, the second time later.
+    /// Stamps that many messages of other content share are those of packets, and of those that hardly change nothing can be told.
+    fn once(&self, same: impl Fn(usize, usize) -> bool) -> Option<Vec<usize>> {
         if self.stamp_ns.len() != self.len() {
             return None;
         }
@@ -73,11 +80,16 @@ impl Arrivals {
         let mut rows: Vec<usize> = (0..self.len()).collect();
         rows.sort_by_key(|r| stamp_ns[*r]);
         rows.dedup_by(|b, a| stamp_ns[*a] == stamp_ns[*b] && same(*a, *b));
-        let all = rows.len();
+        let steps = rows.windows(2);
+        let shared = steps.filter(|w| stamp_ns[w[0]] == stamp_ns[w[1]]).count();
+        let few = rows.len() * MOST_COPIES < self.len();
+        (!few && shared as f64 <= MANY * rows.len() as f64).then_some(rows)
+    }
+
+    /// By the stamps, where these are the better times.
+    fn by_stamps(&self, start_ns: i64, mut rows: Vec<usize>) -> Option<Axis> {
+        let stamp_ns = &self.stamp_ns;
         rows.dedup_by_key(|r| stamp_ns[*r]);
-        if (all - rows.len()) as f64 > MANY * all as f64 {
-            return None;
-        }
         let first_ns = stamp_ns[*rows.first()?];
         let log_s = self.log_s(&rows, start_ns);
         let mut stamps: Vec<f64> = rows
@@ -97,9 +109,13 @@ impl Arrivals {
     }
 
     /// By the log times; packets are spread.
-    fn by_log(&self, start_ns: i64, same: impl Fn(usize, usize) -> bool) -> Axis {
-        let mut rows: Vec<usize> = (0..self.len()).collect();
-        rows.sort_by_key(|r| self.log_ns[*r]);
+    fn by_log(
+        &self,
+        start_ns: i64,
+        mut rows: Vec<usize>,
+        same: impl Fn(usize, usize) -> bool,
+    ) -> Axis {
+        rows.sort_by_key(|r| (self.log_ns[*r], *r));
         rows.dedup_by(|b, a| self.log_ns[*a] == self.log_ns[*b] && same(*a, *b));
         let Dated { t_s, remark, .. } = dated(self.log_s(&rows, start_ns), None);
         let mut dates: Vec<(f64, usize)> = t_s.into_iter().zip(rows).collect();
@@ -279,6 +295,25 @@ mod tests {
         let axis = arrivals.dated(0, |a, b| a / 2 == b / 2);
         assert_eq!(axis.rows, (0..400).step_by(2).collect::<Vec<_>>());
         assert!(axis.remarks.is_empty(), "{:?}", axis.remarks);
+        // One in ten comes once more, 3 ms later, with its own stamp; or every one.
+        for every in [10, 1] {
+            let mut arrivals = Arrivals::default();
+            let mut taken = Vec::new();
+            for k in 0..900 {
+                for late in 0..if k % every == 0 { 2 } else { 1 } {
+                    arrivals.push(&[taken_ns(k) + late * 3_000_000], Some(&[taken_ns(k)]));
+                    taken.push(k);
+                }
+            }
+            let axis = arrivals.dated(0, |a, b| taken[a] == taken[b]);
+            assert_eq!(axis.t_s.len(), 900, "{every}");
+            assert!(axis.remarks.is_empty(), "{:?}", axis.remarks);
+            assert!(axis.rows.iter().zip(0..).all(|(row, k)| taken[*row] == k));
+        }
+        // At rest under stamps that are all zero nothing repeats.
+        let mut arrivals = Arrivals::default();
+        (0..900).for_each(|k| arrivals.push(&[taken_ns(k)], Some(&[0])));
+        assert_eq!(arrivals.dated(0, |_, _| true).t_s.len(), 900);
         // Packets of thirty, too few to tell their rate.
         let mut arrivals = Arrivals::default();
         (0..90).for_each(|k| arrivals.push(&[taken_ns(k / 30 * 30)], None));

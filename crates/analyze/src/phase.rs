@@ -338,9 +338,38 @@ pub fn unwrap(phase_rad: &[f64]) -> Vec<f64> {
     out
 }
 
+/// A phase that goes on, rad. One that takes more than a turn and never falls by half of one goes on already: where it leaps, it advanced.
+pub fn continuous(phase_rad: &[f64]) -> Vec<f64> {
+    let known = || phase_rad.iter().filter(|x| x.is_finite());
+    let (low, high) = known().fold((f64::INFINITY, f64::NEG_INFINITY), |(a, b), x| {
+        (a.min(*x), b.max(*x))
+    });
+    let falls = known().zip(known().skip(1)).any(|(a, b)| b - a < -PI);
+    match falls || high - low <= TAU {
+        true => unwrap(phase_rad),
+        false => phase_rad.to_vec(),
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn a_phase_that_goes_on_is_left_as_it_is() {
+        // 3.2 rad from one sample to the next: unwrapping would take it back.
+        let fast: Vec<f64> = (0..50).map(|k| 3.2 * f64::from(k)).collect();
+        assert_eq!(continuous(&fast), fast);
+        let slow: Vec<f64> = (0..50).map(|k| 0.5 * f64::from(k)).collect();
+        let wrapped: Vec<f64> = slow.iter().map(|x| wrap(*x)).collect();
+        for (a, b) in continuous(&wrapped).iter().zip(&slow) {
+            assert!((a - b).abs() < 1e-12);
+        }
+        let mut lost = fast.clone();
+        lost[20] = f64::NAN;
+        let found = continuous(&lost);
+        assert!(found[20].is_nan() && found[21] == fast[21]);
+    }
 
     #[test]
     fn locking_of_pairs_is_that_of_their_relative_phases() {

@@ -5,7 +5,7 @@ use std::collections::BTreeMap;
 use super::natural::natural;
 use super::pass::{Entry, Pass};
 use crate::inputs::{Inputs, between, nearest};
-use crate::phase::{unwrap, wrap};
+use crate::phase::{continuous, wrap};
 use crate::quality::Quality;
 use crate::roles::{AngleUnit, Role, RolesFile};
 
@@ -218,7 +218,7 @@ fn by_row(kept: &[(usize, f64)], messages: usize) -> Vec<Option<f64>> {
 fn wrapped(t_s: &[f64], x: &[f64], axis: &[f64]) -> Vec<f64> {
     let known = t_s.iter().zip(x).filter(|(_, x)| x.is_finite());
     let (t_s, x): (Vec<f64>, Vec<f64>) = known.unzip();
-    let straight = between(&t_s, &unwrap(&x), axis);
+    let straight = between(&t_s, &continuous(&x), axis);
     straight.into_iter().map(wrap).collect()
 }
 

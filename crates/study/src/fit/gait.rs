@@ -1,10 +1,11 @@
 //! What the carriers do: beat, pull, frequencies, amplitudes.
 
 use super::squares::{Block, bootstrapped, unexplained};
-use super::{BLOCK_S, Estimate, Field, Outcome, budgeted, estimate, unwrapped};
+use super::{BLOCK_S, Estimate, Field, Outcome, budgeted, estimate};
 use analyze::beat::adler::{Adler, VAGUE_RAD_PER_S};
 use analyze::imu::budget::Budget;
 use analyze::inputs::{Window, between, longest_step_s, mean_step_in, mean_step_s, stretches};
+use analyze::phase::continuous;
 use nalgebra::{DMatrix, DVector};
 use std::f64::consts::{PI, TAU};
 use std::ops::Range;
@@ -23,7 +24,7 @@ pub(super) fn gait(field: &Field) -> Result<Vec<Outcome>, String> {
     if i.phases_are_measured {
         return gait_from_steps(field, from);
     }
-    let phases: Vec<Vec<f64>> = i.phase_rad.iter().map(|p| unwrapped(&p[from..])).collect();
+    let phases: Vec<Vec<f64>> = i.phase_rad.iter().map(|p| continuous(&p[from..])).collect();
     if phases.iter().flatten().any(|p| !p.is_finite()) {
         return Err("phases have gaps".into());
     }
@@ -440,7 +441,7 @@ impl Increments {
     /// Where the beat was recorded: everything but its tempo is linear.
     fn under_a_beat(&self, coupled: bool) -> Result<Solved, String> {
         let (t_s, psi) = longest_heard(&self.t_s, &self.heard).ok_or("no beat")?;
-        let tempo = Tempo::of(&t_s, &unwrapped(&psi));
+        let tempo = Tempo::of(&t_s, &continuous(&psi));
         let keep = self.wanted(coupled, &[0]);
         let psi = |k: usize| self.heard[k];
         let no_tempo = |_: usize| 0.0;
@@ -689,7 +690,7 @@ fn gait_from_steps(field: &Field, from: usize) -> Result<Vec<Outcome>, String> {
     let (t_s, psi) = heard
         .filter(|(t_s, _)| t_s.len() >= 100)
         .ok_or("too few beats after the onset of the music")?;
-    let mut beat = Tempo::of(&t_s, &unwrapped(&psi)).told();
+    let mut beat = Tempo::of(&t_s, &continuous(&psi)).told();
     // A course through many beats errs less than they do, and slower: what it leaves of them tells no interval.
     if let (Ok(found), Some((hz, half))) = (&mut beat, field.heard_hz) {
         let half = half.max(LEAST_SURE * hz);
@@ -830,7 +831,7 @@ pub(super) fn amplitudes(field: &Field, window: Window) -> Result<Vec<Outcome>, 
     let phase_t = i.phase_times();
     let each = i.heave_m.iter().zip(&i.phase_rad).enumerate();
     each.map(|(c, (heave, phase))| {
-        let phase = between(phase_t, &unwrapped(phase), t_s);
+        let phase = between(phase_t, &continuous(phase), t_s);
         let mut blocks: Vec<Block<3>> = Vec::new();
         for (k, (z, phi)) in heave[range.clone()].iter().zip(&phase).enumerate() {
             if k.is_multiple_of(per_block) {

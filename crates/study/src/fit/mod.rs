@@ -40,10 +40,8 @@ mod read;
 mod squares;
 
 use analyze::inputs::{Inputs, Window, mean_step_s, stretches};
-use analyze::phase::unwrap;
 use contact::{contact, contact_from_sensors, pendulum};
 use gait::{amplitudes, gait};
-use std::f64::consts::{PI, TAU};
 use std::ops::Range;
 
 /// What a fit is made from.
@@ -188,19 +186,6 @@ fn even(t_s: &[f64]) -> Vec<Range<usize>> {
         }
     }
     parts
-}
-
-/// A phase that goes on, rad. One that takes more than a turn and never falls by half of one goes on already: where it leaps, it advanced.
-fn unwrapped(phase_rad: &[f64]) -> Vec<f64> {
-    let ends = |(a, b): (f64, f64), x: &f64| (a.min(*x), b.max(*x));
-    let (low, high) = phase_rad
-        .iter()
-        .fold((f64::INFINITY, f64::NEG_INFINITY), ends);
-    let falls = phase_rad.windows(2).any(|w| w[1] - w[0] < -PI);
-    match falls || high - low <= TAU {
-        true => unwrap(phase_rad),
-        false => phase_rad.to_vec(),
-    }
 }
 
 fn estimate(name: impl Into<String>, unit: &'static str, value: f64, half: f64) -> Outcome {
