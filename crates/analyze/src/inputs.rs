@@ -171,13 +171,19 @@ impl Default for Inputs {
 /// A force sensor's zero is right to so much of its mean reading.
 const ZERO_SHARE: f64 = 0.2;
 
+/// The strongest pull on a handle, N, below zero, where one is pulled beyond what a force sensor's zero may be off: handles are tied then.
+pub fn pulled_n<N: AsRef<[f64]>>(normal_n: &[N]) -> Option<f64> {
+    let each = || normal_n.iter().flat_map(|n| n.as_ref());
+    let finite = || each().filter(|n| n.is_finite());
+    let mean = finite().sum::<f64>() / finite().count().max(1) as f64;
+    let least = finite().copied().fold(f64::INFINITY, f64::min);
+    (least < -ZERO_SHARE * mean.abs()).then_some(least)
+}
+
 impl Inputs {
-    /// The strongest pull on a handle, N, below zero, where one is pulled beyond what a force sensor's zero may be off: handles are tied then.
+    /// [`pulled_n`] of all forces.
     pub fn pulled_n(&self) -> Option<f64> {
-        let finite = || self.normal_n.iter().flatten().filter(|n| n.is_finite());
-        let mean = finite().sum::<f64>() / finite().count().max(1) as f64;
-        let least = finite().copied().fold(f64::INFINITY, f64::min);
-        (least < -ZERO_SHARE * mean.abs()).then_some(least)
+        pulled_n(&self.normal_n)
     }
 
     /// The height on its own clock: times (s) and heights (m).

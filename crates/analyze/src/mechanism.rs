@@ -5,7 +5,7 @@ use crate::spline::derivatives;
 use std::fmt;
 use std::ops::Range;
 
-/// RMS roll below which there is nothing to explain (deg).
+/// RMS roll about its mean below which there is nothing to explain (deg).
 pub const QUIET_DEG: f64 = 1.0;
 /// The share of roll power that a line has to hold to be called the roll's line.
 pub const LINE_SHARE: f64 = 0.5;
@@ -15,7 +15,7 @@ pub const EXPLAINS: f64 = 0.8;
 /// A verdict on a window.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Verdict {
-    /// RMS roll below 1°.
+    /// RMS roll about its mean below 1°.
     Quiet,
     /// Roll at f/2, as a pendulum whose gravity the summed support modulates.
     Parametric,
@@ -66,6 +66,8 @@ pub struct RollFit {
 pub struct Evidence {
     /// RMS roll about zero (rad).
     pub rms_roll_rad: f64,
+    /// RMS roll about its mean (rad): a load that only leans has nothing that drives it.
+    pub swing_rad: f64,
     /// The height's strongest line f (Hz).
     pub f_hz: Option<f64>,
     /// Share of roll power near f/2.
@@ -82,7 +84,7 @@ impl Evidence {
     /// The word for the evidence.
     ///
     /// ```text
-    /// quiet        RMS roll < 1°
+    /// quiet        RMS roll about its mean < 1°
     /// parametric   share near f/2 ≥ 0.5, and, where there are forces, a > 0, R² ≥ 0.8 and fed ≥ b/2
     /// direct       share near f ≥ 0.5
     /// mixed        everything else
@@ -93,7 +95,7 @@ impl Evidence {
     /// # Errors
     /// Without a line in the height there is no f to compare with: the reason is returned.
     pub fn verdict(&self) -> Result<Verdict, String> {
-        if self.rms_roll_rad.to_degrees() < QUIET_DEG {
+        if self.swing_rad.to_degrees() < QUIET_DEG {
             return Ok(Verdict::Quiet);
         }
         let (Some(half), Some(at_f)) = (self.share_at_half, self.share_at_f) else {
@@ -117,7 +119,12 @@ impl fmt::Display for Evidence {
         // No more digits than hold where noise is in it, which the metric of that name leaves out.
         write!(f, "RMS roll {:.1}°", self.rms_roll_rad.to_degrees())?;
         if self.verdict() == Ok(Verdict::Quiet) {
-            return write!(f, ", below {QUIET_DEG}°: nothing to explain");
+            let leans = self.rms_roll_rad.to_degrees() >= QUIET_DEG;
+            let about = match leans {
+                true => format!(", {:.1}° about its mean", self.swing_rad.to_degrees()),
+                false => String::new(),
+            };
+            return write!(f, "{about}, below {QUIET_DEG}°: nothing to explain");
         }
         if let (Some(hz), Some(half), Some(at_f)) = (self.f_hz, self.share_at_half, self.share_at_f)
         {
@@ -403,6 +410,7 @@ mod tests {
         };
         let e = Evidence {
             rms_roll_rad: 0.3,
+            swing_rad: 0.3,
             f_hz: Some(2.0),
             share_at_half: Some(0.9),
             share_at_f: Some(0.01),
@@ -410,13 +418,16 @@ mod tests {
             per_mass: false,
         };
         assert_eq!(e.verdict(), Ok(Verdict::Parametric));
-        assert_eq!(
-            Evidence {
-                rms_roll_rad: 0.01,
-                ..e.clone()
-            }
-            .verdict(),
-            Ok(Verdict::Quiet)
+        // A load that leans by 17° and does not swing.
+        let leans = Evidence {
+            swing_rad: 0.01,
+            ..e.clone()
+        };
+        assert_eq!(leans.verdict(), Ok(Verdict::Quiet));
+        assert!(
+            leans
+                .to_string()
+                .contains("RMS roll 17.2°, 0.6° about its mean, below 1°")
         );
         assert_eq!(
             Evidence {

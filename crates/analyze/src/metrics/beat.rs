@@ -5,11 +5,13 @@ use super::{Context, Value};
 use crate::beat::adler::{Adler, VAGUE_RAD_PER_S};
 use crate::beat::lock::RATIOS;
 use crate::inputs::between;
-use crate::phase::{Circular, circular, hilbert, relative_phase, unwrap};
+use crate::phase::{Circular, circular, continuous, hilbert, relative_phase, unwrap};
 use std::f64::consts::TAU;
 
 /// A relative phase of this resultant or more stays.
 const STAYS: f64 = 0.9;
+/// A relative phase of a smaller resultant has no mean worth a name: beside it the phase is anywhere.
+const FOLLOWS: f64 = 0.5;
 /// The analytic signal knows no phase so near its ends, s.
 const ENDS_S: f64 = 2.0;
 /// Any two rhythms keep step for a shorter time than this, s.
@@ -24,11 +26,28 @@ pub(super) fn carriers(c: &Context) -> Vec<Circular> {
 }
 
 pub fn beat_lead_deg(c: &Context) -> Value {
-    let leads: Vec<f64> = carriers(c).iter().map(|p| p.mean_rad).collect();
-    match circular(leads.iter().copied()) {
-        Some(all) => Value::number(all.mean_rad.to_degrees())
-            .per(leads.iter().map(|lead| lead.to_degrees()).collect()),
-        None => Value::missing("no carrier's phase in the window"),
+    let all = carriers(c);
+    if all.is_empty() {
+        return Value::missing("no carrier's phase in the window");
+    }
+    let follow = |p: &&Circular| p.resultant >= FOLLOWS;
+    let leads = all.iter().filter(follow).map(|p| p.mean_rad);
+    let resultants: Vec<String> = all.iter().map(|p| format!("{:.2}", p.resultant)).collect();
+    let resultants = resultants.join(", ");
+    let Some(lead) = circular(leads.clone()) else {
+        return Value::missing(format!(
+            "no carrier follows the beat: |⟨exp(i(φ_j − ψ))⟩| = {resultants}"
+        ));
+    };
+    let left_out = leads.count() < all.len();
+    Value {
+        reason: left_out.then(|| {
+            format!(
+                "of those who follow the beat, by at least {FOLLOWS}: |⟨exp(i(φ_j − ψ))⟩| = {resultants}"
+            )
+        }),
+        ..Value::number(lead.mean_rad.to_degrees())
+            .per(all.iter().map(|p| p.mean_rad.to_degrees()).collect())
     }
 }
 
@@ -43,8 +62,9 @@ pub fn detuning_rad_per_s(c: &Context) -> Value {
             "nobody saw how the carriers came to the beat: who is with it does not show what they would do alone",
         );
     }
+    let intervals = || format!("each carrier's: {}", with_intervals(found));
     Value {
-        reason: Some(format!("each carrier's: {}", with_intervals(found))),
+        reason: found.strained().or_else(|| Some(intervals())),
         ..Value::number(mean(each)).per(each.clone())
     }
 }
@@ -73,6 +93,12 @@ pub fn pull_rad_per_s(c: &Context) -> Value {
             false => "the phases go with no pull as with any".to_owned(),
         });
     }
+    if let Some(why) = found.strained() {
+        return Value {
+            reason: Some(why),
+            ..Value::number(found.pull_rad_per_s)
+        };
+    }
     Value {
         reason: Some(format!(
             "grows in τ = {:.1} s; phase noise {:.4} rad/√s",
@@ -95,6 +121,12 @@ pub fn coupling_rad_per_s(c: &Context) -> Value {
         return Value::missing(format!(
             "anything from {low:.1} to {high:.1} rad/s goes with the phases (95 %)"
         ));
+    }
+    if let Some(why) = found.strained() {
+        return Value {
+            reason: Some(why),
+            ..Value::number(strength)
+        };
     }
     let none = low <= 0.0 && high >= 0.0;
     Value {
@@ -122,6 +154,12 @@ pub fn captured(c: &Context) -> Value {
     let Some((found, inside)) = tested else {
         return Value::bool(stays);
     };
+    if let Some(why) = found.strained() {
+        return Value {
+            reason: Some(format!("by the phases alone: {why}")),
+            ..Value::bool(stays)
+        };
+    }
     let [low, high] = found.pull_ci95_rad_per_s;
     Value {
         reason: Some(format!(
@@ -161,7 +199,7 @@ pub fn roll_lock(c: &Context) -> Value {
     let inside = roll.t_s.partition_point(|t| *t < from)..roll.t_s.partition_point(|t| *t <= to);
     let phi = unwrap(&phase[inside.clone()]);
     // Where the beat pauses there is nothing to be in step with.
-    let psi = between(&times, &unwrap(&beat), &roll.t_s[inside]);
+    let psi = between(&times, &continuous(&beat), &roll.t_s[inside]);
     let (phi, psi): (Vec<f64>, Vec<f64>) = phi
         .into_iter()
         .zip(psi)
@@ -234,6 +272,38 @@ mod tests {
         assert_eq!(m.get("roll_lock").unwrap().as_word(), None);
     }
 
+    /// One follows, one walks 0.3 Hz faster: the lead is the first's.
+    #[test]
+    fn who_does_not_follow_the_beat_has_no_lead() {
+        let mut inputs = walk(1.0, 0.3);
+        inputs.phase_rad.swap(0, 1);
+        let lead = |inputs: &Inputs| {
+            metrics(inputs, Window::ALL)
+                .get("beat_lead_deg")
+                .unwrap()
+                .clone()
+        };
+        let found = lead(&inputs);
+        assert!((found.as_f64().unwrap() - 50.0).abs() < 1e-6, "{found:?}");
+        assert!(found.reason.unwrap().starts_with("of those who follow"));
+        inputs.phase_rad.swap_remove(0);
+        let found = lead(&inputs);
+        assert_eq!(found.as_f64(), None);
+        assert!(found.reason.unwrap().contains("no carrier follows"));
+    }
+
+    /// 2 Hz told 3.75 times a second, as it goes on: from one message to the next it turns by more than half.
+    #[test]
+    fn a_beat_that_comes_unwrapped_may_come_seldom() {
+        let mut inputs = walk(3.0, 0.0);
+        let every = |x: &[f64]| x.iter().copied().step_by(8).collect::<Vec<f64>>();
+        inputs.phase_t_s = every(&inputs.t_s);
+        inputs.beat_phase_rad = every(&inputs.beat_phase_rad);
+        inputs.phase_rad = inputs.phase_rad.iter().map(|p| every(p)).collect();
+        let m = metrics(&inputs, Window::from(10.0));
+        assert_eq!(m.get("roll_lock").unwrap().as_word(), Some("3:2"));
+    }
+
     #[test]
     fn carriers_ahead_of_the_beat_lead_it_and_those_who_slip_are_not_captured() {
         let m = metrics(&walk(1.0, 0.0), Window::ALL);
@@ -275,6 +345,47 @@ mod tests {
         }
         inputs.beat_phase_rad[..300].fill(f64::NAN);
         inputs
+    }
+
+    /// Two carriers with noise, pulled from 10 s on by `pulls`; who minds nobody.
+    fn pulled_by(pulls: [f64; 2]) -> Inputs {
+        let mut random = crate::random::Random(11);
+        let (dt, omega, noise) = (1.0 / 300.0, TAU * 2.0, 0.02);
+        let mut inputs = walk(1.0, 0.0);
+        let mut phase = [0.3, 2.0];
+        inputs.phase_rad = vec![vec![], vec![]];
+        for k in 0..18_000 {
+            let t = f64::from(k) * dt;
+            for c in 0..2 {
+                if k % 10 == 0 {
+                    inputs.phase_rad[c].push(phase[c]);
+                }
+                let heard = if t < 10.0 { 0.0 } else { pulls[c] };
+                let own = omega + [0.5, -0.7][c];
+                phase[c] += dt * (own + heard * (omega * t - phase[c]).sin());
+                phase[c] += noise * f64::sqrt(dt) * random.normal();
+            }
+        }
+        inputs.beat_phase_rad[..300].fill(f64::NAN);
+        inputs
+    }
+
+    /// One K for all, where the beat pulls one carrier and not the other, would come out in between, with an interval as narrow as ever.
+    #[test]
+    fn a_pull_that_is_not_the_same_for_all_is_said() {
+        for (pulls, same) in [([1.5, 1.5], true), ([1.5, 1.0], false), ([1.5, 0.0], false)] {
+            let m = metrics(&pulled_by(pulls), Window::ALL);
+            for name in ["pull_rad_per_s", "coupling_rad_per_s", "detuning_rad_per_s"] {
+                let found = m.get(name).unwrap();
+                let why = found.reason.as_deref().unwrap_or_default();
+                assert_eq!(
+                    !why.contains("do more than follow"),
+                    same,
+                    "{pulls:?} {name}: {found:?}"
+                );
+                assert!(same || found.ci95.is_none(), "{pulls:?} {name}: {found:?}");
+            }
+        }
     }
 
     #[test]

@@ -1,6 +1,7 @@
 //! Who holds it and when nobody does: contact, unloading, force statistics.
 
 use super::{Context, Value};
+use crate::inputs::pulled_n;
 use crate::pairs::products;
 use crate::summary::rounding;
 use nalgebra::DMatrix;
@@ -24,7 +25,7 @@ pub fn contact_loss(c: &Context) -> Value {
         .filter(|k| forces.columns.iter().any(|n| n[*k] <= 0.0))
         .count();
     Value {
-        reason: tied(c),
+        reason: tied(c).or_else(|| floats_without_slack(c)),
         ..Value::number(share(slack, forces.len()))
     }
 }
@@ -40,17 +41,34 @@ pub fn contact_loss_mean(c: &Context) -> Value {
         .map(|n| share(n.iter().filter(|n| **n <= 0.0).count(), n.len()))
         .collect();
     Value {
-        reason: tied(c),
+        reason: tied(c).or_else(|| floats_without_slack(c)),
         ..Value::number(mean(&per)).per(per)
     }
 }
 
 /// Said where a handle is pulled down, which one that only rests never is.
 fn tied(c: &Context) -> Option<String> {
-    let least_n = c.inputs.pulled_n()?;
+    let least_n = pulled_n(&c.forces().columns)?;
     Some(format!(
         "handles are pulled, with up to {:.0} N: they are tied, and where N ≤ 0 they are not slack",
         -least_n
+    ))
+}
+
+/// So many samples show a zero.
+const FEWEST_AFLOAT: usize = 10;
+
+/// Said where nobody holds the load and yet no handle reads nought: what a sensor reads of nothing is its zero.
+fn floats_without_slack(c: &Context) -> Option<String> {
+    let weight_n = c.weight_n().ok()?;
+    let (forces, total) = (c.forces(), c.total_force_n());
+    let afloat = |k: &usize| total[*k] <= FLOAT_SHARE * weight_n;
+    let afloat: Vec<usize> = (0..total.len()).filter(afloat).collect();
+    let held = |k: &&usize| forces.columns.iter().all(|n| n[**k] > 0.0);
+    let held = afloat.iter().filter(held).count();
+    (afloat.len() >= FEWEST_AFLOAT && 2 * held > afloat.len()).then(|| format!(
+        "in {:.1} % of the window the summed support is below {FLOAT_SHARE} M·g (`t_float`), and in most of that no handle reads N ≤ 0: the sensors' zeros are off, and contact is lost more often than they say",
+        100.0 * share(afloat.len(), total.len())
     ))
 }
 
@@ -128,4 +146,58 @@ fn variance(x: &[f64]) -> f64 {
     let v = (squares - sum * sum / n) / n;
     // What is no number stays none.
     if v < 0.0 { 0.0 } else { v }
+}
+
+#[cfg(test)]
+mod tests {
+    use crate::inputs::{Inputs, Window};
+    use crate::metrics::metrics;
+
+    /// Two handles of 60 kg that are thrown for a third of every second, read by sensors whose zero is off by `zero_n`.
+    fn thrown(zero_n: f64) -> Inputs {
+        let t_s: Vec<f64> = (0..600).map(|k| f64::from(k) / 30.0).collect();
+        let held = |t: &f64| {
+            if (t.fract() * 30.0).round() < 10.0 {
+                0.0
+            } else {
+                441.45
+            }
+        };
+        let n: Vec<f64> = t_s.iter().map(|t| held(t) + zero_n).collect();
+        Inputs {
+            normal_n: vec![n.clone(), n],
+            mass_kg: Some(60.0),
+            gravity_m_per_s2: 9.81,
+            t_s,
+            ..Inputs::default()
+        }
+    }
+
+    #[test]
+    fn sensors_that_read_something_of_nothing_are_said() {
+        for (zero_n, lost) in [(0.0, 1.0 / 3.0), (3.0, 0.0)] {
+            let m = metrics(&thrown(zero_n), Window::ALL);
+            for name in ["contact_loss", "contact_loss_mean"] {
+                let found = m.get(name).unwrap();
+                assert!((found.as_f64().unwrap() - lost).abs() < 0.01, "{found:?}");
+                let said = found.reason.as_deref().unwrap_or_default();
+                assert_eq!(said.contains("zeros are off"), zero_n > 0.0, "{said}");
+            }
+        }
+    }
+
+    #[test]
+    fn a_pull_outside_the_window_says_nothing_of_it() {
+        let mut inputs = thrown(0.0);
+        inputs.normal_n[0][0] = -1300.0;
+        let said = |window| {
+            metrics(&inputs, window)
+                .get("contact_loss")
+                .unwrap()
+                .reason
+                .clone()
+        };
+        assert!(said(Window::ALL).unwrap().contains("up to 1300 N"));
+        assert_eq!(said(Window::from(5.0)), None);
+    }
 }

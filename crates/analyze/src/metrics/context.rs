@@ -243,6 +243,18 @@ impl<'a> Context<'a> {
             .as_ref()
     }
 
+    /// Why the height's line is none, where a beat sounds that is faster than the height's samples can show: what they show instead is an alias.
+    pub fn aliased(&self) -> Option<String> {
+        self.missing(Need::Beat).is_none().then_some(())?;
+        let beat_hz = super::together::beat_hz(self).as_f64()?;
+        let half_rate_hz = 0.5 / self.height().step_s()?;
+        (beat_hz > half_rate_hz).then(|| format!(
+            "the height has {:.2} samples per second, too few for a motion at the beat's {beat_hz:.2} Hz: more than {:.2} are needed",
+            2.0 * half_rate_hz,
+            2.0 * beat_hz
+        ))
+    }
+
     /// Why the roll cannot be held against the height's line, where it is sampled too slowly to show that.
     pub fn too_slow(&self) -> Option<String> {
         let hz = self.height_line()?.hz;

@@ -9,11 +9,17 @@ const H2_HALF_WIDTH_HZ: f64 = 0.45;
 const NO_LINE: &str = "the signal does not move in the window, or has fewer than four samples";
 
 pub fn peak_hz(c: &Context) -> Value {
+    if let Some(why) = c.aliased() {
+        return Value::missing(why);
+    }
     c.height_line()
         .map_or_else(|| Value::missing(NO_LINE), |line| Value::number(line.hz))
 }
 
 pub fn h2_ratio(c: &Context) -> Value {
+    if let Some(why) = c.aliased() {
+        return Value::missing(why);
+    }
     let Some(line) = c.height_line() else {
         return Value::missing(NO_LINE);
     };
@@ -42,7 +48,7 @@ pub fn subharmonic_ratio(c: &Context) -> Value {
     let Some(line) = c.height_line() else {
         return Value::missing("the height has no line to compare with");
     };
-    if let Some(why) = c.too_slow() {
+    if let Some(why) = c.aliased().or_else(|| c.too_slow()) {
         return Value::missing(why);
     }
     let Some(shares) = Shares::of(&c.roll().t_s, &c.roll().x, line.hz) else {

@@ -306,7 +306,7 @@ pub const METRICS: &[Metric] = &[
         needs: &[Need::Phases, Need::Beat],
         compute: beat::beat_lead_deg,
         origin: "Mardia & Jupp 2000",
-        definition: "Circular mean of φ_j − ψ over the part of W in which a beat sounds, positive ahead of the beat; `per` lists the carriers. Phases that steps tell are counted as a model's: 0 on the way up, a step at −90°.",
+        definition: "Circular mean, over the carriers who follow the beat (|⟨exp(i(φ_j − ψ))⟩| ≥ 0.5), of each one's circular mean of φ_j − ψ over the part of W in which a beat sounds, positive ahead of the beat; `per` lists all carriers. Phases that steps tell are counted as a model's: 0 on the way up, a step at −90°.",
     },
     Metric {
         name: "detuning_rad_per_s",
@@ -423,7 +423,7 @@ pub const METRICS: &[Metric] = &[
         needs: &[Need::Height],
         compute: lines::peak_hz,
         origin: ARCHIVE,
-        definition: "Frequency of the largest magnitude of the unwindowed real Fourier transform of the height about its mean over W.",
+        definition: "Frequency of the largest magnitude of the unwindowed real Fourier transform of the height about its mean over W; none, and nothing that rests on it, where a beat sounds at more than half the height's sampling rate.",
     },
     Metric {
         name: "h2_ratio",

@@ -1,5 +1,6 @@
 //! When it starts to roll.
 
+use super::contact::{deviation, mean};
 use super::{Context, Value};
 use crate::inputs::{mean_step_s, stretches};
 
@@ -47,20 +48,35 @@ pub fn onset_time_s(c: &Context) -> Value {
         "it rolls so from the window's beginning on, and may have begun before".to_owned()
     });
     Value {
-        reason,
+        reason: leans(c).or(reason),
         ..Value::number(onset_s)
     }
 }
 
+/// Said where the roll's mean alone takes it so far, and it hardly moves.
+fn leans(c: &Context) -> Option<String> {
+    let roll = &c.roll().x;
+    let [mean_deg, swing_deg] = [mean(roll), deviation(roll)].map(f64::to_degrees);
+    (swing_deg < MOVES_DEG && mean_deg.abs() > ONSET_ROLL_DEG - MOVES_DEG).then(|| format!(
+        "it leans by {mean_deg:.1}° and moves about that by {swing_deg:.1}° (SD): nothing begins to swing"
+    ))
+}
+
 pub fn unstable(c: &Context) -> Value {
     if c.onset().is_some() {
-        return Value::bool(true);
+        return Value {
+            reason: leans(c),
+            ..Value::bool(true)
+        };
     }
     match holds_one(c) {
         true => Value::bool(false),
         false => Value::missing(TOO_SHORT),
     }
 }
+
+/// A roll that moves by less (SD) does not swing, deg.
+const MOVES_DEG: f64 = 2.0;
 
 const TOO_SHORT: &str = "the window holds no 2 s of roll without a hole";
 
@@ -89,6 +105,26 @@ mod tests {
         // 0.5² m' > 60 (10°)² needs m' = 8 samples.
         let first = t.iter().position(|t| *t > 30.0).unwrap();
         assert_eq!(onset_s(&t, &late), Some(t[first + 7]));
+    }
+
+    #[test]
+    fn a_load_that_leans_is_not_said_to_begin_to_swing() {
+        use crate::inputs::{Inputs, Window};
+        let said = |swing: f64, name: &str| {
+            let t_s: Vec<f64> = (0..1800).map(|k| f64::from(k) / 30.0).collect();
+            let roll = t_s.iter().map(|t| 0.29 + swing * (7.0 * t).sin());
+            let inputs = Inputs {
+                roll_rad: roll.collect(),
+                t_s,
+                ..Inputs::default()
+            };
+            let found = crate::metrics::metrics(&inputs, Window::ALL);
+            found.get(name).unwrap().reason.clone().unwrap_or_default()
+        };
+        for name in ["unstable", "onset_time_s"] {
+            assert!(said(0.01, name).contains("it leans by 16.6° and moves about that by 0.4°"));
+            assert!(!said(0.3, name).contains("leans"));
+        }
     }
 
     #[test]

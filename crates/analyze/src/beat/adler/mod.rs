@@ -20,7 +20,8 @@
 //! What carriers do to each other is K_c [rad/s], from everybody to everybody alike, with the others' phases as they were observed. It is
 //! always looked for: left out, a pull of 2.7 beside a coupling of 0.5 came out as 3.5. Carriers whom a coupling holds together before the
 //! music (K_c beyond their detunings' difference) do not show both apart. Measured phases of steady walkers err by more than these wander, and
-//! a coupling of 1 or more is then found too weak, and the detunings with it.
+//! a coupling of 1 or more is then found too weak, and the detunings with it. Whether one K and one K_c say all that recorded phases do is tested:
+//! σ, which takes up what they leave, must be the σ that second differences over a tenth of a second show.
 //! Source: R. Adler, Proc. IRE 34 (1946) 351; Pikovsky, Rosenblum & Kurths, Synchronization (2001), ch. 7 and 9;
 //! Särkkä, Bayesian Filtering and Smoothing (2013), ch. 9 and 12.
 
@@ -41,7 +42,7 @@ use likelihood::Score;
 use nalgebra::DVector;
 use rayon::prelude::*;
 use unknowns::{BUILD_UP, COUPLING, LEAST, MOST, OFFSET, OWN, PULL, place};
-use walk::Walk;
+use walk::{Shown, Walk};
 
 /// What phases and a beat say of the pull.
 #[derive(Clone, Debug, PartialEq)]
@@ -65,7 +66,16 @@ pub struct Adler {
     pub coupling_rad_per_s: Option<[f64; 2]>,
     /// Ω, from which the detunings are counted, rad/s.
     pub beat_rad_per_s: f64,
+    /// σ as recorded phases show it within a tenth of a second, where it can be told apart from what draws them, rad/√s.
+    pub shown: Option<Shown>,
 }
+
+/// A fit that leaves more than the noise that the phases show by so many of its standard errors leaves more than noise.
+const MORE_THAN_NOISE: f64 = 3.0;
+/// What the closure, the grid and the least σ leave of any phases, rad/√s.
+const LEFT_RAD_PER_SQRT_S: f64 = 6e-4;
+/// Pulls that draw a phase by more than this share of its distance within the lag are not told from noise.
+const DRAWN: f64 = 0.3;
 
 impl Adler {
     /// [`adler`] on a recording's columns.
@@ -81,6 +91,23 @@ impl Adler {
             beat,
             inputs.phases_are_measured,
         )
+    }
+
+    /// What does not go with Adler's equation, in a sentence: carriers whom the beat pulls unequally, who mind some more than others, or do anything
+    /// else that one K and one K_c for all cannot say. Numbers are then those of the nearest that can, and their intervals hold nothing.
+    pub fn strained(&self) -> Option<String> {
+        let (
+            left,
+            Shown {
+                noise: shown,
+                error,
+                ..
+            },
+        ) = (self.noise_rad_per_sqrt_s, self.shown?);
+        let most = (shown * (1.0 + MORE_THAN_NOISE * error)).hypot(LEFT_RAD_PER_SQRT_S);
+        (left > most).then(|| format!(
+            "carriers do more than follow one beat with one pull and mind all others alike, which leaves {left:.4} rad/√s where the phases wander by {shown:.4} within a tenth of a second"
+        ))
     }
 
     /// Whether every |Δω| ≤ K; `None` where K is not known.
@@ -156,6 +183,9 @@ pub fn adler(
             .then(|| [x[COUPLING], half_of(cover[COUPLING]).hypot(1.96 * lost)]),
         offset_rad: (0..carriers).map(|c| wrap(x[place(OFFSET, c)])).collect(),
         beat_rad_per_s: walk.omega_rad_per_s,
+        shown: walk
+            .shown
+            .filter(|shown| shown.lag_s * (x[PULL].exp() + x[COUPLING].abs()) < DRAWN),
     };
     let finite = best.value.is_finite() && cover.iter().all(|c| c.is_finite());
     finite.then_some(found).ok_or(walk::TOO_LITTLE)

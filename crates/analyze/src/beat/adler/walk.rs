@@ -5,6 +5,7 @@ use super::unknowns::{BUILD_UP, ERROR, NOISE, OFFSET, OWN, PULL, SHARED, place};
 use crate::beat::smooth::smooth;
 use crate::imu::track::period_s;
 use crate::inputs::placed;
+use crate::median::median;
 use nalgebra::{DVector, Matrix3, Vector3};
 use std::f64::consts::TAU;
 
@@ -69,10 +70,79 @@ pub struct Walk {
     pub before_s: f64,
     /// Ω, rad/s.
     pub omega_rad_per_s: f64,
+    /// σ as recorded phases show it within a tenth of a second, whatever draws them slowly.
+    pub shown: Option<Shown>,
     /// Least σ², rad²/s.
     pub least_noise: f64,
     /// Least ε², rad².
     pub least_error: f64,
+}
+
+/// Lags that differ by less than this share of a step are of one length.
+const EVEN: f64 = 0.01;
+/// The median of a normal distribution's magnitude, in its SD.
+const MEDIAN: f64 = 0.6745;
+
+/// The longer of two lags, s: slow enough for noise that has a memory of its own, fast enough for most pulls.
+const LAG_S: f64 = 0.1;
+
+/// Farther from nought, in SDs, is no noise: a beat's beginning, a slip. What a normal distribution has within is this share of its variance.
+const TRIM: [f64; 2] = [3.0, 0.9733];
+/// Variances over a longer lag that grow by so much more than noise without a memory are of noise with one, or of no noise.
+const REMEMBERS: f64 = 1.2;
+
+/// σ within a tenth of a second.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Shown {
+    /// rad/√s.
+    pub noise: f64,
+    /// Its relative standard error, about.
+    pub error: f64,
+    /// The longer lag that it is seen over, s.
+    pub lag_s: f64,
+}
+
+/// σ by the second differences of phases at two lags; `None` where noise has a memory longer than the shorter.
+///
+/// ```text
+/// var(y(t + h) − 2 y(t) + y(t − h)) = 2σ²(h − T/2) + 6ε²
+/// ```
+/// of a Wiener process that is interpolated between steps T ≤ h and observed with an error ε: its slope in h is 2σ², whatever T and ε. A smooth
+/// course adds one of order h⁴. Variances are those within three SDs of nought, of each carrier; σ² is their mean.
+fn shown_noise(t_s: &[f64], phases: &[Vec<f64>], step_s: f64) -> Option<Shown> {
+    let long = (LAG_S / step_s).round().max(2.0) as usize;
+    let hops = [long / 2, long];
+    let lag_s = hops[1] as f64 * step_s;
+    let mut count = 0;
+    let mut variance = |y: &[f64], hop: usize| {
+        let span_s = 2.0 * hop as f64 * step_s;
+        let even = |k: &usize| (t_s[k + 2 * hop] - t_s[*k] - span_s).abs() < EVEN * step_s;
+        let places = (0..t_s.len().saturating_sub(2 * hop)).filter(even);
+        let bends = places.map(|k| (y[k + 2 * hop] - 2.0 * y[k + hop] + y[k]).abs());
+        let mut bends: Vec<f64> = bends.filter(|x| x.is_finite()).collect();
+        count += bends.len();
+        let usual = median(&mut bends)? / MEDIAN;
+        let near = || bends.iter().filter(|x| **x < TRIM[0] * usual);
+        let n = near().count();
+        let squares: f64 = near().map(|x| x * x).sum();
+        (n >= FEWEST).then_some(squares / (TRIM[1] * n as f64))
+    };
+    let grows = hops[1] as f64 / hops[0] as f64;
+    let mut sum = 0.0;
+    for y in phases {
+        let [short, long] = [variance(y, hops[0])?, variance(y, hops[1])?];
+        if long > REMEMBERS * (2.0 * grows - 1.0) * short {
+            return None;
+        }
+        sum += (long - short).max(0.0) / (2.0 * (hops[1] - hops[0]) as f64 * step_s);
+    }
+    // Differences that overlap tell less than as many that do not.
+    let apart = 0.5 * count as f64 / hops[1] as f64;
+    Some(Shown {
+        noise: (sum / phases.len() as f64).sqrt(),
+        error: (0.75 / apart).sqrt(),
+        lag_s,
+    })
 }
 
 impl Walk {
@@ -103,6 +173,11 @@ impl Walk {
         let phases: Result<Vec<Vec<f64>>, _> = phase_rad.iter().map(|p| Ok(cut(p)?.0)).collect();
         let phases = phases?;
         let step_s = period_s(t_s).ok_or(TOO_LITTLE)?;
+        let shown = (!measured).then(|| shown_noise(t_s, &phases, step_s));
+        let seen = |walk| Walk {
+            shown: shown.flatten(),
+            ..walk
+        };
         let parts = (step_s / STEP_S).round().max(1.0);
         // Whoever recorded phases saw the beat as seldom: it may have begun anywhere in the sample before.
         let unheard = match measured && parts == 1.0 {
@@ -110,7 +185,7 @@ impl Walk {
             false => parts as usize,
         };
         if parts == 1.0 && t_s.windows(2).all(|t| t[1] - t[0] <= 1.5 * step_s) {
-            return Walk::on(t_s, &phases, beat, measured, first_heard, unheard);
+            return Walk::on(t_s, &phases, beat, measured, first_heard, unheard).map(seen);
         }
         if (t_s[t_s.len() - 1] - t_s[0]) / step_s + 1.0 > 2.0 * t_s.len() as f64 {
             return Err(TOO_LITTLE);
@@ -123,7 +198,7 @@ impl Walk {
         let places = phases.first().map_or(0, Vec::len);
         let even: Vec<f64> = (0..places).map(|k| t_s[0] + k as f64 * step_s).collect();
         let beat = played_on(t_s, &beat, &turns, &even);
-        Walk::on(&even, &phases, beat, measured, first_heard, unheard)
+        Walk::on(&even, &phases, beat, measured, first_heard, unheard).map(seen)
     }
 
     /// On an even axis; phases straightened; over so many of its steps before the first beat nobody knows whether it sounds.
@@ -188,6 +263,7 @@ impl Walk {
             least_error: error * error,
             measured,
             company: Vec::new(),
+            shown: None,
             t_s: t,
             beat,
             sounds,
