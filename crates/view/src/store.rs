@@ -211,13 +211,35 @@ impl<'s> Store<'s> {
         times_ns: &[i64],
         columns: impl IntoIterator<Item = SerializedComponentColumn>,
     ) -> anyhow::Result<()> {
-        let sent = self.progress.last_ns.get(path).copied();
+        self.rows_of(path, "", times_ns, columns)
+    }
+
+    /// Rows of nothing at the times at which what [`Store::rows`] says of an entity is there no more: the viewer keeps the latest.
+    pub fn gone(
+        &mut self,
+        path: &str,
+        times_ns: &[i64],
+        empty: impl IntoIterator<Item = SerializedComponentColumn>,
+    ) -> anyhow::Result<()> {
+        self.rows_of(path, " is gone", times_ns, empty)
+    }
+
+    /// Rows of an entity that were counted as `kind` so far.
+    fn rows_of(
+        &mut self,
+        path: &str,
+        kind: &str,
+        times_ns: &[i64],
+        columns: impl IntoIterator<Item = SerializedComponentColumn>,
+    ) -> anyhow::Result<()> {
+        let key = format!("{path}{kind}");
+        let sent = self.progress.last_ns.get(&key).copied();
         let from = sent.map_or(0, |sent| times_ns.partition_point(|t| *t <= sent));
         let new = &times_ns[from..];
         let Some(last) = new.last() else {
             return Ok(());
         };
-        self.progress.last_ns.insert(path.to_owned(), *last);
+        self.progress.last_ns.insert(key, *last);
         // The few that are dated long before all others would make the axis as long.
         let early_ns = self.start_ns.saturating_sub(TAKEN_BEFORE_NS);
         let dated = new.iter().map(|&t| match t < early_ns {

@@ -186,7 +186,56 @@ pub fn every(rows: usize, count: usize) -> usize {
     rows.saturating_mul(count).div_ceil(MOST_PLACES).max(1)
 }
 
+/// A hole as long as this or longer takes away what was drawn, s: figures that go for a few lost frames would flicker.
+const GONE_AFTER_S: f64 = 0.5;
+
+/// From when until when something is there, ns.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Stay {
+    /// Its first sample.
+    pub from_ns: i64,
+    /// A step after its last one; `None` where nothing else is recorded after that.
+    pub until_ns: Option<i64>,
+}
+
+/// The stretches of `times_ns` between holes, in a recording that ends at `end_ns`: the viewer keeps the latest, in a hole too.
+pub fn stays(times_ns: &[i64], end_ns: i64) -> Vec<Stay> {
+    let Some(first_ns) = times_ns.first().copied() else {
+        return Vec::new();
+    };
+    let t_s = recording::signal::seconds_since(times_ns, first_ns);
+    let parts = analyze::inputs::stretches(&t_s, GONE_AFTER_S);
+    let step_s = analyze::inputs::mean_step_in(&t_s, &parts);
+    let until = |last: usize| {
+        // OK because a step is shorter than the recording.
+        let gone_ns = times_ns[last].saturating_add((step_s? * 1e9) as i64);
+        let goes_on = match times_ns.get(last + 1) {
+            Some(next) => gone_ns < *next,
+            None => (end_ns as f64 - times_ns[last] as f64) / 1e9 > GONE_AFTER_S.max(2.0 * step_s?),
+        };
+        goes_on.then_some(gone_ns)
+    };
+    let stay = |part: std::ops::Range<usize>| Stay {
+        from_ns: times_ns[part.start],
+        until_ns: until(part.end - 1),
+    };
+    parts.into_iter().map(stay).collect()
+}
+
 impl Take {
+    /// The stretches of `times_ns`, which has the times of something in this recording.
+    pub fn stays(&self, times_ns: &[i64]) -> Vec<Stay> {
+        // What grows may have the rest of it still to come.
+        let end_ns = if self.growing { i64::MIN } else { self.end_ns };
+        stays(times_ns, end_ns)
+    }
+
+    /// When something that has the times `times_ns` is there no more, ns.
+    pub fn ends(&self, times_ns: &[i64]) -> Vec<i64> {
+        let stays = self.stays(times_ns).into_iter();
+        stays.filter_map(|stay| stay.until_ns).collect()
+    }
+
     /// Weight M·g, N, where the mass is known.
     pub fn weight_n(&self) -> Option<f64> {
         self.inputs
@@ -224,6 +273,12 @@ impl Take {
             }
             if i.normal_n.is_empty() {
                 self.force_ns.truncate(n);
+            }
+            if let Some(pose) = &mut self.pose {
+                let n = settled(&pose.times_ns);
+                pose.times_ns.truncate(n);
+                pose.position_m.truncate(n);
+                pose.orientation.truncate(n);
             }
         }
         if i.phases_are_measured {
@@ -275,6 +330,45 @@ impl Default for Take {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn what_is_there_goes_in_holes_and_before_the_end() {
+        const MS: i64 = 1_000_000;
+        // 10 Hz: one sample lost, three seconds lost, and an end at 6.9 s.
+        let times = (0..20).filter(|k| *k != 7).chain(50..70);
+        let times: Vec<i64> = times.map(|k| 100 * k * MS).collect();
+        let stay = |from_ms: i64, until_ms: Option<i64>| Stay {
+            from_ns: from_ms * MS,
+            until_ns: until_ms.map(|ms| ms * MS),
+        };
+        let parts = |end_ms: i64| {
+            let near = |ns: i64| ns / (10 * MS) * 10 * MS;
+            let mut parts = stays(&times, end_ms * MS);
+            // The mean step is longer than the usual one by what was lost.
+            parts
+                .iter_mut()
+                .for_each(|p| p.until_ns = p.until_ns.map(near));
+            parts
+        };
+        assert_eq!(parts(6900), [stay(0, Some(2000)), stay(5000, None)]);
+        assert_eq!(parts(7300), [stay(0, Some(2000)), stay(5000, None)]);
+        assert_eq!(parts(9000), [stay(0, Some(2000)), stay(5000, Some(7000))]);
+        assert_eq!(
+            stays(&[5], 9_000 * MS),
+            [Stay {
+                from_ns: 5,
+                until_ns: None
+            }]
+        );
+        assert_eq!(stays(&[], 9_000 * MS), []);
+        let mut take = Take {
+            end_ns: 9_000 * MS,
+            ..Take::default()
+        };
+        assert_eq!(take.ends(&times).len(), 2);
+        take.growing = true;
+        assert_eq!(take.ends(&times).len(), 1);
+    }
 
     #[test]
     fn a_quarter_turn_about_x_takes_y_to_z() {

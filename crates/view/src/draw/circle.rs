@@ -64,9 +64,17 @@ pub fn draw(store: &mut Store<'_>, take: &Take) -> anyhow::Result<Option<View>> 
         .with_colors([palette::WHITE]);
     store.fixed("/phases/order", &arrow)?;
 
+    let ends = take.ends(&take.phase_ns);
+    let none = || std::iter::repeat_n(0, ends.len());
+    let nowhere: [[f32; 2]; 0] = [];
+    let empty = Arrows2D::from_vectors(nowhere).columns(none())?;
+    store.gone("/phases/order", &ends, empty)?;
+
     let times: Vec<i64> = take.phase_ns.iter().copied().step_by(told).collect();
     let columns = Points2D::new(points).columns(std::iter::repeat_n(carriers, times.len()))?;
     store.rows("/phases/carriers", &times, columns)?;
+    let empty = || Points2D::new(nowhere).columns(none());
+    store.gone("/phases/carriers", &ends, empty()?)?;
     let style = Points2D::update_fields()
         .with_radii([0.075f32])
         .with_colors((0..carriers).map(|i| palette::carrier(i).0));
@@ -76,6 +84,7 @@ pub fn draw(store: &mut Store<'_>, take: &Take) -> anyhow::Result<Option<View>> 
         let places = (0..rows).flat_map(|k| numbers(first[k], second[k]));
         let columns = Points2D::new(places).columns(std::iter::repeat_n(2, rows))?;
         store.rows("/phases/numbers", &take.phase_ns, columns)?;
+        store.gone("/phases/numbers", &ends, empty()?)?;
         let style = Points2D::update_fields()
             .with_radii([Radius::new_ui_points(0.0)])
             .with_colors([palette::carrier(0).0, palette::carrier(1).0])
@@ -99,6 +108,7 @@ pub fn draw(store: &mut Store<'_>, take: &Take) -> anyhow::Result<Option<View>> 
             &times,
             Points2D::new(places).columns(lengths)?,
         )?;
+        store.gone("/phases/beat", &ends, empty()?)?;
         let style = Points2D::update_fields()
             .with_radii([0.055f32])
             .with_colors([palette::WHITE]);
@@ -148,6 +158,35 @@ mod tests {
         });
         let marks = sent.lengths("/phases/beat", "Points2D:positions");
         assert_eq!(marks, [1, 1, 0, 1]);
+    }
+
+    #[test]
+    fn no_phase_stands_in_a_hole() {
+        let times = (0..20).chain(50..70).map(|k: i64| k * 100_000_000);
+        let mut take = Take {
+            phase_ns: times.collect(),
+            end_ns: 20_000_000_000,
+            ..Take::default()
+        };
+        take.inputs.phase_rad = vec![vec![0.0; 40]; 2];
+        take.inputs.beat_phase_rad = vec![0.5; 40];
+        let sent = sent::by(|store| {
+            draw(store, &take).unwrap();
+        });
+        for (entity, component) in [
+            ("/phases/order", "Arrows2D:vectors"),
+            ("/phases/carriers", "Points2D:positions"),
+            ("/phases/numbers", "Points2D:positions"),
+            ("/phases/beat", "Points2D:positions"),
+        ] {
+            let rows = sent.lengths(entity, component);
+            assert_eq!(
+                rows.iter().filter(|count| **count == 0).count(),
+                2,
+                "{entity}"
+            );
+            assert_eq!(rows.len(), 42, "{entity}");
+        }
     }
 
     #[test]

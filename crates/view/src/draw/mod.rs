@@ -26,6 +26,7 @@ pub fn all(store: &mut Store<'_>, take: &Take) -> anyhow::Result<Node> {
     let sensors = sensors::draw(store, take)?;
     Ok(layout(
         Scene {
+            is_measured: take.inputs.sources.attitude != "imu",
             space,
             circle,
             spectra,
@@ -40,6 +41,8 @@ pub fn all(store: &mut Store<'_>, take: &Take) -> anyhow::Result<Node> {
 
 /// What is known of the thing carried.
 struct Scene {
+    /// How it turns was measured as such, and not estimated from inertial sensors.
+    is_measured: bool,
     space: Option<View>,
     circle: Option<View>,
     spectra: Option<View>,
@@ -48,9 +51,9 @@ struct Scene {
 }
 
 impl Scene {
-    /// Whether there is anything but the scene in space.
+    /// Whether there is anything.
     fn has_any(&self) -> bool {
-        let drawings = self.circle.is_some() || self.spectra.is_some();
+        let drawings = self.space.is_some() || self.circle.is_some() || self.spectra.is_some();
         drawings || !self.plots.is_empty() || !self.energies.is_empty()
     }
 }
@@ -63,14 +66,15 @@ fn layout(scene: Scene, log: Option<View>, page: View, mut panels: Vec<Panel>) -
         None => page.into(),
     };
     let mut tabs: Vec<Node> = Vec::new();
-    if scene.space.is_some() {
+    if scene.space.is_some() && scene.is_measured {
         tabs.extend(around(scene, words));
     } else if scene.has_any() {
         // What was measured stands before what was estimated from it.
         let measured = panels.first().filter(|panel| panel.is_sensor);
         let mut plots: Vec<View> = measured.map_or(Vec::new(), |panel| panel.plots.clone());
         plots.extend(scene.plots.into_iter().chain(scene.energies));
-        let small = scene.circle.into_iter().chain(scene.spectra).collect();
+        let small = scene.space.into_iter().chain(scene.circle);
+        let small = small.chain(scene.spectra).collect();
         tabs.push(side_by_side(plots, small, words));
     } else if panels.is_empty() {
         return words;

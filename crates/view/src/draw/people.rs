@@ -6,7 +6,7 @@ use re_sdk_types::datatypes::Quaternion;
 
 use crate::palette;
 use crate::store::Store;
-use crate::take::{Carriers, Pose, Take, every};
+use crate::take::{Carriers, Pose, Stay, Take, every};
 
 /// Lift of a foot in its swing, m, and half the stride, m: for the eye alone.
 const FOOT_LIFT_M: f64 = 0.10;
@@ -50,10 +50,10 @@ pub fn draw(
     // Who has no phase stands.
     let phase_at: Vec<Vec<f64>> = (0..count)
         .map(|i| match take.inputs.phase_rad.get(i) {
-            Some(phase) if take.phase_ns == carriers.times_ns => analyze::phase::unwrap(phase),
+            Some(phase) if take.phase_ns == carriers.times_ns => analyze::phase::continuous(phase),
             Some(phase) if !take.phase_ns.is_empty() && phase.len() == take.phase_ns.len() => {
                 let s = |t: &[i64]| recording::signal::seconds_since(t, take.start_ns);
-                let unwrapped = analyze::phase::unwrap(phase);
+                let unwrapped = analyze::phase::continuous(phase);
                 analyze::inputs::interpolate(&s(&take.phase_ns), &unwrapped, &s(&carriers.times_ns))
             }
             _ => vec![f64::NAN; rows],
@@ -95,13 +95,18 @@ pub fn draw(
     });
     let columns = LineStrips3D::new(legs).columns(lengths())?;
     store.rows("/world/legs", &times, columns)?;
+    let ends = take.ends(&times);
+    let none = || std::iter::repeat_n(0, ends.len());
+    let no_strips: [[[f32; 3]; 2]; 0] = [];
+    let empty = || LineStrips3D::new(no_strips).columns(none());
+    store.gone("/world/legs", &ends, empty()?)?;
     let style = LineStrips3D::update_fields()
         .with_radii([0.055f32])
         .with_colors(colors.iter().copied());
     store.fixed("/world/legs", &style)?;
     let length_m = (handle_m - hip_m - 0.12).max(0.1);
     if count <= WHOLE_FIGURES {
-        return bodies(store, &times, &figures, length_m);
+        return bodies(store, &times, &take.stays(&times), &figures, length_m);
     }
     // A stroke and a dot for each, all in two entities.
     let parts = |z: f64| {
@@ -115,12 +120,16 @@ pub fn draw(
         .map(|(low, high)| [low, high]);
     let columns = LineStrips3D::new(torsos).columns(lengths())?;
     store.rows("/world/torsos", &times, columns)?;
+    store.gone("/world/torsos", &ends, empty()?)?;
     let style = LineStrips3D::update_fields()
         .with_radii([0.13f32])
         .with_colors(colors.iter().copied());
     store.fixed("/world/torsos", &style)?;
     let columns = Points3D::new(parts(0.2)).columns(lengths())?;
     store.rows("/world/heads", &times, columns)?;
+    let nowhere: [[f32; 3]; 0] = [];
+    let empty = Points3D::new(nowhere).columns(none())?;
+    store.gone("/world/heads", &ends, empty)?;
     let style = Points3D::update_fields()
         .with_radii([0.11f32])
         .with_colors(colors);
@@ -142,15 +151,22 @@ struct Figures {
 fn bodies(
     store: &mut Store<'_>,
     times: &[i64],
+    stays: &[Stay],
     figures: &[Figures],
     length_m: f64,
 ) -> anyhow::Result<()> {
     // They stay as they are: they are said again only where they come or go.
-    let turns: Vec<usize> = (0..figures.len())
-        .filter(|k| *k == 0 || figures[*k].shown != figures[k - 1].shown)
-        .collect();
-    let turn_times: Vec<i64> = turns.iter().map(|k| times[*k]).collect();
-    let lengths = || turns.iter().map(|k| usize::from(figures[*k].shown));
+    let comes = |k: usize| stays.binary_search_by_key(&times[k], |s| s.from_ns).is_ok();
+    let turns = (0..figures.len())
+        .filter(|&k| figures[k].shown != (k > 0 && figures[k - 1].shown) || comes(k))
+        .map(|k| (times[k], figures[k].shown));
+    let gone = stays
+        .iter()
+        .filter_map(|stay| Some((stay.until_ns?, false)));
+    let mut turns: Vec<(i64, bool)> = turns.chain(gone).collect();
+    turns.sort_by_key(|(t_ns, _)| *t_ns);
+    let turn_times: Vec<i64> = turns.iter().map(|(t_ns, _)| *t_ns).collect();
+    let lengths = || turns.iter().map(|(_, shown)| usize::from(*shown));
     let each: usize = lengths().sum();
     for i in 0..figures.first().map_or(0, |f| f.shoulders.len()) {
         let path = format!("/world/carrier_{}", i + 1);

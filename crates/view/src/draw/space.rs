@@ -14,7 +14,7 @@ use super::people::{self, APART_M, about_z, f32s};
 use crate::blueprint::View;
 use crate::palette;
 use crate::store::Store;
-use crate::take::{Pose, Take, every};
+use crate::take::{Pose, Stay, Take, every};
 
 /// How long the trail of the centre of mass is, s.
 const TRAIL_S: f64 = 5.0;
@@ -69,7 +69,10 @@ pub fn draw(store: &mut Store<'_>, take: &Take) -> anyhow::Result<Option<View>> 
                 false => String::new(),
             }
         ),
-        None => "Scene".to_owned(),
+        None => match take.inputs.sources.attitude == "imu" {
+            true => "Scene: turned as inertial sensors say, on the spot".to_owned(),
+            false => "Scene".to_owned(),
+        },
     };
     let view = View::space(title, "/world/follow", eye, target)
         .contents(["/world/**".to_owned()])
@@ -204,11 +207,16 @@ fn body(
         .columns_of_unit_batches()?;
     store.rows("/world/rath", &pose.times_ns, columns)?;
     let half = take.shape.box_m.map(|x| 0.5 * x as f32);
-    let body = Boxes3D::from_half_sizes([half])
+    let (turns, there) = comings(&take.stays(&pose.times_ns));
+    let each: usize = there.iter().sum();
+    let boxes = || Boxes3D::from_half_sizes(vec![half; each]).columns(there.iter().copied());
+    store.rows("/world/rath/body", &turns, boxes()?)?;
+    let body = Boxes3D::update_fields()
         .with_colors([palette::BODY])
         .with_fill_mode(FillMode::Solid);
     store.fixed("/world/rath/body", &body)?;
-    let edges = Boxes3D::from_half_sizes([half])
+    store.rows("/world/rath/edges", &turns, boxes()?)?;
+    let edges = Boxes3D::update_fields()
         .with_colors([palette::POLE])
         .with_radii([0.008f32]);
     store.fixed("/world/rath/edges", &edges)?;
@@ -235,11 +243,28 @@ fn body(
         });
         let columns = LineStrips3D::new(strips).columns(std::iter::repeat_n(count, bent.len()))?;
         store.rows("/world/poles", &take.force_ns, columns)?;
+        let ends = take.ends(&take.force_ns);
+        let empty = LineStrips3D::new(NO_STRIPS).columns(std::iter::repeat_n(0, ends.len()))?;
+        store.gone("/world/poles", &ends, empty)?;
         return store.fixed("/world/poles", &style);
     }
-    let strips = poles.into_iter().map(|ends| ends.to_vec());
-    store.fixed("/world/rath/poles", &style.with_strips(strips))
+    let count = poles.len();
+    let strips = vec![poles; each].concat();
+    let columns = LineStrips3D::new(strips).columns(there.iter().map(|there| there * count))?;
+    store.rows("/world/rath/poles", &turns, columns)?;
+    store.fixed("/world/rath/poles", &style)
 }
+
+/// When something that keeps its shape comes and goes, and how many there are of it from then on.
+fn comings(stays: &[Stay]) -> (Vec<i64>, Vec<usize>) {
+    let turns = stays.iter().flat_map(|stay| {
+        let gone = stay.until_ns.map(|t_ns| (t_ns, 0));
+        std::iter::once((stay.from_ns, 1)).chain(gone)
+    });
+    turns.unzip()
+}
+
+const NO_STRIPS: [[[f32; 3]; 2]; 0] = [];
 
 /// A pole that bends by less is drawn straight, m.
 const STRAIGHT_M: f64 = 0.01;
@@ -423,6 +448,13 @@ fn forces(
         .with_colors(colors)
         .columns(lengths())?;
     store.rows("/world/forces", &times, arrows)?;
+    let ends = take.ends(&times);
+    let none = || std::iter::repeat_n(0, ends.len());
+    let nowhere: [[f32; 3]; 0] = [];
+    let empty = Points3D::new(nowhere).columns(none())?;
+    store.gone("/world/handles", &ends, empty)?;
+    let empty = Arrows3D::from_vectors(nowhere).columns(none())?;
+    store.gone("/world/forces", &ends, empty)?;
     store.fixed(
         "/world/forces",
         &Arrows3D::update_fields().with_radii([0.03 * thick]),
@@ -587,6 +619,68 @@ mod tests {
         assert_eq!(legs, [2, 2, 0]);
         let head = sent.lengths("/world/carrier_1/head", "Ellipsoids3D:half_sizes");
         assert_eq!(head, [1, 0]);
+    }
+
+    #[test]
+    fn nothing_stands_in_a_hole() {
+        // 10 Hz with three seconds lost, and the recording goes on for long after the end.
+        let times: Vec<i64> = (0..20).chain(50..70).map(|k| k * 100_000_000).collect();
+        let n = times.len();
+        let pose = Pose {
+            times_ns: times.clone(),
+            position_m: vec![[0.0, 0.0, 0.8]; n],
+            orientation: vec![[0.0, 0.0, 0.0, 1.0]; n],
+        };
+        let points_m = [2.45, -2.45].map(|x| vec![[x, 0.0, 0.9]; n]).to_vec();
+        let mut take = Take {
+            end_ns: 20_000_000_000,
+            force_ns: times.clone(),
+            carriers: Some(Carriers {
+                times_ns: times,
+                points_m,
+            }),
+            pose: Some(pose),
+            ..Take::default()
+        };
+        take.shape.handles_m = vec![[2.45, 0.0, 0.1], [-2.45, 0.0, 0.1]];
+        take.inputs.mass_kg = Some(60.0);
+        take.inputs.gravity_m_per_s2 = 9.81;
+        take.inputs.normal_n = vec![vec![300.0; n]; 2];
+        let sent = sent::by(|store| {
+            draw(store, &take).unwrap();
+        });
+        // What keeps its shape comes and goes twice.
+        for (entity, component, each) in [
+            ("/world/rath/body", "Boxes3D:half_sizes", 1),
+            ("/world/rath/edges", "Boxes3D:half_sizes", 1),
+            ("/world/rath/poles", "LineStrips3D:strips", 1),
+            ("/world/carrier_1/torso", "Capsules3D:lengths", 1),
+            ("/world/carrier_2/head", "Ellipsoids3D:half_sizes", 1),
+        ] {
+            assert_eq!(
+                sent.lengths(entity, component),
+                [each, 0, each, 0],
+                "{entity}"
+            );
+        }
+        // What moves has a row of nothing for each hole.
+        for (entity, component) in [
+            ("/world/handles", "Points3D:positions"),
+            ("/world/forces", "Arrows3D:vectors"),
+            ("/world/legs", "LineStrips3D:strips"),
+        ] {
+            let rows = sent.lengths(entity, component);
+            assert_eq!(
+                rows.iter().filter(|count| **count == 0).count(),
+                2,
+                "{entity}"
+            );
+            assert_eq!(
+                rows.iter().filter(|count| **count == 2).count(),
+                n,
+                "{entity}"
+            );
+        }
     }
 
     #[test]

@@ -58,10 +58,10 @@ pub fn load(
     };
     name_of_scene(&mut take, info);
     let whole = info.messages <= MAX_EXAMINED;
-    let plan = Plan::new(info, whole);
+    let mut plan = Plan::new(info, whole);
     let mut findings = Vec::new();
     if whole {
-        examined(&mut take, recording, asked)?;
+        plan.place = examined(&mut take, recording, asked)?;
     } else {
         take.notes.push(format!(
             "{} messages: curves and spectra only, at the times of the log; `analyze` computes the metrics.",
@@ -74,7 +74,8 @@ pub fn load(
         (dates, findings) = (dated, found);
         let signals: BTreeMap<&str, &Signal> =
             signals.iter().map(|s| (s.path.as_str(), s)).collect();
-        take.pose = scene::pose(&signals);
+        let place = plan.place.as_deref();
+        take.pose = scene::pose(&signals).or_else(|| scene::found(&signals, &take, place));
         take.carriers = scene::carriers(&signals);
         take.energy = scene::energy(&signals);
         take.tangential_n = scene::tangentials(&signals, &take);
@@ -113,8 +114,12 @@ fn at_ns(start_ns: i64, t_s: &[f64]) -> Vec<i64> {
     t_s.iter().map(at).collect()
 }
 
-/// Metrics, events, remarks and the columns behind them, as `analyze` finds them.
-fn examined(take: &mut Take, recording: &Recording, asked: &Request) -> Result<(), ReadError> {
+/// Metrics, events, remarks and the columns behind them, as `analyze` finds them. Returns the path whose `.z` is the height, if there is one.
+fn examined(
+    take: &mut Take,
+    recording: &Recording,
+    asked: &Request,
+) -> Result<Option<String>, ReadError> {
     // No list of signals is asked for: no topic has the empty name. (To name no signal would switch the estimates off.)
     let request = Request {
         topics: vec![String::new()],
@@ -129,8 +134,12 @@ fn examined(take: &mut Take, recording: &Recording, asked: &Request) -> Result<(
     take.phase_ns = at(analysis.inputs.phase_times());
     take.window = analysis.window;
     take.metrics = analysis.metrics;
-    let imu = analysis.roles.into_iter().find(|(role, _)| *role == "imu");
-    take.main_imu = imu.and_then(|(_, topics)| topics.into_iter().next());
+    let plays = |wanted: &str| {
+        let role = analysis.roles.iter().find(|(role, _)| *role == wanted);
+        role.and_then(|(_, played)| played.first().cloned())
+    };
+    take.main_imu = plays("imu");
+    let place = plays("height").and_then(|path| Some(path.strip_suffix(".z")?.to_owned()));
     take.events = analysis.events;
     take.remarks = analysis
         .quality
@@ -140,7 +149,7 @@ fn examined(take: &mut Take, recording: &Recording, asked: &Request) -> Result<(
         .collect();
     take.notes.extend(analysis.warnings);
     take.inputs = analysis.inputs;
-    Ok(())
+    Ok(place)
 }
 
 fn remark(topic: &str, text: &str) -> String {
@@ -156,6 +165,8 @@ struct Plan<'a> {
     /// Topics of our own schemas, which have drawings of their own.
     ours: Vec<&'a str>,
     imus: Vec<&'a str>,
+    /// What has the body's place, whose `.z` is the height.
+    place: Option<String>,
 }
 
 impl<'a> Plan<'a> {
@@ -200,6 +211,7 @@ impl<'a> Plan<'a> {
         Plan {
             ours: if whole { ours } else { Vec::new() },
             imus: of(&["sensor_msgs/Imu"]),
+            place: None,
         }
     }
 
@@ -212,7 +224,12 @@ impl<'a> Plan<'a> {
         let pose = ["position_m", "orientation"]
             .iter()
             .any(|f| within(path, topics::STATE, f));
-        pose || within(path, topics::ENERGY, "")
+        let place = |place: &String| {
+            let part = path.strip_prefix(place.as_str());
+            part.is_some_and(|part| [".x", ".y"].contains(&part))
+        };
+        pose || self.place.as_ref().is_some_and(place)
+            || within(path, topics::ENERGY, "")
             || within(path, topics::FORCES, "compression_m")
             || (within(path, topics::FORCES, "tangential_n") && !path.ends_with(".z"))
             || (within(path, topics::TF, "") && path.contains(".transform.translation."))

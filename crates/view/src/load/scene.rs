@@ -58,6 +58,72 @@ pub fn pose(signals: &BTreeMap<&str, &Signal>) -> Option<Pose> {
     })
 }
 
+/// How high the centre of mass is drawn where only its motion about the mean is known, or nothing, m: about a shoulder's height.
+const USUAL_HEIGHT_M: f64 = 0.9;
+/// More moments than these no eye tells apart.
+const MOST_MOMENTS: usize = 100_000;
+
+/// Where the body is by what `analyze` found of its motion, be it by a pose or by an inertial sensor: on the spot where `place`, whose `.x`
+/// and `.y` it is, is not known. `None` where nothing tells how it is turned.
+pub fn found(signals: &BTreeMap<&str, &Signal>, take: &Take, place: Option<&str>) -> Option<Pose> {
+    let inputs = &take.inputs;
+    let [roll, pitch, yaw] = [&inputs.roll_rad, &inputs.pitch_rad, &inputs.yaw_rad];
+    let known = |x: Option<&f64>| x.copied().filter(|x| x.is_finite());
+    let turned = |k: &usize| known(roll.get(*k)).or(known(pitch.get(*k))).is_some();
+    let mut rows: Vec<usize> = (0..take.state_ns.len()).filter(turned).collect();
+    if rows.len() < 2 {
+        return None;
+    }
+    let step = rows.len().div_ceil(MOST_MOMENTS);
+    rows = rows.into_iter().step_by(step).collect();
+    let times_ns: Vec<i64> = rows.iter().map(|k| take.state_ns[*k]).collect();
+    let s = |t: &[i64]| recording::signal::seconds_since(t, take.start_ns);
+    let at = s(&times_ns);
+    let along = |axis: &str| {
+        let signal = signals.get(format!("{}.{axis}", place?).as_str())?;
+        let of = analyze::inputs::interpolate(&s(&signal.times_ns), &signal.values, &at);
+        Some(of)
+    };
+    let [x, y] = ["x", "y"].map(along);
+    let (height_s, height_m) = inputs.height();
+    let (height_m, level_m) = match height_m.iter().any(|z| z.is_finite()) {
+        true => {
+            let told = analyze::inputs::interpolate(height_s, height_m, &at);
+            let is_motion = inputs.sources.height == "imu";
+            (told, if is_motion { USUAL_HEIGHT_M } else { 0.0 })
+        }
+        false => (Vec::new(), USUAL_HEIGHT_M),
+    };
+    let or_nought = |column: &[f64], n: usize| known(column.get(n)).unwrap_or(0.0);
+    let place = |n: usize| {
+        let on_ground = [&x, &y].map(|axis| axis.as_ref().map_or(0.0, |axis| or_nought(axis, n)));
+        [
+            on_ground[0],
+            on_ground[1],
+            level_m + or_nought(&height_m, n),
+        ]
+    };
+    Some(Pose {
+        position_m: (0..rows.len()).map(place).collect(),
+        orientation: rows
+            .iter()
+            .map(|&k| quaternion([roll, pitch, yaw].map(|column| or_nought(column, k))))
+            .collect(),
+        times_ns,
+    })
+}
+
+/// The quaternion x, y, z, w of R = R_z(yaw) R_y(pitch) R_x(roll): the half-angle product (Diebel 2006, eq. 297).
+fn quaternion(roll_pitch_yaw_rad: [f64; 3]) -> [f64; 4] {
+    let [(sr, cr), (sp, cp), (sy, cy)] = roll_pitch_yaw_rad.map(|a| (0.5 * a).sin_cos());
+    [
+        sr * cp * cy - cr * sp * sy,
+        cr * sp * cy + sr * cp * sy,
+        cr * cp * sy - sr * sp * cy,
+        cr * cp * cy + sr * sp * sy,
+    ]
+}
+
 /// The carriers' frames in `/tf`: the first transform is the body's, the others are theirs.
 pub fn carriers(signals: &BTreeMap<&str, &Signal>) -> Option<Carriers> {
     let axis = |name: &str| {
@@ -203,6 +269,55 @@ pub fn energy(signals: &BTreeMap<&str, &Signal>) -> Option<Ledger> {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn what_was_found_of_the_motion_is_a_pose() {
+        use std::f64::consts::FRAC_PI_2;
+        let mut take = Take {
+            state_ns: (0..5).map(|k| k * 10_000_000).collect(),
+            ..Take::default()
+        };
+        assert!(found(&BTreeMap::new(), &take, None).is_none());
+        take.inputs.t_s = (0..5).map(|k| f64::from(k) * 0.01).collect();
+        take.inputs.sources.height = "imu".into();
+        take.inputs.height_m = vec![0.0, 0.01, 0.02, f64::NAN, 0.01];
+        take.inputs.roll_rad = vec![0.0, FRAC_PI_2, 0.0, f64::NAN, 0.3];
+        take.inputs.pitch_rad = vec![0.0, 0.0, FRAC_PI_2, f64::NAN, f64::NAN];
+        let pose = found(&BTreeMap::new(), &take, None).unwrap();
+        // Nothing is known of the fourth sample.
+        assert_eq!(pose.times_ns, [0, 10_000_000, 20_000_000, 40_000_000]);
+        assert_eq!(pose.position_m[1], [0.0, 0.0, USUAL_HEIGHT_M + 0.01]);
+        let turned = |k: usize, v: [f64; 3]| pose.in_world(k, &v).map(|x| (1e9 * x).round() / 1e9);
+        // Roll takes left to up, pitch ahead to down.
+        assert_eq!(turned(1, [0.0, 1.0, 0.0]), [0.0, 0.0, 1.0]);
+        assert_eq!(turned(2, [1.0, 0.0, 0.0]), [0.0, 0.0, -1.0]);
+
+        // A pose has a place and a height of its own.
+        take.inputs.sources.height = "pose".into();
+        let signal = |part: &str, x: f64| Signal {
+            path: format!("/odom.p.{part}"),
+            times_ns: take.state_ns.clone().into(),
+            values: vec![x; 5],
+            topic: "/odom".into(),
+            unit: "m".into(),
+        };
+        let place = [signal("x", 3.0), signal("y", -2.0)];
+        let signals = place.iter().map(|s| (s.path.as_str(), s)).collect();
+        let pose = found(&signals, &take, Some("/odom.p")).unwrap();
+        assert_eq!(pose.position_m[2], [3.0, -2.0, 0.02]);
+        // Yaw goes first in the world, roll first in the body.
+        let q = quaternion([0.3, -0.4, 2.0]);
+        let pose = Pose {
+            orientation: vec![q],
+            ..Pose::default()
+        };
+        let ahead = pose.in_world(0, &[1.0, 0.0, 0.0]);
+        let (sp, cp) = (-0.4f64).sin_cos();
+        let (sy, cy) = 2.0f64.sin_cos();
+        for (got, expected) in ahead.iter().zip([cp * cy, cp * sy, -sp]) {
+            assert!((got - expected).abs() < 1e-12, "{ahead:?}");
+        }
+    }
 
     #[test]
     fn carriers_are_beside_the_body_whichever_way_it_faces() {
