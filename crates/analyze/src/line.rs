@@ -8,6 +8,9 @@ use crate::summary::rounding;
 /// Half-width of "near a line", as a share of f.
 pub const NEAR: f64 = 0.1;
 
+/// Bins that stand on the edge of a band are in it, whichever way their frequencies are rounded.
+const ROUNDING: f64 = 1e-9;
+
 /// So many periods of f tell a line at f/2 from one at f: a Hann taper's line reaches 2/T to either side, the band [`NEAR`] · f.
 pub const FEWEST_PERIODS: f64 = 2.0 / NEAR;
 
@@ -126,7 +129,7 @@ impl Shares {
             hz.iter()
                 .zip(&power)
                 .skip(1)
-                .filter(|(f, _)| (*f - f0).abs() <= NEAR * f_hz)
+                .filter(|(f, _)| (*f - f0).abs() <= (1.0 + ROUNDING) * NEAR * f_hz)
                 .map(|(_, p)| p)
                 .sum::<f64>()
         };
@@ -146,6 +149,23 @@ mod tests {
         let t: Vec<f64> = (0..1350).map(|k| k as f64 / 30.0).collect();
         let x = t.iter().map(|t| f(*t)).collect();
         [t, x]
+    }
+
+    /// Of 90 periods in the window the bands' edges are bins 36, 54, 81 and 99: all four count.
+    #[test]
+    fn bins_on_the_edge_of_a_band_are_in_it() {
+        let bin = |k: f64, t: f64| (TAU * k * t / 45.0).cos();
+        let [t, x] = series(|t| bin(35.0, t) + bin(100.0, t));
+        let outside = Shares::of(&t, &x, 2.0).unwrap();
+        // The taper puts a quarter of a line's amplitude into each bin beside it: one of six parts of its power.
+        for share in [outside.at_half, outside.at_f] {
+            assert!((share - 1.0 / 12.0).abs() < 1e-6, "{outside:?}");
+        }
+        let [t, x] = series(|t| bin(54.0, t) + bin(81.0, t));
+        let edges = Shares::of(&t, &x, 2.0).unwrap();
+        for share in [edges.at_half, edges.at_f] {
+            assert!((share - 5.0 / 12.0).abs() < 1e-6, "{edges:?}");
+        }
     }
 
     #[test]
