@@ -327,8 +327,9 @@ mod tests {
         }
     }
 
-    /// Two carriers of their own frequencies, pulled from 10 s on without noise: Adler's equation by small steps.
-    fn pulled(pull: f64, detuning: [f64; 2]) -> Inputs {
+    /// Two carriers of their own frequencies who mind nobody, pulled from 10 s on: Adler's equation by small steps.
+    fn pulled(pulls: [f64; 2], detuning: [f64; 2], noise_rad_per_sqrt_s: f64) -> Inputs {
+        let mut random = crate::random::Random(11);
         let (dt, omega) = (1.0 / 300.0, TAU * 2.0);
         let mut inputs = walk(1.0, 0.0);
         let mut phase = [0.3, 2.0];
@@ -339,31 +340,9 @@ mod tests {
                 if k % 10 == 0 {
                     inputs.phase_rad[c].push(phase[c]);
                 }
-                let heard = if t < 10.0 { 0.0 } else { pull };
-                phase[c] += dt * (omega + detuning[c] + heard * (omega * t - phase[c]).sin());
-            }
-        }
-        inputs.beat_phase_rad[..300].fill(f64::NAN);
-        inputs
-    }
-
-    /// Two carriers with noise, pulled from 10 s on by `pulls`; who minds nobody.
-    fn pulled_by(pulls: [f64; 2]) -> Inputs {
-        let mut random = crate::random::Random(11);
-        let (dt, omega, noise) = (1.0 / 300.0, TAU * 2.0, 0.02);
-        let mut inputs = walk(1.0, 0.0);
-        let mut phase = [0.3, 2.0];
-        inputs.phase_rad = vec![vec![], vec![]];
-        for k in 0..18_000 {
-            let t = f64::from(k) * dt;
-            for c in 0..2 {
-                if k % 10 == 0 {
-                    inputs.phase_rad[c].push(phase[c]);
-                }
                 let heard = if t < 10.0 { 0.0 } else { pulls[c] };
-                let own = omega + [0.5, -0.7][c];
-                phase[c] += dt * (own + heard * (omega * t - phase[c]).sin());
-                phase[c] += noise * f64::sqrt(dt) * random.normal();
+                phase[c] += dt * (omega + detuning[c] + heard * (omega * t - phase[c]).sin());
+                phase[c] += noise_rad_per_sqrt_s * f64::sqrt(dt) * random.normal();
             }
         }
         inputs.beat_phase_rad[..300].fill(f64::NAN);
@@ -374,7 +353,7 @@ mod tests {
     #[test]
     fn a_pull_that_is_not_the_same_for_all_is_said() {
         for (pulls, same) in [([1.5, 1.5], true), ([1.5, 1.0], false), ([1.5, 0.0], false)] {
-            let m = metrics(&pulled_by(pulls), Window::ALL);
+            let m = metrics(&pulled(pulls, [0.5, -0.7], 0.02), Window::ALL);
             for name in ["pull_rad_per_s", "coupling_rad_per_s", "detuning_rad_per_s"] {
                 let found = m.get(name).unwrap();
                 let why = found.reason.as_deref().unwrap_or_default();
@@ -391,7 +370,7 @@ mod tests {
     #[test]
     fn adlers_test_uses_what_was_before_the_window() {
         let late = Window::from(40.0);
-        let inside = metrics(&pulled(1.5, [0.5, -0.9]), late);
+        let inside = metrics(&pulled([1.5; 2], [0.5, -0.9], 0.0), late);
         let number = |m: &Metrics, name: &str| m.number(name).unwrap();
         let pull = number(&inside, "pull_rad_per_s");
         assert!(
@@ -404,7 +383,7 @@ mod tests {
         assert!((detuning.per[0] - 0.5).abs() < 0.003);
         assert_eq!(inside.get("captured").unwrap().as_bool(), Some(true));
         // At the edge a carrier waits for most of each slow turn: together with the beat, but not captured.
-        let outside = pulled(0.5, [0.505, 0.1]);
+        let outside = pulled([0.5; 2], [0.505, 0.1], 0.0);
         let dwelling = Window {
             start_s: 25.0,
             end_s: 40.0,

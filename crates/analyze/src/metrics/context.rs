@@ -103,6 +103,7 @@ pub struct Context<'a> {
     forces: OnceCell<Table<'a>>,
     phases: OnceCell<Table<'a>>,
     height_line: OnceCell<Option<Line>>,
+    aliased: OnceCell<Option<String>>,
     onset: OnceCell<Option<f64>>,
     adler: OnceCell<Result<Adler, &'static str>>,
 }
@@ -121,6 +122,7 @@ impl<'a> Context<'a> {
             forces: OnceCell::new(),
             phases: OnceCell::new(),
             height_line: OnceCell::new(),
+            aliased: OnceCell::new(),
             onset: OnceCell::new(),
             adler: OnceCell::new(),
         }
@@ -245,6 +247,10 @@ impl<'a> Context<'a> {
 
     /// Why the height's line is none, where a beat sounds that is faster than the height's samples can show: what they show instead is an alias.
     pub fn aliased(&self) -> Option<String> {
+        self.aliased.get_or_init(|| self.hides_the_beat()).clone()
+    }
+
+    fn hides_the_beat(&self) -> Option<String> {
         self.missing(Need::Beat).is_none().then_some(())?;
         let beat_hz = super::together::beat_hz(self).as_f64()?;
         let half_rate_hz = 0.5 / self.height().step_s()?;

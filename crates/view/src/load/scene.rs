@@ -113,15 +113,10 @@ pub fn found(signals: &BTreeMap<&str, &Signal>, take: &Take, place: Option<&str>
     })
 }
 
-/// The quaternion x, y, z, w of R = R_z(yaw) R_y(pitch) R_x(roll): the half-angle product (Diebel 2006, eq. 297).
-fn quaternion(roll_pitch_yaw_rad: [f64; 3]) -> [f64; 4] {
-    let [(sr, cr), (sp, cp), (sy, cy)] = roll_pitch_yaw_rad.map(|a| (0.5 * a).sin_cos());
-    [
-        sr * cp * cy - cr * sp * sy,
-        cr * sp * cy + sr * cp * sy,
-        cr * cp * sy - sr * sp * cy,
-        cr * cp * cy + sr * sp * sy,
-    ]
+/// The quaternion x, y, z, w of R = R_z(yaw) R_y(pitch) R_x(roll), as `analyze` takes its angles.
+fn quaternion([roll_rad, pitch_rad, yaw_rad]: [f64; 3]) -> [f64; 4] {
+    let turn = nalgebra::UnitQuaternion::from_euler_angles(roll_rad, pitch_rad, yaw_rad);
+    turn.into_inner().coords.into()
 }
 
 /// The carriers' frames in `/tf`: the first transform is the body's, the others are theirs.
