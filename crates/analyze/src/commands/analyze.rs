@@ -2,6 +2,7 @@
 
 use std::io::Write;
 use std::path::{Path, PathBuf};
+use std::time::Duration;
 
 use analyze::examine::{Analysis, Request, examine};
 use analyze::field::DeviceClocks;
@@ -9,6 +10,7 @@ use analyze::quality::Quality;
 use analyze::report;
 use analyze::roles::{RolesFile, matches, meant};
 use anyhow::{Context, bail};
+use indicatif::{ProgressBar, ProgressFinish, ProgressStyle};
 use recording::Kind;
 use recording::read::{ReadOptions, Recording, STDIN};
 use recording::whole::{self, Output, Usage};
@@ -135,6 +137,26 @@ fn open(path: &Path, args: &AnalyzeArgs, request: &Request) -> anyhow::Result<Re
     Ok(opened?)
 }
 
+/// Files from this size on take longer than a second, bytes.
+const LARGE: u64 = 64 << 20;
+
+/// A sign of life on a terminal while a large file is analysed: how far that is nobody knows, for most of the work comes after reading.
+fn alive(path: &Path) -> anyhow::Result<ProgressBar> {
+    let bytes = std::fs::metadata(path).map_or(0, |file| file.len());
+    if bytes < LARGE {
+        return Ok(ProgressBar::hidden());
+    }
+    let bar = ProgressBar::new_spinner()
+        .with_message(path.display().to_string())
+        .with_finish(ProgressFinish::AndClear);
+    bar.set_length(bytes);
+    bar.set_style(ProgressStyle::with_template(
+        "{spinner} {msg}: {total_bytes}, {elapsed}",
+    )?);
+    bar.enable_steady_tick(Duration::from_millis(500));
+    Ok(bar)
+}
+
 fn one(path: &Path, args: &AnalyzeArgs, request: &Request) -> anyhow::Result<Analysis> {
     let mut recording = open(path, args, request)?;
     let name = if path.as_os_str() == "-" {
@@ -142,11 +164,13 @@ fn one(path: &Path, args: &AnalyzeArgs, request: &Request) -> anyhow::Result<Ana
     } else {
         path.display().to_string()
     };
+    let alive = alive(path)?;
     let mut analysis = examine(&name, &recording, request)?;
     if recording.contradicts_its_summary() {
         recording = recording.searched();
         analysis = examine(&name, &recording, request)?;
     }
+    drop(alive);
     // Where all was read and there are no numbers, the topics are the answer.
     let asked = !request.signals.is_empty() || !request.topics.is_empty();
     let lost = analysis.quality.iter().any(|q| q.loss);
