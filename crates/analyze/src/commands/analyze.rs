@@ -146,13 +146,12 @@ fn alive(path: &Path) -> anyhow::Result<ProgressBar> {
     if bytes < LARGE {
         return Ok(ProgressBar::hidden());
     }
+    let style = ProgressStyle::with_template("{spinner} {msg}: {total_bytes}, {elapsed}")?;
     let bar = ProgressBar::new_spinner()
+        .with_style(style)
         .with_message(path.display().to_string())
         .with_finish(ProgressFinish::AndClear);
     bar.set_length(bytes);
-    bar.set_style(ProgressStyle::with_template(
-        "{spinner} {msg}: {total_bytes}, {elapsed}",
-    )?);
     bar.enable_steady_tick(Duration::from_millis(500));
     Ok(bar)
 }
