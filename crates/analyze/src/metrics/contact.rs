@@ -25,7 +25,7 @@ pub fn contact_loss(c: &Context) -> Value {
         .filter(|k| forces.columns.iter().any(|n| n[*k] <= 0.0))
         .count();
     Value {
-        reason: tied(c).or_else(|| floats_without_slack(c)),
+        reason: doubt(c),
         ..Value::number(share(slack, forces.len()))
     }
 }
@@ -41,9 +41,14 @@ pub fn contact_loss_mean(c: &Context) -> Value {
         .map(|n| share(n.iter().filter(|n| **n <= 0.0).count(), n.len()))
         .collect();
     Value {
-        reason: tied(c).or_else(|| floats_without_slack(c)),
+        reason: doubt(c),
         ..Value::number(mean(&per)).per(per)
     }
+}
+
+/// Why N ≤ 0 does not say who is slack, where it does not.
+fn doubt(c: &Context) -> Option<String> {
+    tied(c).or_else(|| floats_without_slack(c))
 }
 
 /// Said where a handle is pulled down, which one that only rests never is.

@@ -96,17 +96,12 @@ impl Adler {
     /// What does not go with Adler's equation, in a sentence: carriers whom the beat pulls unequally, who mind some more than others, or do anything
     /// else that one K and one K_c for all cannot say. Numbers are then those of the nearest that can, and their intervals hold nothing.
     pub fn strained(&self) -> Option<String> {
-        let (
-            left,
-            Shown {
-                noise: shown,
-                error,
-                ..
-            },
-        ) = (self.noise_rad_per_sqrt_s, self.shown?);
-        let most = (shown * (1.0 + MORE_THAN_NOISE * error)).hypot(LEFT_RAD_PER_SQRT_S);
+        let (left, shown) = (self.noise_rad_per_sqrt_s, self.shown?);
+        let most = shown.noise * (1.0 + MORE_THAN_NOISE * shown.error);
+        let most = most.hypot(LEFT_RAD_PER_SQRT_S);
         (left > most).then(|| format!(
-            "carriers do more than follow one beat with one pull and mind all others alike, which leaves {left:.4} rad/√s where the phases wander by {shown:.4} within a tenth of a second"
+            "carriers do more than follow one beat with one pull and mind all others alike, which leaves {left:.4} rad/√s where the phases wander by {:.4} within a tenth of a second",
+            shown.noise
         ))
     }
 
