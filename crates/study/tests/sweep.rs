@@ -274,7 +274,13 @@ fn a_recording_that_is_lost_is_made_again_and_another_study_s_table_is_none_of_o
     let missing = || store.progress(Shard::WHOLE).unwrap().missing;
     let compute = || {
         store
-            .compute(&missing(), 1, &AtomicBool::new(false), || ())
+            .fill(
+                &missing(),
+                1,
+                &AtomicBool::new(false),
+                |runs| store.run(runs),
+                || (),
+            )
             .unwrap()
     };
     assert_eq!(compute().runs, 2);
@@ -325,7 +331,13 @@ fn what_a_kill_left_is_taken_away() {
         unfinished("parts/notes.part", true),
     ];
     store
-        .compute(&[0], 1, &AtomicBool::new(false), || ())
+        .fill(
+            &[0],
+            1,
+            &AtomicBool::new(false),
+            |runs| store.run(runs),
+            || (),
+        )
         .unwrap();
     assert!(!left.iter().any(|path| path.exists()), "{left:?}");
     assert!(kept.iter().all(|path| path.exists()), "{kept:?}");
@@ -342,14 +354,22 @@ fn a_recording_that_cannot_be_written_is_no_result() {
     let stop = AtomicBool::new(false);
     let in_the_way = folder.path().join("recordings/run-000000001.mcap");
     std::fs::create_dir(&in_the_way).unwrap();
-    let why = store.compute(&[0], 1, &stop, || ()).unwrap_err();
+    let why = store
+        .fill(&[0], 1, &stop, |runs| store.run(runs), || ())
+        .unwrap_err();
     assert!(
         why.contains("run-000000001.mcap: cannot be written"),
         "{why}"
     );
     assert_eq!(store.progress(Shard::WHOLE).unwrap().missing, [0]);
     std::fs::remove_dir(&in_the_way).unwrap();
-    assert_eq!(store.compute(&[0], 1, &stop, || ()).unwrap().failed, 0);
+    assert_eq!(
+        store
+            .fill(&[0], 1, &stop, |runs| store.run(runs), || ())
+            .unwrap()
+            .failed,
+        0
+    );
 }
 
 /// The file that cannot be written is named, once and by its own name, with what the system says of it.
@@ -360,7 +380,9 @@ fn what_cannot_be_written_is_named_as_it_is() {
     let store = Store::new(&ours, folder.path());
     store.create().unwrap();
     let stop = AtomicBool::new(false);
-    store.compute(&[0], 1, &stop, || ()).unwrap();
+    store
+        .fill(&[0], 1, &stop, |runs| store.run(runs), || ())
+        .unwrap();
     let table = store.table();
     std::fs::create_dir(&table).unwrap();
     assert_eq!(
@@ -391,10 +413,14 @@ fn a_study_that_grows_keeps_what_it_has() {
     let place = |name: &str| folder.path().join(name);
     let table = |plan: &Plan, name: &str, known: Option<&Known>| {
         let path = place(name);
-        let store = Store::new(plan, &path).reusing(known);
+        let store = Store::new(plan, &path);
+        let run = |runs| match known {
+            Some(known) => known.complete(plan, runs, |runs| store.run(runs)),
+            None => store.run(runs),
+        };
         let _claim = store.create().unwrap();
         let blocks: Vec<u64> = (0..plan.blocks()).collect();
-        store.compute(&blocks, 2, &never, || ()).unwrap();
+        store.fill(&blocks, 2, &never, run, || ()).unwrap();
         store.merge().unwrap();
         std::fs::read(store.table()).unwrap()
     };

@@ -102,7 +102,7 @@ pub fn run(args: &Args) -> Result<()> {
     let sentence = |e: String| anyhow!(e);
     let known = args.reuse.as_ref().map(|dir| Known::load(dir, &plan));
     let known = known.transpose().map_err(sentence)?;
-    let store = Store::new(&plan, &out).reusing(known.as_ref());
+    let store = Store::new(&plan, &out);
 
     let told = Shard::of_environment(args.shards, |name| std::env::var(name).ok());
     let shard = match &args.shard {
@@ -144,8 +144,12 @@ pub fn run(args: &Args) -> Result<()> {
     let left = size(&there.missing);
     let bar = progress(left)?;
     let (mut finished, mut said) = (0u64, Instant::now());
+    let run = |runs| match &known {
+        Some(known) => known.complete(&plan, runs, |runs| store.run(runs)),
+        None => store.run(runs),
+    };
     let written = store
-        .compute(&there.missing, args.jobs, stop, || {
+        .fill(&there.missing, args.jobs, stop, run, || {
             bar.inc(1);
             finished += 1;
             // Where there is no terminal, a log gets a line a minute.

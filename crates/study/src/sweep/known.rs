@@ -103,11 +103,25 @@ impl Known {
         }
     }
 
-    /// The rows of runs of one point of `plan`, those that are not here from `compute`, which is asked for as many at a time as can be.
+    /// The rows of runs of `plan`, those that are not here from `compute`, which is asked for as many at a time as can be.
     ///
     /// # Errors
     /// Those of `compute`.
     pub fn complete(
+        &self,
+        plan: &Plan,
+        runs: Range<u64>,
+        compute: impl Fn(Range<u64>) -> Result<Vec<Vec<Cell>>, String>,
+    ) -> Result<Vec<Vec<Cell>>, String> {
+        let points = plan.by_point(runs);
+        let rows: Result<Vec<_>, String> = points
+            .map(|runs| self.complete_point(plan, runs, &compute))
+            .collect();
+        Ok(rows?.concat())
+    }
+
+    /// The same of runs of one point.
+    fn complete_point(
         &self,
         plan: &Plan,
         runs: Range<u64>,

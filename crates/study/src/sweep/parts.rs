@@ -8,7 +8,6 @@
 //! The blocks follow from the study alone, so the parts are the same files for any number of threads and any sharding.
 
 use super::Plan;
-use super::known::Known;
 use super::shard::Shard;
 use super::summary::{Found, Summary};
 use super::table::{Cell, Notes, Reader, Writer};
@@ -32,7 +31,6 @@ const LEFT: Duration = Duration::from_secs(3600);
 pub struct Store<'p> {
     plan: &'p Plan,
     folder: PathBuf,
-    known: Option<&'p Known>,
 }
 
 /// What there is of a study.
@@ -76,14 +74,7 @@ impl<'p> Store<'p> {
         Self {
             plan,
             folder: folder.into(),
-            known: None,
         }
-    }
-
-    /// The same, where runs that another study has are taken over from it.
-    #[must_use]
-    pub fn reusing(self, known: Option<&'p Known>) -> Self {
-        Self { known, ..self }
     }
 
     /// The merged table.
@@ -232,7 +223,7 @@ impl<'p> Store<'p> {
                 continue;
             }
             found.runs += rows.len() as u64;
-            found.failed += rows.iter().filter(|row| !has_result(row)).count() as u64;
+            found.failed += failed(&rows);
         }
         Ok(found)
     }
@@ -323,19 +314,29 @@ impl<'p> Store<'p> {
         }
     }
 
-    /// Computes the blocks named; `done` is called after every run. When `stop` is set, whole parts stay and the rest is dropped.
+    /// Computes the rows of some runs, and writes their recordings where the study keeps them.
     ///
     /// # Errors
-    /// A part or a recording that cannot be written.
-    pub fn compute(
+    /// A recording that cannot be written.
+    pub fn run(&self, runs: Range<u64>) -> Outcome<Vec<Vec<Cell>>> {
+        let recordings = self.recordings();
+        let recordings = self.plan.spec.recordings.then_some(&*recordings);
+        self.plan.run(runs, recordings)
+    }
+
+    /// Fills the blocks named with the rows that `run` gives of their runs ([`Store::run`]); `done` is called after every run. When `stop` is set,
+    /// whole parts stay and the rest is dropped.
+    ///
+    /// # Errors
+    /// A part that cannot be written, and those of `run`.
+    pub fn fill(
         &self,
         blocks: &[u64],
         jobs: usize,
         stop: &AtomicBool,
+        run: impl Fn(Range<u64>) -> Outcome<Vec<Vec<Cell>>> + Sync,
         mut done: impl FnMut(),
     ) -> Outcome<Written> {
-        let recordings = self.recordings();
-        let recordings = self.plan.spec.recordings.then_some(&*recordings);
         self.sweep_up();
         let runs: u64 = blocks
             .iter()
@@ -352,7 +353,7 @@ impl<'p> Store<'p> {
             stop,
             |k| {
                 let pieces = self.pieces(blocks, shares.get(k)).into_iter();
-                let rows: Outcome<Vec<_>> = pieces.map(|p| self.rows_of(p, recordings)).collect();
+                let rows: Outcome<Vec<_>> = pieces.map(&run).collect();
                 rows.map(|rows| rows.concat())
             },
             |_, batch| {
@@ -375,19 +376,6 @@ impl<'p> Store<'p> {
         Ok(written)
     }
 
-    /// The rows of some runs: computed, or taken over.
-    fn rows_of(&self, runs: Range<u64>, recordings: Option<&Path>) -> Outcome<Vec<Vec<Cell>>> {
-        let compute = |runs| self.plan.run(runs, recordings);
-        let Some(known) = self.known else {
-            return compute(runs);
-        };
-        let points = self.plan.by_point(runs);
-        let rows: Outcome<Vec<_>> = points
-            .map(|runs| known.complete(self.plan, runs, compute))
-            .collect();
-        Ok(rows?.concat())
-    }
-
     /// The runs at some places in the row of all runs of `blocks`, where all blocks but the very last are of one size.
     fn pieces(&self, blocks: &[u64], places: Range<u64>) -> Vec<Range<u64>> {
         let size = self.plan.block_runs();
@@ -407,13 +395,12 @@ impl<'p> Store<'p> {
     }
 
     fn write_part(&self, block: u64, rows: &[Vec<Cell>]) -> Outcome<u64> {
-        let failed = rows.iter().filter(|row| !has_result(row)).count() as u64;
         write_whole(&self.part(block), |file| {
             let mut writer = Writer::new(file, self.plan.columns(), &self.notes())?;
             writer.group(rows)?;
             writer.close()
         })?;
-        Ok(failed)
+        Ok(failed(rows))
     }
 
     /// Puts all parts together, in order, and summarises them on the way.
@@ -541,6 +528,11 @@ fn first_differences(there: &str, here: &str) -> String {
 /// Whether a run of the table has a result.
 fn has_result(row: &[Cell]) -> bool {
     row[row.len() - 2] == Cell::Empty
+}
+
+/// How many runs have none.
+fn failed(rows: &[Vec<Cell>]) -> u64 {
+    rows.iter().filter(|row| !has_result(row)).count() as u64
 }
 
 /// Name of a run's recording.
