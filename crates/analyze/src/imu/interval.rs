@@ -342,7 +342,7 @@ fn rate_hz(inputs: &Inputs) -> f64 {
 }
 
 /// What a slow course of the height is part of.
-const OF_COURSE: &[&str] = &["dz_pp_m", "rms_z_m"];
+const OF_COURSE: &[&str] = &["dz_pp_m", "rms_z_m", "growth_ratio"];
 
 /// Roots of mean squares, to which noise adds and from which it never takes.
 const MEAN_SQUARES: &[&str] = &["rms_roll_deg", "rms_pitch_deg"];
@@ -560,27 +560,41 @@ fn beyond_the_budget(name: &str, motion: &Motion, window: Window) -> f64 {
             samples * edges as f64 * period_s / length_s
         }
         // The transform has no taper: each line is as high as it falls on a bin of 1/T, and the estimate's T is not the window's. While an end
-        // moves through a period, both fall everywhere.
+        // moves through a period, both fall everywhere. And of what is missing lines may be higher or lower.
         "h2_ratio" => {
-            let cuts = |hz: f64| (1..=8).map(move |k| [0.0, f64::from(k) / (8.0 * hz)]);
+            let bins = |hz: f64| (1..=8).map(move |k| [0.0, f64::from(k) / (8.0 * hz)]);
             let hz = metrics_of(inputs, window, |n| n == "peak_hz").number("peak_hz");
-            hz.map_or(0.0, |hz| farthest(name, inputs, window, cuts(hz)) / 1.96)
+            let ends = without_ends((range.len() - seen.len()) as f64 * period_s);
+            hz.map_or(0.0, |hz| {
+                farthest(name, inputs, window, bins(hz).chain(ends)) / 1.96
+            })
         }
-        // Thirds of a window without its ends are other thirds: as far off as if as much were missing once, twice, thrice more.
+        // Thirds of a window without its ends are other thirds: as far off as if as much were missing once, twice, thrice more, or as what is
+        // missing swings more or less than the rest. And thirds are whole samples. The course that is missing may be all in one of them.
         "growth_ratio" => {
-            let lost_s = (range.len() - seen.len()) as f64 * period_s;
-            let cuts = [1.0, 2.0, 3.0].map(|k| k * lost_s);
-            let cuts = cuts
-                .into_iter()
-                .flat_map(|cut_s| [[cut_s, 0.0], [0.0, cut_s]]);
-            farthest(name, inputs, window, cuts) / 1.96
+            let lost = range.len() - seen.len();
+            let lost_s = lost as f64 * period_s;
+            let cuts = without_ends(lost_s.max(COUNTED_S));
+            let ends = farthest(name, inputs, window, cuts) / 1.96;
+            let about = about_mean(&seen);
+            let third = seen.len() / 3;
+            let [first, last] = [&about[..third], &about[about.len() - third..]].map(power);
+            let least = first.min(last);
+            if least <= 0.0 {
+                return 0.0;
+            }
+            let missing =
+                lost as f64 / third as f64 * spread_of_parts(&about, lost) / (2.0 * least);
+            let course = lost_course_m(motion, range) / least.sqrt();
+            let growth = (last / first).sqrt();
+            ends.hypot(growth * missing)
+                .hypot(growth * (1f64.hypot(course) - 1.0))
         }
         // The ends have no height. Stretches of their length swing so much more or less than the whole. And a slow course is missing from it.
         "rms_z_m" => {
             let course_m = lost_course_m(motion, range.clone());
             let lost = range.len() - seen.len();
-            let mean = seen.iter().sum::<f64>() / seen.len().max(1) as f64;
-            let about: Vec<f64> = seen.iter().map(|z| z - mean).collect();
+            let about = about_mean(&seen);
             let whole = power(&about);
             if whole <= 0.0 {
                 return 0.0;
@@ -608,6 +622,12 @@ fn lost_course_m(motion: &Motion, range: Range<usize>) -> f64 {
     let course_m = slow_course_m(motion, range, quarter_hz.max(2.0 * corner_hz));
     let excess = course_m.powi(2) - of_budget.powi(2);
     RANGE_OF_WANDER * excess.max(0.0).sqrt()
+}
+
+/// A sample less its mean.
+fn about_mean(x: &[f64]) -> Vec<f64> {
+    let mean = x.iter().sum::<f64>() / x.len().max(1) as f64;
+    x.iter().map(|x| x - mean).collect()
 }
 
 /// Mean square.
@@ -641,6 +661,13 @@ fn slow_course_m(motion: &Motion, range: Range<usize>, to_hz: f64) -> f64 {
         return 0.0;
     }
     variance(&course).sqrt()
+}
+
+/// What is cut off at the ends where so much is missing: as much again, twice and thrice, at either.
+fn without_ends(lost_s: f64) -> impl Iterator<Item = [f64; 2]> {
+    let cuts = [1.0, 2.0, 3.0].map(|k| k * lost_s);
+    cuts.into_iter()
+        .flat_map(|cut_s| [[cut_s, 0.0], [0.0, cut_s]])
 }
 
 /// How far a metric of the height goes when so much (s) is cut off the beginning and the end of what is known of it.
