@@ -170,6 +170,9 @@ fn one(path: &Path, args: &AnalyzeArgs, request: &Request) -> anyhow::Result<Ana
         analysis = examine(&name, &recording, request)?;
     }
     drop(alive);
+    if let Some(outside) = &analysis.outside {
+        bail!("{name}: {outside}");
+    }
     // Where all was read and there are no numbers, the topics are the answer.
     let asked = !request.signals.is_empty() || !request.topics.is_empty();
     let lost = analysis.quality.iter().any(|q| q.loss);

@@ -33,6 +33,8 @@ pub struct Analysis {
     pub samples: u64,
     /// The window (s).
     pub window: Window,
+    /// Where it lies outside the recording, so that there is nothing to analyse: a sentence.
+    pub outside: Option<String>,
     /// Profile of the file.
     pub profile: String,
     /// Software that wrote it.

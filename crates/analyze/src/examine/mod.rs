@@ -91,6 +91,7 @@ pub fn examine(
         warnings.push("no truth is known in the recording: estimates are judged by the pose of a topic whose name holds \"truth\", or of truth = \"TOPIC\" in a file for --roles".into());
     }
     let window = until(field.last_s(), &mut warnings);
+    let outside = outside(window, lasts_s.max(field.last_s()));
     warnings.extend(field.warnings());
     field.fill(&mut inputs);
     field.hold_against_pose(&inputs, &roles, window);
@@ -129,6 +130,7 @@ pub fn examine(
         duration_s,
         samples,
         window,
+        outside,
         profile: info.profile.clone(),
         library: info.library.clone(),
         messages: info.messages,
@@ -195,8 +197,12 @@ fn window(
             0.0
         }
     };
-    if start_s > duration_s || end_s < 0.0 {
-        warnings.push(format!("the window from {start_s} to {end_s} s is outside the recording, which lasts {duration_s:.3} s: nothing is analysed"));
-    }
     Window { start_s, end_s }
+}
+
+/// Said of a window that holds nothing of the recording.
+fn outside(Window { start_s, end_s }: Window, duration_s: f64) -> Option<String> {
+    (start_s > duration_s || end_s < 0.0).then(|| {
+        format!("the window from {start_s} to {end_s} s is outside the recording, which lasts {duration_s:.3} s: nothing of it can be analysed")
+    })
 }

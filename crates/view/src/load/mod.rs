@@ -147,6 +147,7 @@ fn examined(
         .filter(|q| q.kind != "gap")
         .map(|q| (q.t_s, remark(&q.topic, &q.text)))
         .collect();
+    take.notes.extend(analysis.outside);
     take.notes.extend(analysis.warnings);
     take.inputs = analysis.inputs;
     Ok(place)
