@@ -1,5 +1,6 @@
 //! The Rerun viewer as a program of its own: found on PATH, its version checked, fed through its standard input.
 
+use std::net::{Ipv4Addr, TcpListener};
 use std::path::{Path, PathBuf};
 use std::process::{Child, ChildStdin, Command, Stdio};
 
@@ -64,6 +65,14 @@ fn compatible(version: &str) -> bool {
     minor(version) == minor(VERSION)
 }
 
+/// Where the viewer's page is usually found.
+const WEB_PORT: u16 = 9090;
+
+/// The port if nobody has it, else 0, for which the viewer takes a free one: a second page does not end the first, nor the first a second.
+fn free_or_any(port: u16) -> u16 {
+    TcpListener::bind((Ipv4Addr::LOCALHOST, port)).map_or(0, |_| port)
+}
+
 /// How many threads the viewer computes with: it reads the pipe in one of them, and with that one alone it would show nothing before the end.
 fn threads() -> usize {
     const LEAST: usize = 4;
@@ -84,12 +93,17 @@ pub fn start(program: &Path, kind: Kind) -> anyhow::Result<(Child, ChildStdin)> 
             "127.0.0.1",
             "--threads",
             &threads().to_string(),
+            "--port",
+            "auto",
         ])
         .stdin(Stdio::piped())
         .stdout(Stdio::null());
     match kind {
-        Kind::Window => command.args(["--port", "auto", "--hide-welcome-screen"]),
-        Kind::Web => command.arg("--serve-web"),
+        Kind::Window => command.arg("--hide-welcome-screen"),
+        Kind::Web => {
+            let port = free_or_any(WEB_PORT).to_string();
+            command.args(["--serve-web", "--web-viewer-port", &port])
+        }
     };
     let mut child = command
         .spawn()
@@ -112,6 +126,24 @@ mod tests {
         assert_eq!(version("something else"), None);
         assert!(compatible("0.36.0") && compatible("0.36.9-alpha.1+dev"));
         assert!(!compatible("0.35.3") && !compatible("1.36.3") && !compatible("0.3"));
+    }
+
+    #[test]
+    fn a_port_that_is_taken_is_left_to_whoever_has_it() {
+        let held = || {
+            let holder = TcpListener::bind((Ipv4Addr::LOCALHOST, 0)).unwrap();
+            let port = holder.local_addr().unwrap().port();
+            (holder, port)
+        };
+        let (_holder, port) = held();
+        assert_eq!(free_or_any(port), 0);
+        // Others of this machine may take one that was just let go.
+        let is_found_free = |_| {
+            let (holder, port) = held();
+            drop(holder);
+            free_or_any(port) == port
+        };
+        assert!((0..20).any(is_found_free));
     }
 
     #[test]
