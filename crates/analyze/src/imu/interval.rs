@@ -10,7 +10,7 @@ use super::rath::{Motion, Mounting};
 use super::track::Instrument;
 use super::unloading::unloadings;
 use crate::inputs::{Inputs, Window, between};
-use crate::line::rival_hz;
+use crate::line::{Shares, rival_hz};
 use crate::mechanism::Verdict;
 use crate::metrics::{Datum, Metrics, metrics_of};
 use crate::random::Random;
@@ -540,14 +540,30 @@ fn beyond_the_budget(name: &str, motion: &Motion, window: Window) -> f64 {
         // Lines sit on bins of 1/T, and the estimate's T is shorter than the window's: up to half a bin each, evenly spread.
         "peak_hz" | "roll_peak_hz" if !seen.is_empty() => {
             let bin = 0.5 / (seen.len() as f64 * period_s) / 3f64.sqrt() * 2f64.sqrt();
-            let x = if name == "peak_hz" {
-                &inputs.height_m[range.clone()]
-            } else {
-                &inputs.roll_rad[range.clone()]
+            let (t_s, x) = match name {
+                "peak_hz" => finite(inputs, &inputs.height_m, range),
+                _ => finite(inputs, &inputs.roll_rad, range),
             };
-            let all = inputs.t_s[range].iter().zip(x);
-            let (t_s, x): (Vec<f64>, Vec<f64>) = all.filter(|(_, x)| x.is_finite()).unzip();
             bin.hypot(rival_hz(&t_s, &x) / 1.96)
+        }
+        // So may the line be by which the roll's shares are told, a bin in all, or its rival: it counts where power lies at a band's edge.
+        "subharmonic_ratio" => {
+            let hz = metrics_of(inputs, window, |n| n == "peak_hz").number("peak_hz");
+            let (t_s, z) = finite(inputs, &inputs.height_m, range.clone());
+            let bin_hz = 1.0 / (seen.len() as f64 * period_s);
+            let off_hz = [bin_hz, bin_hz.hypot(rival_hz(&t_s, &z))];
+            let (t_s, roll) = finite(inputs, &inputs.roll_rad, range);
+            let ratio = |hz: f64| {
+                let shares = Shares::of(&t_s, &roll, hz)?;
+                Some(shares.at_half / shares.at_f).filter(|x| x.is_finite())
+            };
+            let off = |hz: f64| {
+                let whole = ratio(hz)?;
+                let others = off_hz.into_iter().flat_map(|off| [hz - off, hz + off]);
+                let others = others.filter_map(ratio);
+                Some(others.map(|x| (x - whole).abs()).fold(0.0, f64::max))
+            };
+            hz.and_then(off).unwrap_or(0.0) / 1.96
         }
         // What is slower than the corner is missing or too much.
         "dz_pp_m" => lost_course_m(motion, range),
@@ -628,6 +644,12 @@ fn lost_course_m(motion: &Motion, range: Range<usize>) -> f64 {
 fn about_mean(x: &[f64]) -> Vec<f64> {
     let mean = x.iter().sum::<f64>() / x.len().max(1) as f64;
     x.iter().map(|x| x - mean).collect()
+}
+
+/// What of a column is known in a part, with its times.
+fn finite(inputs: &Inputs, x: &[f64], range: Range<usize>) -> (Vec<f64>, Vec<f64>) {
+    let all = inputs.t_s[range.clone()].iter().zip(&x[range]);
+    all.filter(|(_, x)| x.is_finite()).unzip()
 }
 
 /// Mean square.

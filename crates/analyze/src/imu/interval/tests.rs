@@ -367,6 +367,10 @@ fn what_the_window_holds_beyond_the_budget_is_known_by_hand() {
     let two = |t: f64| 0.3 * (line(32.0)(t) + 0.9 * line(38.0)(t));
     let one = thrown(|t| 0.05 * line(54.0)(t), two);
     let torn = on_bins.hypot(6.0 * bin_hz / 1.96);
+    // Of the line at bin 60 the taper puts 1/4, 1, 1/4 on bins 59, 60, 61, and the band about bin 54 ends at 59.4: of 53 at 58.3, of 55 at 60.5.
+    let three = |t: f64| 0.3 * line(27.0)(t) + 0.01 * (line(54.0)(t) + line(60.0)(t));
+    let edged = thrown(|t| 0.05 * line(54.0)(t), three);
+    let shares = |of_third: f64| 1.5 * 0.3f64.powi(2) / (0.01f64.powi(2) * (1.5 + of_third));
     // Two lines 59 and 118 periods long; without half a period the one falls between bins, where it is 2/π as high, the other on one.
     let harmonic = thrown(
         |t| 0.05 * (TAU * 2.0 * t).sin() + 0.015 * (TAU * 4.0 * t + 1.0).sin(),
@@ -392,6 +396,13 @@ fn what_the_window_holds_beyond_the_budget_is_known_by_hand() {
     for (motion, name, window, known, within) in [
         (&one, "peak_hz", MOST, on_bins, 1e-3),
         (&one, "roll_peak_hz", MOST, torn, 1e-3),
+        (
+            &edged,
+            "subharmonic_ratio",
+            MOST,
+            (shares(0.25) - shares(1.25)) / 1.96,
+            0.01,
+        ),
         (
             &harmonic,
             "h2_ratio",
