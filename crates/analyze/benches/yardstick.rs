@@ -14,7 +14,8 @@ use std::{
     time::Duration,
 };
 
-use analyze::examine::{Analysis, Request, examine};
+use analyze::examine::{Analysis, examine};
+use analyze::request::Request;
 use analyze::spectrum::{Options, welch};
 use recording::read::{ReadOptions, Recording};
 

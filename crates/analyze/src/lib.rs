@@ -30,6 +30,7 @@ pub mod quality;
 pub mod quaternion;
 mod random;
 pub mod report;
+pub mod request;
 pub mod roles;
 pub mod spectrum;
 pub mod spline;

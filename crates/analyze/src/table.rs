@@ -8,9 +8,10 @@ use std::path::Path;
 use recording::read::{ReadError, Recording};
 use recording::{Finding, Kind, Signal};
 
-use crate::examine::{Request, with_angles};
+use crate::examine::with_angles;
 use crate::quaternion::{ANGLES, angles};
 use crate::report::quoted;
+use crate::request::Request;
 
 /// Why a table could not be written. Nothing is left under the final name.
 #[derive(Debug, thiserror::Error)]

@@ -1812,7 +1812,7 @@ fn what_was_not_measured_is_not_drawn() {
     let roles = folder.path().join("roles.toml");
     std::fs::write(&roles, "roll = \"/m.roll\"\n").unwrap();
     let opened = Recording::open(Path::new(&file), &Default::default()).unwrap();
-    let request = analyze::examine::Request {
+    let request = analyze::request::Request {
         roles: Some(analyze::roles::RolesFile::read(&roles).unwrap()),
         ..Default::default()
     };
@@ -1862,7 +1862,7 @@ fn signals_share_a_panel_where_one_scale_shows_them() {
     };
     let file = told(folder.path(), &[("/m", (0..500).map(message).collect())]);
     let opened = Recording::open(Path::new(&file), &Default::default()).unwrap();
-    let request = analyze::examine::Request {
+    let request = analyze::request::Request {
         traces: true,
         ..Default::default()
     };

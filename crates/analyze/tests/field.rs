@@ -3,8 +3,7 @@
 //!
 //!     IMU_RECORDINGS=FOLDER cargo test --release -p analyze --test field -- --ignored
 
-use analyze::examine::{Analysis, Request, examine};
-use analyze::field::DeviceClocks;
+use analyze::examine::{Analysis, examine};
 use analyze::imu::Track;
 use analyze::imu::axes::{misfit, signed_permutations};
 use analyze::imu::bias::far_off;
@@ -13,6 +12,7 @@ use analyze::imu::rath::{Settings, motion};
 use analyze::imu::unit::other_unit;
 use analyze::metrics::Datum;
 use analyze::quality::Quality;
+use analyze::request::{DeviceClocks, Request};
 use nalgebra::{Matrix3, UnitQuaternion, Vector3};
 use recording::cdr::Imu;
 use recording::import::{ImportOptions, ingest};

@@ -5,7 +5,8 @@
 
 use crate::pool::in_order;
 use crate::statistics::summarise;
-use analyze::examine::{Request, examine};
+use analyze::examine::examine;
+use analyze::request::Request;
 use recording::read::{ReadOptions, Recording};
 use recording::write::{RecordingWriter, WriterOptions};
 use serde_json::{Value, json};

@@ -937,7 +937,7 @@ fn carriers_whose_sensors_come_to_their_end_have_no_interval() {
         let path = folder.path().join(format!("{range}.mcap"));
         field_log(&scene, &path);
         let recording = Recording::open(&path, &ReadOptions::default()).unwrap();
-        let request = analyze::examine::Request::default();
+        let request = analyze::request::Request::default();
         let found = analyze::examine::examine("log", &recording, &request).unwrap();
         let ended = found.quality.iter().filter(|q| q.kind == "saturated");
         let ended = ended.filter(|q| q.topic.contains("carrier")).count();

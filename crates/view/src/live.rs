@@ -7,7 +7,7 @@ use std::io::Read;
 use std::sync::mpsc::{RecvTimeoutError, channel};
 use std::time::{Duration, Instant};
 
-use analyze::examine::Request;
+use analyze::request::Request;
 use recording::Finding;
 use recording::read::{ReadError, Recording, STDIN};
 

@@ -6,7 +6,7 @@ use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 use std::time::Duration;
 
-use analyze::examine::Request;
+use analyze::request::Request;
 use analyze::roles::RolesFile;
 use anyhow::{Context, anyhow, bail};
 use clap::Parser;

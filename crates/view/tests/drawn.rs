@@ -2,7 +2,7 @@
 
 mod common;
 
-use analyze::examine::Request;
+use analyze::request::Request;
 use common::{ROWS, imus, imus_logged, json_channel, run, run_logged, taken};
 use recording::cdr::Imu;
 use recording::read::Recording;

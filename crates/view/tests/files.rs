@@ -4,7 +4,7 @@ mod common;
 
 use std::process::Command;
 
-use analyze::examine::Request;
+use analyze::request::Request;
 use recording::read::Recording;
 use recording::write::{RecordingWriter, WriterOptions};
 use view::load::{Detail, load, options};

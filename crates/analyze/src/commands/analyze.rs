@@ -4,10 +4,10 @@ use std::io::Write;
 use std::path::{Path, PathBuf};
 use std::time::Duration;
 
-use analyze::examine::{Analysis, Request, examine};
-use analyze::field::DeviceClocks;
+use analyze::examine::{Analysis, examine};
 use analyze::quality::Quality;
 use analyze::report;
+use analyze::request::{DeviceClocks, Request};
 use analyze::roles::{RolesFile, matches, meant};
 use anyhow::{Context, bail};
 use indicatif::{ProgressBar, ProgressFinish, ProgressStyle};

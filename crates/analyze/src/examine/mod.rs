@@ -6,13 +6,11 @@ mod listing;
 mod natural;
 mod pass;
 mod remarks;
-mod request;
 
 pub use analysis::{Analysis, Topic, Trace};
 pub(crate) use listing::MOST_SERIES;
 pub use natural::natural;
 pub(crate) use pass::with_angles;
-pub use request::Request;
 
 use std::collections::BTreeSet;
 
@@ -23,6 +21,7 @@ use crate::field::Field;
 use crate::inputs::Window;
 use crate::metrics::metrics;
 use crate::quality::Quality;
+use crate::request::Request;
 use crate::roles::{Role, Roles, RolesFile};
 use columns::number;
 use listing::spectra;

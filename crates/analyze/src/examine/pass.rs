@@ -6,11 +6,11 @@ use recording::read::{Batch, ReadError, Recording};
 use recording::signal::unit_of;
 
 use super::analysis::Topic;
-use super::request::Request;
 use crate::arrivals::{Arrivals, Axis};
 use crate::envelope::Envelope;
 use crate::quality::Quality;
 use crate::quaternion::Quaternions;
+use crate::request::Request;
 use crate::roles::{Role, Roles};
 use crate::summary::{Stream, Times, seconds, segment};
 

@@ -25,7 +25,6 @@ use recording::text::counted;
 
 use crate::beat::lock::Course;
 use crate::events::Event;
-use crate::examine::Request;
 use crate::imu::Track;
 use crate::imu::axes::misfit;
 use crate::imu::bias::far_off;
@@ -42,6 +41,7 @@ use crate::imu::unloading::unloadings;
 use crate::inputs::{self, Inputs, Window};
 use crate::metrics::{Metrics, Value, metrics_of};
 use crate::quality::Quality;
+use crate::request::{DeviceClocks, Request};
 use crate::roles::{Role, Roles, Sensors, about_the_load, stands_beside};
 use carriers::Carriers;
 use clocks::Clocks;
@@ -50,18 +50,6 @@ use columns::{ACCEL_MARK, BEAT, Columns, GYRO_MARK, STAMPS, Sensor};
 use dates::Dated;
 use judge::Judge;
 use sound::Heard;
-
-/// What is done about the clocks of sensors that differ.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub enum DeviceClocks {
-    /// They are put right, and it is said how.
-    #[default]
-    PutRight,
-    /// They are left as they are, and it is said how they differ.
-    Told,
-    /// Nothing: all sensors were stamped by one clock, and what looks like an offset between carriers is theirs.
-    One,
-}
 
 /// What a recording's sensors say.
 #[derive(Default)]

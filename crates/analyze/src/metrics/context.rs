@@ -18,6 +18,8 @@ pub enum Need {
     Yaw,
     /// Height of the centre of mass.
     Height,
+    /// The same, often enough for a beat that sounds.
+    HeightLine,
     /// Normal forces of the handles.
     Forces,
     /// Normal forces, or the support ratio measured as such.
@@ -296,6 +298,7 @@ impl<'a> Context<'a> {
             Need::Pitch => empty(!self.pitch().x.is_empty(), "pitch"),
             Need::Yaw => empty(!self.yaw().x.is_empty(), "yaw"),
             Need::Height => empty(!self.height().x.is_empty(), "height"),
+            Need::HeightLine => self.missing(Need::Height).or_else(|| self.aliased()),
             Need::Forces => empty(!self.forces().is_empty(), "handle forces"),
             Need::Support if self.inputs.normal_n.is_empty() => empty(
                 !self.support_ratio().x.is_empty(),
@@ -315,7 +318,7 @@ impl<'a> Context<'a> {
             Need::Roll => !i.roll_rad.is_empty(),
             Need::Pitch => !i.pitch_rad.is_empty(),
             Need::Yaw => !i.yaw_rad.is_empty(),
-            Need::Height => !i.height().1.is_empty(),
+            Need::Height | Need::HeightLine => !i.height().1.is_empty(),
             Need::Forces => !i.normal_n.is_empty(),
             Need::Support => !i.normal_n.is_empty() || !i.support_ratio.is_empty(),
             Need::Phases => !i.phase_rad.is_empty(),
@@ -332,7 +335,7 @@ impl<'a> Context<'a> {
         let s = &self.inputs.sources;
         match need {
             Need::Roll | Need::Pitch | Need::Yaw => &s.attitude,
-            Need::Height => &s.height,
+            Need::Height | Need::HeightLine => &s.height,
             Need::Forces | Need::Support => &s.forces,
             Need::Phases => &s.phases,
             Need::Beat => &s.beat,

@@ -35,9 +35,6 @@ pub fn growth_ratio(c: &Context) -> Value {
         (z.iter().map(|z| (z - middle) * (z - middle)).sum::<f64>() / third as f64).sqrt()
     };
     let (first, last) = (rms(&z[..third]), rms(&z[z.len() - third..]));
-    if let Some(why) = c.aliased() {
-        return Value::missing(why);
-    }
     if first <= rounding(z) {
         return Value::missing("the height does not move in the first third of the window");
     }

@@ -10,9 +10,6 @@ const H2_HALF_WIDTH_HZ: f64 = 0.45;
 const NO_LINE: &str = "the signal does not move in the window, or has fewer than four samples";
 
 pub fn peak_hz(c: &Context) -> Value {
-    if let Some(why) = c.aliased() {
-        return Value::missing(why);
-    }
     told(c.height_line(), c.height())
 }
 
@@ -35,9 +32,6 @@ fn told(line: Option<&Line>, of: &Series<'_>) -> Value {
 }
 
 pub fn h2_ratio(c: &Context) -> Value {
-    if let Some(why) = c.aliased() {
-        return Value::missing(why);
-    }
     let Some(line) = c.height_line() else {
         return Value::missing(NO_LINE);
     };
@@ -65,7 +59,7 @@ pub fn subharmonic_ratio(c: &Context) -> Value {
     let Some(line) = c.height_line() else {
         return Value::missing("the height has no line to compare with");
     };
-    if let Some(why) = c.aliased().or_else(|| c.too_slow()) {
+    if let Some(why) = c.too_slow() {
         return Value::missing(why);
     }
     let Some(shares) = Shares::of(&c.roll().t_s, &c.roll().x, line.hz) else {

@@ -2,10 +2,10 @@
 
 use super::{Clocks, Field};
 use analyze::Window;
-use analyze::examine::{Request, examine, natural};
-use analyze::field::DeviceClocks;
+use analyze::examine::{examine, natural};
 use analyze::inputs;
 use analyze::quality::Quality;
+use analyze::request::{DeviceClocks, Request};
 use analyze::roles::RolesFile;
 use anyhow::{Result, anyhow};
 use recording::import::{ImportOptions, ingest};

@@ -10,7 +10,8 @@ mod stream;
 
 use std::collections::BTreeMap;
 
-use analyze::examine::{Request, examine};
+use analyze::examine::examine;
+use analyze::request::Request;
 use recording::read::{Info, ReadError, ReadOptions, Recording};
 use recording::signal::{Signal, field_of};
 use recording::{Finding, Kind, topics};

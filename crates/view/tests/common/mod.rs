@@ -5,7 +5,7 @@ use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
 use std::process::Command;
 
-use analyze::examine::Request;
+use analyze::request::Request;
 use re_chunk::Chunk;
 use re_log_types::LogMsg;
 use recording::cdr::{Header, Imu, Quaternion, TfMessage, Time, Transform, TransformStamped};

@@ -1,8 +1,19 @@
 //! What is asked of a recording.
 
-use crate::field::DeviceClocks;
 use crate::inputs::Window;
 use crate::roles::{RolesFile, matches, of_topic};
+
+/// What is done about the clocks of sensors that differ.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum DeviceClocks {
+    /// They are put right, and it is said how.
+    #[default]
+    PutRight,
+    /// They are left as they are, and it is said how they differ.
+    Told,
+    /// Nothing: all sensors were stamped by one clock, and what looks like an offset between carriers is theirs.
+    One,
+}
 
 /// What is asked of a recording.
 #[derive(Clone, Debug, Default)]
@@ -56,7 +67,7 @@ impl Request {
     }
 
     /// How long the window may be that was asked for, s.
-    pub(super) fn longest_s(&self) -> f64 {
+    pub(crate) fn longest_s(&self) -> f64 {
         let (from, to) = self.window;
         let span_s = to.map(|to| to - from.unwrap_or(0.0));
         span_s.map_or(f64::INFINITY, |s| s.max(0.0))
