@@ -305,6 +305,12 @@ fn even(t_s: &[f64], step_s: f64) -> bool {
         .all(|t| ((t[1] - t[0]) / step_s - 1.0).abs() <= UNEVEN)
 }
 
+/// Times and values of what is finite.
+pub fn finite(t_s: &[f64], x: &[f64]) -> (Vec<f64>, Vec<f64>) {
+    let known = t_s.iter().zip(x).filter(|(_, x)| x.is_finite());
+    known.unzip()
+}
+
 /// A signal about its mean on an even axis, 0 in its holes.
 pub struct Even {
     /// Its samples.

@@ -2,7 +2,7 @@
 
 use serde::Serialize;
 
-use crate::inputs::{Window, mean_step_s, on_axis, stretches};
+use crate::inputs::{Window, finite, mean_step_s, on_axis, stretches};
 use crate::median::median;
 use crate::spectrum::{DEFAULT_SEGMENT_S, Options, Spectrum, welch};
 use crate::summary::{ends, moves, squares};
@@ -95,9 +95,8 @@ impl SpectrumSummary {
             return None;
         }
         let range = window.range(t_s);
-        let all = t_s[range.clone()].iter().zip(&x[range]);
         // An estimated column has no values at its ends.
-        let (t_s, x): (Vec<f64>, Vec<f64>) = all.filter(|(_, x)| x.is_finite()).unzip();
+        let (t_s, x) = finite(&t_s[range.clone()], &x[range]);
         let parts = stretches(&t_s, 0.0).into_iter();
         let longest = parts.max_by_key(ExactSizeIterator::len)?;
         let (t_s, x) = (&t_s[longest.clone()], &x[longest]);

@@ -18,7 +18,7 @@ use crate::imu::track::period_s;
 use crate::imu::truth::{Truth, inclination_error_deg, relative_error};
 use crate::imu::unloading::unloadings;
 use crate::imu::{Track, interval, vertical};
-use crate::inputs::{Inputs, Window, interpolate};
+use crate::inputs::{Inputs, Window, finite, interpolate};
 use crate::metrics::{Datum, Metrics, Value, metrics_of};
 use crate::roles::{Role, Roles};
 use crate::steps::agreement;
@@ -157,10 +157,7 @@ impl Judge {
             let height = HEIGHT
                 .iter()
                 .find_map(|f| Some((columns.get(topic, f)?, f)));
-            judge.height = height.map(|(s, field)| {
-                let all = times_s(s, field).into_iter().zip(&s.values);
-                all.filter(|(_, z)| z.is_finite()).unzip()
-            });
+            judge.height = height.map(|(s, field)| finite(&times_s(s, field), &s.values));
             judge.of_body = recording
                 .info()
                 .channels

@@ -9,7 +9,7 @@ use super::floating::floating;
 use super::rath::{Motion, Mounting};
 use super::track::Instrument;
 use super::unloading::unloadings;
-use crate::inputs::{Inputs, Window, between};
+use crate::inputs::{Inputs, Window, between, finite};
 use crate::line::{Shares, rival_hz};
 use crate::mechanism::Verdict;
 use crate::metrics::{Datum, Metrics, metrics_of};
@@ -528,11 +528,9 @@ const RANGE_OF_WANDER: f64 = 3.8;
 fn beyond_the_budget(name: &str, motion: &Motion, window: Window) -> f64 {
     let inputs = &motion.inputs;
     let range = window.range(&inputs.t_s);
-    let seen: Vec<f64> = inputs.height_m[range.clone()]
-        .iter()
-        .copied()
-        .filter(|z| z.is_finite())
-        .collect();
+    let of = |x: &[f64]| finite(&inputs.t_s[range.clone()], &x[range.clone()]);
+    let (seen_s, seen) = of(&inputs.height_m);
+    let lost = range.len() - seen.len();
     let Some(period_s) = super::track::period_s(&inputs.t_s) else {
         return 0.0;
     };
@@ -541,18 +539,16 @@ fn beyond_the_budget(name: &str, motion: &Motion, window: Window) -> f64 {
         "peak_hz" | "roll_peak_hz" if !seen.is_empty() => {
             let bin = 0.5 / (seen.len() as f64 * period_s) / 3f64.sqrt() * 2f64.sqrt();
             let (t_s, x) = match name {
-                "peak_hz" => finite(inputs, &inputs.height_m, range),
-                _ => finite(inputs, &inputs.roll_rad, range),
+                "peak_hz" => (seen_s, seen),
+                _ => of(&inputs.roll_rad),
             };
             bin.hypot(rival_hz(&t_s, &x) / 1.96)
         }
         // So may the line be by which the roll's shares are told, a bin in all, or its rival: it counts where power lies at a band's edge.
         "subharmonic_ratio" => {
-            let hz = metrics_of(inputs, window, |n| n == "peak_hz").number("peak_hz");
-            let (t_s, z) = finite(inputs, &inputs.height_m, range.clone());
             let bin_hz = 1.0 / (seen.len() as f64 * period_s);
-            let off_hz = [bin_hz, bin_hz.hypot(rival_hz(&t_s, &z))];
-            let (t_s, roll) = finite(inputs, &inputs.roll_rad, range);
+            let off_hz = [bin_hz, bin_hz.hypot(rival_hz(&seen_s, &seen))];
+            let (t_s, roll) = of(&inputs.roll_rad);
             let ratio = |hz: f64| {
                 let shares = Shares::of(&t_s, &roll, hz)?;
                 Some(shares.at_half / shares.at_f).filter(|x| x.is_finite())
@@ -563,7 +559,7 @@ fn beyond_the_budget(name: &str, motion: &Motion, window: Window) -> f64 {
                 let others = others.filter_map(ratio);
                 Some(others.map(|x| (x - whole).abs()).fold(0.0, f64::max))
             };
-            hz.and_then(off).unwrap_or(0.0) / 1.96
+            heave_hz(inputs, window).and_then(off).unwrap_or(0.0) / 1.96
         }
         // What is slower than the corner is missing or too much.
         "dz_pp_m" => lost_course_m(motion, range),
@@ -579,20 +575,17 @@ fn beyond_the_budget(name: &str, motion: &Motion, window: Window) -> f64 {
         // moves through a period, both fall everywhere. And of what is missing lines may be higher or lower.
         "h2_ratio" => {
             let bins = |hz: f64| (1..=8).map(move |k| [0.0, f64::from(k) / (8.0 * hz)]);
-            let hz = metrics_of(inputs, window, |n| n == "peak_hz").number("peak_hz");
-            let ends = without_ends((range.len() - seen.len()) as f64 * period_s);
-            hz.map_or(0.0, |hz| {
+            let ends = without_ends(lost as f64 * period_s);
+            heave_hz(inputs, window).map_or(0.0, |hz| {
                 farthest(name, inputs, window, bins(hz).chain(ends)) / 1.96
             })
         }
         // Thirds of a window without its ends are other thirds: as far off as if as much were missing once, twice, thrice more, or as what is
         // missing swings more or less than the rest. And thirds are whole samples. The course that is missing may be all in one of them.
         "growth_ratio" => {
-            let lost = range.len() - seen.len();
-            let lost_s = lost as f64 * period_s;
-            let cuts = without_ends(lost_s.max(COUNTED_S));
+            let cuts = without_ends((lost as f64 * period_s).max(COUNTED_S));
             let ends = farthest(name, inputs, window, cuts) / 1.96;
-            let about = about_mean(&seen);
+            let about = centred(&seen);
             let third = seen.len() / 3;
             let [first, last] = [&about[..third], &about[about.len() - third..]].map(power);
             let least = first.min(last);
@@ -609,8 +602,7 @@ fn beyond_the_budget(name: &str, motion: &Motion, window: Window) -> f64 {
         // The ends have no height. Stretches of their length swing so much more or less than the whole. And a slow course is missing from it.
         "rms_z_m" => {
             let course_m = lost_course_m(motion, range.clone());
-            let lost = range.len() - seen.len();
-            let about = about_mean(&seen);
+            let about = centred(&seen);
             let whole = power(&about);
             if whole <= 0.0 {
                 return 0.0;
@@ -630,7 +622,7 @@ fn beyond_the_budget(name: &str, motion: &Motion, window: Window) -> f64 {
 fn lost_course_m(motion: &Motion, range: Range<usize>) -> f64 {
     let corner_hz = motion.settings.height_corner_hz;
     let of_budget = ABOVE_CORNER * motion.settings.budget.height_wander_m;
-    let step_hz = || metrics_of(&motion.inputs, Window::ALL, |n| n == "peak_hz").number("peak_hz");
+    let step_hz = || heave_hz(&motion.inputs, Window::ALL);
     let quarter_hz = (rate_hz(&motion.inputs) < ENOUGH_HZ)
         .then(step_hz)
         .flatten()
@@ -641,15 +633,14 @@ fn lost_course_m(motion: &Motion, range: Range<usize>) -> f64 {
 }
 
 /// A sample less its mean.
-fn about_mean(x: &[f64]) -> Vec<f64> {
+fn centred(x: &[f64]) -> Vec<f64> {
     let mean = x.iter().sum::<f64>() / x.len().max(1) as f64;
     x.iter().map(|x| x - mean).collect()
 }
 
-/// What of a column is known in a part, with its times.
-fn finite(inputs: &Inputs, x: &[f64], range: Range<usize>) -> (Vec<f64>, Vec<f64>) {
-    let all = inputs.t_s[range.clone()].iter().zip(&x[range]);
-    all.filter(|(_, x)| x.is_finite()).unzip()
+/// Of the height's strongest line, Hz.
+fn heave_hz(inputs: &Inputs, window: Window) -> Option<f64> {
+    metrics_of(inputs, window, |n| n == "peak_hz").number("peak_hz")
 }
 
 /// Mean square.

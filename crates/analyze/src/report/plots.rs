@@ -2,7 +2,7 @@
 
 use crate::envelope::outline;
 use crate::examine::{Analysis, MOST_SERIES};
-use crate::inputs::{Even, Window, stretches};
+use crate::inputs::{Even, Window, finite, stretches};
 use crate::line::whole;
 use crate::peaks::SpectrumSummary;
 use crate::phase;
@@ -129,12 +129,6 @@ impl Panel {
             });
         }
     }
-}
-
-/// Times and values of what is finite.
-fn finite(t_s: &[f64], x: &[f64]) -> (Vec<f64>, Vec<f64>) {
-    let known = t_s.iter().zip(x).filter(|(_, x)| x.is_finite());
-    known.unzip()
 }
 
 /// A curve in more parts than this is something else than a signal with holes.
