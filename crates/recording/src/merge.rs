@@ -46,7 +46,7 @@ pub enum MergeError {
     /// Two have messages on one topic at one time, which could not be told apart afterwards.
     #[error(
         "{name}: holds {topic} at a time when {other} does, too (for {overlap_s:.1} s); expected parts of one recording one after the other, or \
-         recordings of different topics (`analyze {other} {name}` compares two)"
+         recordings of different topics (`--keep-first` takes what two hold from the one given first; `analyze {other} {name}` compares them)"
     )]
     Overlap {
         /// The later one.
@@ -63,11 +63,22 @@ pub enum MergeError {
     Write(#[from] WriteError),
 }
 
+/// What becomes of a topic that two hold at one time.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Shared {
+    /// It is an error.
+    Refused,
+    /// It is taken from the recording given first, and left out of the other as a whole.
+    OfFirst,
+}
+
 /// One of the recordings.
 struct Part {
     name: String,
     recording: Recording,
     losses: Vec<Finding>,
+    /// Topics that are left out, and of which recording they are taken.
+    left_out: BTreeMap<String, String>,
 }
 
 impl Part {
@@ -87,6 +98,7 @@ impl Part {
             name: path.display().to_string(),
             recording,
             losses: findings,
+            left_out: BTreeMap::new(),
         })
     }
 
@@ -96,17 +108,41 @@ impl Part {
         (info.messages > 0).then_some((info.start_ns, info.end_ns))
     }
 
-    /// Topics with messages.
+    /// Topics with messages that are taken.
     fn topics(&self) -> impl Iterator<Item = &str> {
         let channels = self.recording.info().channels.iter();
         let used = channels.filter(|channel| channel.messages > 0);
-        used.map(|channel| channel.topic.as_str())
+        let topics = used.map(|channel| channel.topic.as_str());
+        topics.filter(|topic| !self.left_out.contains_key(*topic))
     }
 
-    /// A topic on which both have messages.
-    fn shares(&self, other: &Part) -> Option<&str> {
-        self.topics()
-            .find(|topic| other.topics().any(|t| t == *topic))
+    /// Sees that what this one holds can be told from what one given before it does.
+    fn fit(&mut self, before: &Part, shared: Shared) -> Result<(), MergeError> {
+        let (Some(own), Some(others)) = (self.span_ns(), before.span_ns()) else {
+            return Ok(());
+        };
+        let overlap_ns = own.1.min(others.1) - own.0.max(others.0);
+        if overlap_ns <= MOST_OVERLAP_NS {
+            return Ok(());
+        }
+        let held: BTreeSet<&str> = before.topics().collect();
+        let both = self.topics().filter(|topic| held.contains(topic));
+        let both: Vec<String> = both.map(str::to_owned).collect();
+        if let (Some(topic), Shared::Refused) = (both.first(), shared) {
+            let (later, other) = match own < others {
+                true => (before, &*self),
+                false => (&*self, before),
+            };
+            return Err(MergeError::Overlap {
+                name: later.name.clone(),
+                other: other.name.clone(),
+                topic: topic.clone(),
+                overlap_s: overlap_ns as f64 * 1e-9,
+            });
+        }
+        let left_out = both.into_iter().map(|topic| (topic, before.name.clone()));
+        self.left_out.extend(left_out);
+        Ok(())
     }
 }
 
@@ -133,46 +169,28 @@ pub struct Parts(Vec<Part>);
 
 impl Parts {
     /// Opens recordings, reads each once for its damage, and sees that they fit together.
-    pub fn open(files: &[PathBuf], options: &ReadOptions) -> Result<Self, MergeError> {
+    pub fn open(
+        files: &[PathBuf],
+        shared: Shared,
+        options: &ReadOptions,
+    ) -> Result<Self, MergeError> {
         let mut seen = Vec::new();
         let mut parts = Vec::new();
         for file in files {
-            let part = Part::open(file, options)?;
+            let mut part = Part::open(file, options)?;
             let place = file.canonicalize().unwrap_or_else(|_| file.clone());
             if seen.contains(&place) {
                 return Err(MergeError::Twice { name: part.name });
             }
             seen.push(place);
+            for before in &parts {
+                part.fit(before, shared)?;
+            }
             parts.push(part);
         }
         // Those without a message come first, and say nothing about time.
         parts.sort_by_key(Part::span_ns);
-        let parts = Parts(parts);
-        parts.fit()?;
-        Ok(parts)
-    }
-
-    fn fit(&self) -> Result<(), MergeError> {
-        for (k, part) in self.0.iter().enumerate() {
-            for other in &self.0[..k] {
-                let (Some(own), Some(before)) = (part.span_ns(), other.span_ns()) else {
-                    continue;
-                };
-                let overlap_ns = own.1.min(before.1) - own.0;
-                if overlap_ns <= MOST_OVERLAP_NS {
-                    continue;
-                }
-                if let Some(topic) = part.shares(other) {
-                    return Err(MergeError::Overlap {
-                        name: part.name.clone(),
-                        other: other.name.clone(),
-                        topic: topic.to_owned(),
-                        overlap_s: overlap_ns as f64 * 1e-9,
-                    });
-                }
-            }
-        }
-        Ok(())
+        Ok(Parts(parts))
     }
 
     /// The profile that all have; empty where they differ.
@@ -198,7 +216,7 @@ impl Parts {
         losses
     }
 
-    /// Which are empty, where time passes between them that none recorded, and in which of the record `rath`'s keys they differ, one line each.
+    /// What is left out of them, which are empty, where time passes between them that none recorded, and in which of the record `rath`'s keys they differ, one line each.
     pub fn notes(&self) -> Vec<String> {
         let mut notes = Vec::new();
         let records = self
@@ -223,6 +241,10 @@ impl Parts {
         }
         let mut last: Option<(i64, &Part)> = None;
         for part in &self.0 {
+            for (topic, of) in &part.left_out {
+                let name = &part.name;
+                notes.push(format!("{name}: {topic} is left out, it is {of}'s"));
+            }
             let Some((start_ns, end_ns)) = part.span_ns() else {
                 notes.push(format!("{}: holds no messages", part.name));
                 continue;
@@ -275,7 +297,11 @@ impl Parts {
         for part in &self.0 {
             let channels = part.recording.info().channels.iter();
             let channels: Vec<_> = channels
-                .map(|channel| writer.raw_channel(&RawChannel::from(channel)))
+                .map(|channel| {
+                    let taken = !part.left_out.contains_key(&channel.topic);
+                    let channel = RawChannel::from(channel);
+                    taken.then(|| writer.raw_channel(&channel)).transpose()
+                })
                 .collect::<Result<_, _>>()?;
             sources.push((RawMessages::of(&part.recording), channels));
         }
@@ -290,9 +316,9 @@ impl Parts {
             };
             let mut outcome = Ok(());
             let bytes = source.give(&mut |message| {
-                if outcome.is_ok() {
+                if let (Some(channel), Ok(())) = (channels[message.channel], &outcome) {
                     count += 1;
-                    outcome = writer.copy(channels[message.channel], message);
+                    outcome = writer.copy(channel, message);
                 }
             });
             outcome?;

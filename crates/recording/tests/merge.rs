@@ -7,7 +7,7 @@ use std::{
 
 use recording::{
     cdr::Float64,
-    merge::{MergeError, Parts, files},
+    merge::{MergeError, Parts, Shared, files},
     read::{RawAttachment, ReadOptions, Recording},
     topics::MessageKind,
     write::{RawChannel, RecordingWriter, WriterOptions},
@@ -69,7 +69,7 @@ fn record(path: &Path, topics: &[&str], from_s: f64, to_s: f64) {
 }
 
 fn open(paths: &[PathBuf]) -> Result<Parts, MergeError> {
-    Parts::open(&files(paths)?, &ReadOptions::default())
+    Parts::open(&files(paths)?, Shared::Refused, &ReadOptions::default())
 }
 
 fn merge(parts: &Parts, out: &Path) -> Recording {
@@ -224,7 +224,7 @@ fn what_could_not_be_told_apart_is_refused() {
         error(&[&b, &a]),
         format!(
             "{b_name}: holds /imu at a time when {a_name} does, too (for 5.0 s); expected parts of one recording one after the other, or \
-             recordings of different topics (`analyze {a_name} {b_name}` compares two)"
+             recordings of different topics (`--keep-first` takes what two hold from the one given first; `analyze {a_name} {b_name}` compares them)"
         )
     );
     assert_eq!(
@@ -238,6 +238,39 @@ fn what_could_not_be_told_apart_is_refused() {
     let apart = open(&[later.clone(), a.clone()]).expect("fits");
     let pause = format!("{}: begins 30.0 s after {a_name} ends", later.display());
     assert_eq!(apart.notes(), [pause]);
+}
+
+/// Of three that hold one topic, the second gives way to the first; then the third, which meets only the second, keeps its own.
+#[test]
+fn what_two_hold_at_one_time_is_taken_from_the_one_given_first() {
+    let folder = folder();
+    let [first, second, third, out] =
+        ["1.mcap", "2.mcap", "3.mcap", "out.mcap"].map(|name| folder.path().join(name));
+    record(&first, &["/tf", "/odom"], 10.0, 20.0);
+    record(&second, &["/imu", "/tf"], 5.0, 30.0);
+    record(&third, &["/tf"], 25.0, 35.0);
+    let paths = [first.clone(), second.clone(), third];
+    let parts = Parts::open(&paths, Shared::OfFirst, &ReadOptions::default()).expect("fits");
+    let (of, out_of) = (first.display(), second.display());
+    assert_eq!(
+        parts.notes(),
+        [format!("{out_of}: /tf is left out, it is {of}'s")]
+    );
+    let whole = merge(&parts, &out);
+    let of_topic = |topic: &str| {
+        let all = messages(&whole).into_iter();
+        let ticks = all.filter(|(_, _, text)| text.starts_with(&format!("{topic} ")));
+        let mut ticks: Vec<i64> = ticks.map(|(t_ns, ..)| t_ns * 100 / SECOND_NS).collect();
+        ticks.sort_unstable();
+        ticks
+    };
+    assert!(
+        of_topic("/tf")
+            .into_iter()
+            .eq((1000..2000).chain(2500..3500))
+    );
+    assert!(of_topic("/imu").into_iter().eq(500..3000));
+    assert!(of_topic("/odom").into_iter().eq(1000..2000));
 }
 
 #[test]
