@@ -6,6 +6,7 @@ use std::sync::Mutex;
 
 use crate::pairs::products;
 use crate::random::Random;
+use crate::summary::ends;
 use nalgebra::DMatrix;
 use realfft::RealFftPlanner;
 use realfft::num_complex::Complex64;
@@ -338,16 +339,19 @@ pub fn unwrap(phase_rad: &[f64]) -> Vec<f64> {
     out
 }
 
-/// A phase that goes on, rad. One that takes more than a turn and never falls by half of one goes on already: where it leaps, it advanced.
+/// Whether a phase (rad) comes unwrapped: it takes more than a turn, and never falls by half of one from a sample to the next. Over what is not
+/// finite nobody knows how it went.
+pub fn comes_unwrapped(phase_rad: &[f64]) -> bool {
+    let [low, high] = ends(phase_rad);
+    let falls = phase_rad.windows(2).any(|pair| pair[1] - pair[0] < -PI);
+    high - low > TAU && !falls
+}
+
+/// A phase that goes on, rad. One that comes unwrapped goes on already: where it leaps, it advanced.
 pub fn continuous(phase_rad: &[f64]) -> Vec<f64> {
-    let known = || phase_rad.iter().filter(|x| x.is_finite());
-    let (low, high) = known().fold((f64::INFINITY, f64::NEG_INFINITY), |(a, b), x| {
-        (a.min(*x), b.max(*x))
-    });
-    let falls = known().zip(known().skip(1)).any(|(a, b)| b - a < -PI);
-    match falls || high - low <= TAU {
-        true => unwrap(phase_rad),
-        false => phase_rad.to_vec(),
+    match comes_unwrapped(phase_rad) {
+        true => phase_rad.to_vec(),
+        false => unwrap(phase_rad),
     }
 }
 

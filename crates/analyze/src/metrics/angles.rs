@@ -16,8 +16,26 @@ fn rms_deg(x: &[f64]) -> Value {
     )
 }
 
+/// That of an angle that is wrapped, with a word where it goes through more than `most_deg`, as `what` does.
+fn rms_of_sway(x: &[f64], what: &str, most_deg: f64) -> Value {
+    let [low, high] = ends(&continuous(x));
+    let turned_deg = (high - low).to_degrees();
+    let turns = turned_deg > most_deg;
+    Value {
+        reason: turns.then(|| {
+            format!(
+                "{what} goes through {turned_deg:.0}°: about zero that says nothing of how it sways"
+            )
+        }),
+        ..rms_deg(x)
+    }
+}
+
+/// A roll that goes through more than a turn rolls over (deg).
+const ROLLS_OVER_DEG: f64 = 360.0;
+
 pub fn rms_roll_deg(c: &Context) -> Value {
-    rms_deg(&c.roll().x)
+    rms_of_sway(&c.roll().x, "the roll", ROLLS_OVER_DEG)
 }
 
 pub fn rms_pitch_deg(c: &Context) -> Value {
@@ -28,15 +46,7 @@ pub fn rms_pitch_deg(c: &Context) -> Value {
 const TURNS_DEG: f64 = 90.0;
 
 pub fn rms_yaw_deg(c: &Context) -> Value {
-    let yaw = c.yaw();
-    let [low, high] = ends(&continuous(&yaw.x));
-    let turned_deg = (high - low).to_degrees();
-    Value {
-        reason: (turned_deg > TURNS_DEG).then(|| {
-            format!("the heading goes through {turned_deg:.0}°: about zero that says nothing of how it sways")
-        }),
-        ..rms_deg(&yaw.x)
-    }
+    rms_of_sway(&c.yaw().x, "the heading", TURNS_DEG)
 }
 
 pub fn roll_excess_s(c: &Context) -> Value {
@@ -55,25 +65,26 @@ mod tests {
     use crate::metrics::metrics;
 
     #[test]
-    fn a_heading_that_turns_is_no_sway() {
-        let said = |turn_rad: f64| {
+    fn a_heading_that_turns_and_a_roll_that_rolls_over_are_no_sway() {
+        let said = |name: &str, turn_rad: f64| {
             let t_s: Vec<f64> = (0..1800).map(|k| f64::from(k) / 30.0).collect();
+            let angle = t_s.iter().map(|t| turn_rad * t / 60.0);
+            let angle: Vec<f64> = angle.map(crate::phase::wrap).collect();
             let inputs = Inputs {
-                yaw_rad: t_s
-                    .iter()
-                    .map(|t| crate::phase::wrap(turn_rad * t / 60.0))
-                    .collect(),
+                yaw_rad: angle.clone(),
+                roll_rad: angle,
                 t_s,
                 ..Inputs::default()
             };
-            let found = metrics(&inputs, Window::ALL)
-                .get("rms_yaw_deg")
-                .unwrap()
-                .clone();
+            let found = metrics(&inputs, Window::ALL).get(name).unwrap().clone();
             assert!(found.as_f64().is_some());
             found.reason
         };
-        assert_eq!(said(0.5), None);
-        assert!(said(4.7).unwrap().contains("goes through 269°"));
+        assert_eq!(said("rms_yaw_deg", 0.5), None);
+        let yaw = said("rms_yaw_deg", 4.7).unwrap();
+        assert!(yaw.contains("the heading goes through 269°"), "{yaw}");
+        assert_eq!(said("rms_roll_deg", 6.2), None);
+        let roll = said("rms_roll_deg", 12.6).unwrap();
+        assert!(roll.contains("the roll goes through 722°"), "{roll}");
     }
 }

@@ -7,6 +7,7 @@ use crate::beat::adler::turns::{FOLDED, Turns};
 use crate::inputs::stretches;
 use crate::phase;
 use crate::steps::rate_of;
+use crate::summary::ends;
 use std::f64::consts::TAU;
 
 /// How many surrogates the chance level of measured phases is made from.
@@ -14,10 +15,29 @@ const SURROGATES: usize = 400;
 
 const ALONE: &str = "one carrier alone is always in step";
 
+/// A phase that moves less than this all the window long stands still (rad).
+const STILL_RAD: f64 = 0.01;
+
+/// Whoever stands still is in step with all others who do, whatever they would do when they walk.
+fn standing(phases: &[&[f64]]) -> Option<String> {
+    let still = |x: &&&[f64]| {
+        let [low, high] = ends(x);
+        high - low < STILL_RAD
+    };
+    let count = phases.iter().filter(still).count();
+    (count > 1).then(|| {
+        let of = phases.len();
+        format!("the phases of {count} of {of} carriers stand still: that these are in step says nothing")
+    })
+}
+
 pub fn synchrony(c: &Context) -> Value {
     match &c.phases().slices()[..] {
         [_] => Value::missing(ALONE),
-        phases => Value::number(mean(&phase::order_parameter(phases))),
+        phases => Value {
+            reason: standing(phases),
+            ..Value::number(mean(&phase::order_parameter(phases)))
+        },
     }
 }
 
@@ -68,11 +88,16 @@ pub fn step_rate_hz(c: &Context) -> Value {
 }
 
 pub fn plv(c: &Context) -> Value {
-    let per = phase::locking(&c.phases().slices());
+    let phases = c.phases();
+    let phases = phases.slices();
+    let per = phase::locking(&phases);
     if per.is_empty() {
         return Value::missing("a pair needs two carriers");
     }
-    Value::number(mean(&per)).per(per)
+    Value {
+        reason: standing(&phases),
+        ..Value::number(mean(&per)).per(per)
+    }
 }
 
 pub fn beat_synchrony(c: &Context) -> Value {
@@ -144,6 +169,26 @@ mod tests {
         let by_chance = (1..=60).filter(|s| p_value(false, *s) < 0.1).count();
         // Six of sixty are expected, more than twelve in one series of a hundred.
         assert!(by_chance <= 12, "{by_chance}");
+    }
+
+    #[test]
+    fn who_stands_still_is_in_step_for_nothing() {
+        let walks = |hz: f64| (0..300).map(move |k| TAU * hz * f64::from(k) / 30.0);
+        let stands = || vec![0.3; 300];
+        let said = |phase_rad: Vec<Vec<f64>>| {
+            let inputs = Inputs {
+                phase_t_s: (0..300).map(|k| f64::from(k) / 30.0).collect(),
+                phase_rad,
+                ..Inputs::default()
+            };
+            let found = metrics(&inputs, Window::ALL);
+            ["synchrony", "plv"].map(|name| found.get(name).unwrap().reason.clone())
+        };
+        for reason in said(vec![stands(), walks(2.0).collect(), stands()]) {
+            assert!(reason.unwrap().starts_with("the phases of 2 of 3 carriers"));
+        }
+        let one = said(vec![stands(), walks(2.0).collect(), walks(2.0).collect()]);
+        assert_eq!(one, [None, None]);
     }
 
     #[test]

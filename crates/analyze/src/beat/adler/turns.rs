@@ -2,8 +2,8 @@
 
 use crate::beat::tempo::PERIOD_S;
 use crate::median::median;
-use crate::phase::wrap;
-use std::f64::consts::{PI, TAU};
+use crate::phase::{comes_unwrapped, wrap};
+use std::f64::consts::TAU;
 
 /// Why a phase that comes wrapped tells no rate.
 pub const FOLDED: &str =
@@ -11,7 +11,7 @@ pub const FOLDED: &str =
 
 /// Turns of a phase (rad) at ascending times (s).
 pub struct Turns {
-    /// Whether it comes unwrapped: it leaves a turn by itself, and never goes back by half of one.
+    /// Whether it [comes unwrapped](comes_unwrapped).
     pub unwrapped: bool,
     /// Its usual rate, rad/s; NaN where no two samples follow on each other.
     pub usual_rad_per_s: f64,
@@ -21,14 +21,12 @@ pub struct Turns {
 impl Turns {
     /// Of `phase_rad`, wrapped or not; NaN where there is none.
     pub fn of(t_s: &[f64], phase_rad: &[f64]) -> Self {
-        let finite = phase_rad.iter().filter(|x| x.is_finite());
-        let (low, high) = finite.fold((f64::MAX, f64::MIN), |(a, b), x| (a.min(*x), b.max(*x)));
         let steps = || {
             let each = t_s.windows(2).zip(phase_rad.windows(2));
             let each = each.map(|(t, x)| (t[1] - t[0], x[1] - x[0]));
             each.filter(|(_, turned)| turned.is_finite())
         };
-        let unwrapped = high - low > TAU && steps().all(|(_, turned)| turned > -PI);
+        let unwrapped = comes_unwrapped(phase_rad);
         let turned = |by: f64| if unwrapped { by } else { wrap(by) };
         let mut rates: Vec<f64> = steps().map(|(dt, by)| turned(by) / dt).collect();
         let mut steps_s: Vec<f64> = steps().map(|(dt, _)| dt).collect();
