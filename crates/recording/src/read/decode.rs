@@ -2,7 +2,7 @@
 
 use std::{ops::Range, sync::Arc};
 
-use super::{protobuf::Pools, rows::Rows};
+use super::{descriptors::Pools, rows::Rows};
 
 /// Where a message lies in the bytes of its block.
 #[derive(Clone, Debug)]
@@ -33,6 +33,6 @@ pub(super) struct SchemaRef<'a> {
     pub name: &'a str,
     pub encoding: &'a str,
     pub data: &'a Arc<[u8]>,
-    /// Those of the recording.
+    /// Descriptors of the recording's schemas.
     pub pools: &'a Pools,
 }

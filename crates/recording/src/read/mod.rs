@@ -12,6 +12,7 @@ mod collect;
 mod container;
 mod decode;
 mod decoders;
+mod descriptors;
 mod early;
 mod idl;
 mod json;
@@ -39,8 +40,8 @@ use std::{
 
 use crate::foreign;
 use container::{Container, Damage, Definitions, Statistics};
+use descriptors::Pools;
 use early::Early;
-use protobuf::Pools;
 
 pub use container::ends_whole;
 pub use decoders::supported;

@@ -3,11 +3,9 @@
 //! A plan per message type says what each field number holds. Values wait in the plan until the message is whole, because fields may
 //! come in any order and more than once (the last one counts), and fields that are not there have the value zero where proto3 says so.
 
-use std::collections::{HashMap, HashSet};
-use std::sync::{Mutex, PoisonError};
+use std::collections::HashMap;
 
-use prost::Message as _;
-use prost_reflect::{DescriptorPool, FieldDescriptor, Kind as FieldKind, MessageDescriptor};
+use prost_reflect::{FieldDescriptor, Kind as FieldKind, MessageDescriptor};
 
 use super::{
     decode::{Decoder, SchemaRef},
@@ -29,71 +27,14 @@ pub(super) fn open(schema: &SchemaRef<'_>, rows: &mut Rows) -> Result<Box<dyn De
     Ok(Box::new(Protobuf { descriptor, root }))
 }
 
-/// The schemas of a recording that were parsed, by where they lie: hundreds of channels may share one that is large.
-#[derive(Default)]
-pub(super) struct Pools(Mutex<HashMap<usize, Result<DescriptorPool, String>>>);
-
 /// The message's descriptor out of the set in the file.
 fn descriptor(schema: &SchemaRef<'_>) -> Result<MessageDescriptor, String> {
-    let mut pools = schema
-        .pools
-        .0
-        .lock()
-        .unwrap_or_else(PoisonError::into_inner);
-    let known = pools.entry(schema.data.as_ptr().addr());
-    let pool = known.or_insert_with(|| pool(schema.data)).clone()?;
+    let pool = schema.pools.of(schema.data)?;
     pool.get_message_by_name(schema.name).ok_or_else(|| {
         format!(
             "the FileDescriptorSet does not define the message {}",
             schema.name
         )
-    })
-}
-
-/// The descriptors of the set in the file.
-fn pool(schema: &[u8]) -> Result<DescriptorPool, String> {
-    let mut set = prost_types::FileDescriptorSet::decode(schema)
-        .map_err(|problem| format!("the schema is no FileDescriptorSet: {problem}"))?;
-    // Writers repeat files, and some leave out what Google defines.
-    let mut present = HashSet::new();
-    set.file
-        .retain(|file| present.insert(file.name().to_owned()));
-    let needed: Vec<String> = set
-        .file
-        .iter()
-        .flat_map(|file| file.dependency.iter().cloned())
-        .collect();
-    let global = DescriptorPool::global();
-    let mut missing = Vec::new();
-    for name in needed {
-        if !present.insert(name.clone()) {
-            continue;
-        }
-        match global.get_file_by_name(&name) {
-            Some(file) => set.file.push(file.file_descriptor_proto().clone()),
-            None => missing.push(name),
-        }
-    }
-    let known = |syntax: &str| ["proto2", "proto3", ""].contains(&syntax);
-    if let Some(file) = set.file.iter().find(|file| !known(file.syntax())) {
-        return Err(format!(
-            "the FileDescriptorSet's file {:?} is written in {:?}; expected proto2 or proto3",
-            file.name(),
-            file.syntax()
-        ));
-    }
-    // The library indexes past its files while it words some of its errors: a schema that makes it panic is one that does not parse.
-    let parsed = std::panic::catch_unwind(|| DescriptorPool::from_file_descriptor_set(set))
-        .map_err(|_| "the FileDescriptorSet is not consistent".to_owned())?;
-    parsed.map_err(|problem| {
-        if missing.is_empty() {
-            format!("the FileDescriptorSet is not consistent: {problem}")
-        } else {
-            format!(
-                "the FileDescriptorSet lacks the imported {}",
-                missing.join(", ")
-            )
-        }
     })
 }
 
