@@ -4,13 +4,14 @@
 //! one of each file is unpacked at a time.
 
 use std::{
+    cell::OnceCell,
     collections::{BTreeMap, BTreeSet},
     path::{Path, PathBuf},
 };
 
 use crate::{
     Finding, Kind,
-    read::{RawMessages, ReadError, ReadOptions, Recording, recordings_in},
+    read::{RawMessage, RawMessages, ReadError, ReadOptions, Recording, recordings_in},
     text::counted,
     write::{RawChannel, RecordingWriter, WriteError},
 };
@@ -18,7 +19,7 @@ use crate::{
 /// A recorder may begin a part before the last one ends, by no more than this, ns.
 const MOST_OVERLAP_NS: i64 = 1_000_000_000;
 
-/// A longer pause between parts is remarked on, ns.
+/// A longer pause between parts is remarked on, and between messages parts the time in which a topic is held, ns.
 const PAUSE_NS: i64 = 10_000_000_000;
 
 /// The metadata record that readers go by: of several all keys, with their last values.
@@ -77,6 +78,8 @@ struct Part {
     name: String,
     recording: Recording,
     losses: Vec<Finding>,
+    /// When messages came, by topic, ns: from the first to the last of each stretch without a pause, in order. Found where it is asked for.
+    held: OnceCell<BTreeMap<String, Vec<(i64, i64)>>>,
     /// Topics that are left out, and of which recording they are taken.
     left_out: BTreeMap<String, String>,
 }
@@ -98,6 +101,7 @@ impl Part {
             name: path.display().to_string(),
             recording,
             losses: findings,
+            held: OnceCell::new(),
             left_out: BTreeMap::new(),
         })
     }
@@ -118,32 +122,85 @@ impl Part {
 
     /// Sees that what this one holds can be told from what one given before it does.
     fn fit(&mut self, before: &Part, shared: Shared) -> Result<(), MergeError> {
-        let (Some(own), Some(others)) = (self.span_ns(), before.span_ns()) else {
-            return Ok(());
-        };
-        let overlap_ns = own.1.min(others.1) - own.0.max(others.0);
-        if overlap_ns <= MOST_OVERLAP_NS {
-            return Ok(());
-        }
         let held: BTreeSet<&str> = before.topics().collect();
         let both = self.topics().filter(|topic| held.contains(topic));
         let both: Vec<String> = both.map(str::to_owned).collect();
-        if let (Some(topic), Shared::Refused) = (both.first(), shared) {
-            let (later, other) = match own < others {
+        for topic in both {
+            let overlap_ns = together_ns(&self.held()[&topic], &before.held()[&topic]);
+            if overlap_ns <= MOST_OVERLAP_NS {
+                continue;
+            }
+            if shared == Shared::OfFirst {
+                self.left_out.insert(topic, before.name.clone());
+                continue;
+            }
+            let (later, other) = match self.span_ns() < before.span_ns() {
                 true => (before, &*self),
                 false => (&*self, before),
             };
             return Err(MergeError::Overlap {
                 name: later.name.clone(),
                 other: other.name.clone(),
-                topic: topic.clone(),
+                topic,
                 overlap_s: overlap_ns as f64 * 1e-9,
             });
         }
-        let left_out = both.into_iter().map(|topic| (topic, before.name.clone()));
-        self.left_out.extend(left_out);
         Ok(())
     }
+
+    /// See [`Part::held`].
+    fn held(&self) -> &BTreeMap<String, Vec<(i64, i64)>> {
+        self.held.get_or_init(|| {
+            let mut held = BTreeMap::new();
+            // None of their messages may have come.
+            for topic in self.topics() {
+                held.insert(topic.to_owned(), Vec::new());
+            }
+            let mut source = RawMessages::of(&self.recording);
+            let mut note = |message: &RawMessage<'_>| {
+                if let Some(stretches) = held.get_mut(message.topic) {
+                    lengthen(stretches, message.log_time_ns);
+                }
+            };
+            while source.give(&mut note).is_some() {}
+            for stretches in held.values_mut() {
+                stretches.sort_unstable();
+                stretches.dedup_by(|next, last| {
+                    let goes_on = next.0 - last.1 <= PAUSE_NS;
+                    last.1 = if goes_on { last.1.max(next.1) } else { last.1 };
+                    goes_on
+                });
+            }
+            held
+        })
+    }
+}
+
+/// The last stretch, or a new one, for a message at a time.
+fn lengthen(stretches: &mut Vec<(i64, i64)>, t_ns: i64) {
+    match stretches.last_mut() {
+        Some((from, to))
+            if t_ns >= from.saturating_sub(PAUSE_NS) && t_ns <= to.saturating_add(PAUSE_NS) =>
+        {
+            (*from, *to) = (t_ns.min(*from), t_ns.max(*to));
+        }
+        _ => stretches.push((t_ns, t_ns)),
+    }
+}
+
+/// For how long stretches in order are together, ns.
+fn together_ns(a: &[(i64, i64)], b: &[(i64, i64)]) -> i64 {
+    let (mut a, mut b) = (a.iter().peekable(), b.iter().peekable());
+    let mut sum_ns = 0;
+    while let (Some(one), Some(other)) = (a.peek(), b.peek()) {
+        sum_ns += (one.1.min(other.1) - one.0.max(other.0)).max(0);
+        if one.1 < other.1 {
+            a.next()
+        } else {
+            b.next()
+        };
+    }
+    sum_ns
 }
 
 /// The files that are meant: of a folder, the recordings in it.
@@ -219,16 +276,17 @@ impl Parts {
     /// What is left out of them, which are empty, where time passes between them that none recorded, and in which of the record `rath`'s keys they differ, one line each.
     pub fn notes(&self) -> Vec<String> {
         let mut notes = Vec::new();
-        let records = self
-            .0
-            .iter()
-            .flat_map(|part| part.recording.metadata_records());
+        let records = self.0.iter().flat_map(|part| {
+            let all = part.recording.metadata_records().iter();
+            let own = all.filter(|(name, _)| name == OWN_RECORD);
+            let each = own.flat_map(|record| &record.1);
+            each.map(|entry| (part.name.as_str(), entry))
+        });
         let mut own: BTreeMap<&str, &str> = BTreeMap::new();
         let mut differ = BTreeSet::new();
-        for (key, value) in records
-            .filter(|(name, _)| name == OWN_RECORD)
-            .flat_map(|record| &record.1)
-        {
+        let mut says_last = "";
+        for (part, (key, value)) in records {
+            says_last = part;
             if own.insert(key, value).is_some_and(|before| before != value) {
                 differ.insert(key.as_str());
             }
@@ -236,14 +294,20 @@ impl Parts {
         if !differ.is_empty() {
             let keys = Vec::from_iter(differ).join(", ");
             notes.push(format!(
-                "the recordings say different things of {keys}; what the last one says will count"
+                "the recordings say different things of {keys}; what {says_last}, which begins last, says will count"
             ));
         }
         let mut last: Option<(i64, &Part)> = None;
         for part in &self.0 {
             for (topic, of) in &part.left_out {
                 let name = &part.name;
-                notes.push(format!("{name}: {topic} is left out, it is {of}'s"));
+                let channels = part.recording.info().channels.iter();
+                let of_topic = channels.filter(|channel| channel.topic == *topic);
+                let messages: u64 = of_topic.map(|channel| channel.messages).sum();
+                let messages = counted(messages, "message", "messages");
+                notes.push(format!(
+                    "{name}: {topic} is left out ({messages}), it is taken from {of}"
+                ));
             }
             let Some((start_ns, end_ns)) = part.span_ns() else {
                 notes.push(format!("{}: holds no messages", part.name));

@@ -254,7 +254,9 @@ fn what_two_hold_at_one_time_is_taken_from_the_one_given_first() {
     let (of, out_of) = (first.display(), second.display());
     assert_eq!(
         parts.notes(),
-        [format!("{out_of}: /tf is left out, it is {of}'s")]
+        [format!(
+            "{out_of}: /tf is left out (2500 messages), it is taken from {of}"
+        )]
     );
     let whole = merge(&parts, &out);
     let of_topic = |topic: &str| {
@@ -271,6 +273,51 @@ fn what_two_hold_at_one_time_is_taken_from_the_one_given_first() {
     );
     assert!(of_topic("/imu").into_iter().eq(500..3000));
     assert!(of_topic("/odom").into_iter().eq(1000..2000));
+}
+
+/// It is topics that must not be held twice at one time, not files that must not overlap.
+#[test]
+fn topics_that_are_held_one_after_the_other_fit_though_the_files_overlap() {
+    let folder = folder();
+    let [robot, phones, out] =
+        ["robot.mcap", "phones.mcap", "both.mcap"].map(|name| folder.path().join(name));
+    // A map, once at the beginning of either; and what is told by the one first, then by the other.
+    for (path, own, (from_s, to_s)) in [
+        (&robot, "/odom", (0.0, 20.0)),
+        (&phones, "/imu", (20.5, 60.0)),
+    ] {
+        let mut writer = RecordingWriter::create(path, &WriterOptions::default()).expect("begins");
+        let [map, event, own] = ["/map", "/event", own].map(|topic| {
+            writer
+                .channel(topic, MessageKind::Float64)
+                .expect("takes it")
+        });
+        let mut tell = |channel, from_s: f64, to_s: f64| {
+            for tick in (100.0 * from_s) as i64..(100.0 * to_s) as i64 {
+                writer
+                    .message(channel, tick * SECOND_NS / 100, &Float64 { data: 1.0 })
+                    .expect("takes it");
+            }
+        };
+        tell(map, 0.0, 0.01);
+        tell(own, 0.0, 60.0);
+        tell(event, from_s, to_s);
+        writer.finish().expect("ends");
+    }
+    let paths = [phones, robot];
+    let parts = open(&paths).expect("fits");
+    assert!(parts.notes().is_empty(), "{:?}", parts.notes());
+    let whole = merge(&parts, &out);
+    assert_eq!(whole.info().messages, 2 * 6001 + 2000 + 3950);
+    // Two seconds of one time are too much, and what the error says.
+    let error = {
+        record(&paths[0], &["/event"], 18.0, 60.0);
+        open(&paths).err().expect("refused").to_string()
+    };
+    assert!(
+        error.contains("holds /event") && error.contains("(for 2.0 s)"),
+        "{error}"
+    );
 }
 
 #[test]
@@ -351,7 +398,10 @@ fn what_recordings_say_differently_is_told() {
     let parts = open(&paths).expect("fits");
     assert_eq!(
         parts.notes(),
-        ["the recordings say different things of mass_kg; what the last one says will count"]
+        [format!(
+            "the recordings say different things of mass_kg; what {}, which begins last, says will count",
+            paths[0].display()
+        )]
     );
     let whole = merge(&parts, &folder.path().join("whole.mcap"));
     assert_eq!(whole.info().metadata["rath"]["mass_kg"], "70");
