@@ -96,8 +96,10 @@ impl Sink {
         #[cfg(unix)]
         {
             use std::os::unix::fs::PermissionsExt as _;
-            // As any new file: the system takes away what the umask forbids.
-            builder.permissions(fs::Permissions::from_mode(0o666));
+            // As the file that is replaced, or as any new one: the system takes away what the umask forbids.
+            let mode =
+                fs::metadata(&path).map_or(0o666, |there| there.permissions().mode() & 0o777);
+            builder.permissions(fs::Permissions::from_mode(mode));
         }
         let (file, temporary) = (builder.tempfile_in(folder))
             .map_err(|error| match error.kind() {

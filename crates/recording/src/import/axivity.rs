@@ -15,7 +15,7 @@ const ONE_G: std::ops::Range<f64> = 0.8..1.3;
 
 /// Whether a text's first row is one of an export.
 pub(super) fn is_export(text: &str) -> bool {
-    let first = text.trim_start_matches('\u{feff}').lines().next();
+    let first = text.lines().next();
     let cells: Vec<&str> = first.unwrap_or_default().split(',').collect();
     let dated = |cell: &str| {
         // 2025-11-24 16:00:00.000

@@ -4,9 +4,11 @@ use std::str::FromStr as _;
 
 use prost_types::Timestamp;
 
-use super::{ImportError, imu, table::Table};
+use super::{ImportError, imu, table::Table, wrapping::Wrapping};
 
 const DAY_NS: i64 = 86_400_000_000_000;
+/// A row of a clock alone may be so late, over midnight too.
+const LATE_NS: i64 = 1_000_000_000;
 
 /// The times of all rows, ns from 1970 or from the device's start: numbers of so many nanoseconds, dates or clocks.
 pub(super) fn times_ns(
@@ -14,11 +16,11 @@ pub(super) fn times_ns(
     column: usize,
     unit_ns: i64,
 ) -> Result<Vec<i64>, ImportError> {
-    let mut dates = Dates::default();
+    let mut clock = Wrapping::new(DAY_NS, LATE_NS);
     let read = |row| {
         let cell = table.text(row, column);
         let t_ns = if cell.contains(':') {
-            dates.read(cell)
+            read_date(cell, &mut clock)
         } else if let Ok(whole) = cell.parse::<i64>() {
             // Whole numbers keep all their digits.
             whole.checked_mul(unit_ns)
@@ -34,36 +36,20 @@ pub(super) fn times_ns(
     (0..table.len()).map(read).collect()
 }
 
-/// Reads the dates and clocks of a column, row by row.
-#[derive(Debug, Default)]
-struct Dates {
-    /// Midnights passed by a clock that tells no date.
-    days: i64,
-    last_ns: i64,
-}
-
-impl Dates {
-    /// Nanoseconds since 1970 (UTC where no zone is given) of `2018-10-03 17:23:55.464`, RFC 3339 or the same with slashes; of a clock alone,
-    /// `17:23:55.464` or `17:23:55:464`, since its first midnight. `None` for anything else, and for times before 1970.
-    fn read(&mut self, cell: &str) -> Option<i64> {
-        let cell = cell.replace('/', "-").replace(',', ".");
-        if cell.find(':')? > 2 {
-            return nanoseconds(&cell);
-        }
-        // The last colon of four parts stands for the point.
-        let clock = match cell.rsplit_once(':') {
-            Some((whole, part)) if whole.matches(':').count() == 2 => format!("{whole}.{part}"),
-            _ => cell,
-        };
-        let padding = if clock.find(':')? == 1 { "0" } else { "" };
-        let ns = nanoseconds(&format!("1970-01-01 {padding}{clock}"))?;
-        // Half a day back is no sample that came late.
-        if self.last_ns - ns > DAY_NS / 2 {
-            self.days += 1;
-        }
-        self.last_ns = ns;
-        self.days.checked_mul(DAY_NS)?.checked_add(ns)
+/// Nanoseconds since 1970 (UTC where no zone is given) of `2018-10-03 17:23:55.464`, RFC 3339 or the same with slashes; of a clock alone,
+/// `17:23:55.464` or `17:23:55:464`, since its first midnight. `None` for anything else, and for times before 1970.
+fn read_date(cell: &str, clock: &mut Wrapping) -> Option<i64> {
+    let cell = cell.replace('/', "-").replace(',', ".");
+    if cell.find(':')? > 2 {
+        return nanoseconds(&cell);
     }
+    // The last colon of four parts stands for the point.
+    let time = match cell.rsplit_once(':') {
+        Some((whole, part)) if whole.matches(':').count() == 2 => format!("{whole}.{part}"),
+        _ => cell,
+    };
+    let padding = if time.find(':')? == 1 { "0" } else { "" };
+    clock.next(nanoseconds(&format!("1970-01-01 {padding}{time}"))?)
 }
 
 fn nanoseconds(text: &str) -> Option<i64> {
@@ -81,6 +67,7 @@ mod tests {
 
     #[test]
     fn dates_and_clocks() {
+        let clock = || Wrapping::new(DAY_NS, LATE_NS);
         // 17,807 days after 1970-01-01, as `date -d @1538587435 -u` says.
         let expected = 1_538_587_435_464_000_000;
         for text in [
@@ -90,18 +77,19 @@ mod tests {
             "2018-10-03 17:23:55,464",
             "2018-10-03T19:23:55.464+02:00",
         ] {
-            assert_eq!(Dates::default().read(text), Some(expected), "{text}");
+            assert_eq!(read_date(text, &mut clock()), Some(expected), "{text}");
         }
-        let mut clock = Dates::default();
+        let mut one = clock();
         let hour = 3_600_000_000_000;
         for (text, ns) in [
             ("9:00:00.5", 9 * hour + 500_000_000),
             ("23:00:00:500", 23 * hour + 500_000_000),
             ("22:59:59.9", 23 * hour - 100_000_000),
             ("00:00:00.25", 24 * hour + 250_000_000),
+            ("23:59:59.75", 24 * hour - 250_000_000),
             ("01:00:00", 25 * hour),
         ] {
-            assert_eq!(clock.read(text), Some(ns), "{text}");
+            assert_eq!(read_date(text, &mut one), Some(ns), "{text}");
         }
         for text in [
             "",
@@ -112,7 +100,7 @@ mod tests {
             "1969-12-31 23:59:59",
             "2018-13-03 00:00:00",
         ] {
-            assert_eq!(Dates::default().read(text), None, "{text}");
+            assert_eq!(read_date(text, &mut clock()), None, "{text}");
         }
     }
 }

@@ -35,7 +35,7 @@ impl Log {
     }
 
     /// Puts a force and a rate track together. Where their times differ, the rate is interpolated linearly at the force's times; where
-    /// it has a hole of more than three usual intervals, or none on one side, it is not given.
+    /// it has a [hole](Between), or none on one side, it is not given.
     pub fn join(name: String, force: Track, rate: Track, mut notes: Vec<String>) -> Self {
         let sample = |t_ns, force, rate| Sample {
             t_ns,
@@ -67,10 +67,17 @@ impl Log {
                 "the angular velocity was interpolated linearly at the times of the acceleration"
                     .to_owned(),
             );
-            let hole = usual_interval(&rate).saturating_mul(3);
-            force
-                .iter()
-                .map(|&(t_ns, force)| sample(t_ns, Some(force), interpolate(&rate, t_ns, hole)))
+            let [of_force, of_rate] = [&force, &rate].map(Between::of);
+            let without = unpaired(&of_force, &of_rate);
+            let what = "of the acceleration's samples have no angular velocity: that has holes there, or began later or ended earlier";
+            notes.extend(told(without, force.len(), what));
+            let without = unpaired(&of_rate, &of_force);
+            let what =
+                "of the angular velocity's samples are where no acceleration is, and are left out";
+            notes.extend(told(without, rate.len(), what));
+            let times = force.iter().zip(&of_force.t_ns);
+            times
+                .map(|(&(t_ns, force), at_ns)| sample(t_ns, Some(force), of_rate.at(*at_ns)))
                 .collect()
         };
         Log {
@@ -97,33 +104,96 @@ pub(super) fn without_repeats(track: &Track) -> Option<Track> {
     is_held.then(|| held.iter().map(|same| same[0]).collect())
 }
 
-/// The median interval of a track, ns.
-fn usual_interval(track: &Track) -> i64 {
-    let mut intervals: Vec<i64> = track.windows(2).map(|pair| pair[1].0 - pair[0].0).collect();
-    intervals.sort_unstable();
-    intervals.get(intervals.len() / 2).copied().unwrap_or(0)
+/// So many samples on either side of an interval tell what is usual there.
+const AROUND: usize = 5;
+/// More than this share of samples without a partner is worth a word: a few at the ends are no loss.
+const MANY: f64 = 0.01;
+
+/// A track to look between whose samples.
+///
+/// Samples of one time came in a packet: they are evenly spread over the interval before it, or a usual one where that is shorter. A hole is
+/// more than three times as long as intervals usually are, of the track and nearby: sensors change their rate.
+pub(super) struct Between<'a> {
+    track: &'a Track,
+    /// Where packets are spread, ns.
+    t_ns: Vec<i64>,
+    usual_ns: i64,
 }
 
-/// The track's value at a time: exact on a sample, linear between two that are no more than `hole` apart.
-pub(super) fn interpolate(track: &Track, t_ns: i64, hole: i64) -> Option<[f64; 3]> {
-    let after = track.partition_point(|row| row.0 < t_ns);
-    let (t1, v1) = *track.get(after)?;
-    if t1 == t_ns {
-        return Some(v1);
+impl<'a> Between<'a> {
+    pub fn of(track: &'a Track) -> Self {
+        let intervals = track.windows(2).map(|pair| pair[1].0 - pair[0].0);
+        let usual_ns = usual(intervals.filter(|ns| *ns > 0).collect());
+        let mut t_ns = Vec::with_capacity(track.len());
+        let mut last_ns = None;
+        for packet in track.chunk_by(|a, b| a.0 == b.0) {
+            let (at_ns, count) = (packet[0].0, packet.len() as i64);
+            let before_ns = last_ns.map_or(usual_ns, |last| usual_ns.min(at_ns - last));
+            t_ns.extend((1..=count).map(|k| at_ns - (count - k) * before_ns / count));
+            last_ns = Some(at_ns);
+        }
+        Between {
+            track,
+            t_ns,
+            usual_ns,
+        }
     }
-    let (t0, v0) = *track.get(after.checked_sub(1)?)?;
-    if t1 - t0 > hole {
-        return None;
+
+    /// The value at a time: exact on a sample, linear between two without a hole.
+    pub fn at(&self, t_ns: i64) -> Option<[f64; 3]> {
+        let (before, after, share) = self.place(t_ns)?;
+        let [(_, v0), (_, v1)] = [before, after].map(|row| self.track[row]);
+        Some(std::array::from_fn(|axis| {
+            v0[axis] + share * (v1[axis] - v0[axis])
+        }))
     }
-    let share = (t_ns - t0) as f64 / (t1 - t0) as f64;
-    Some(std::array::from_fn(|axis| {
-        v0[axis] + share * (v1[axis] - v0[axis])
-    }))
+
+    /// Between which two samples a time lies, which may be one, and where.
+    fn place(&self, t_ns: i64) -> Option<(usize, usize, f64)> {
+        let after = self.t_ns.partition_point(|t| *t < t_ns);
+        let t1 = *self.t_ns.get(after)?;
+        if t1 == t_ns {
+            return Some((after, after, 0.0));
+        }
+        let before = after.checked_sub(1)?;
+        let interval_ns = t1 - self.t_ns[before];
+        let is_long = |usual_ns: i64| interval_ns > usual_ns.saturating_mul(3);
+        if is_long(self.usual_ns) && is_long(self.usual_near(after)) {
+            return None;
+        }
+        let share = (t_ns - self.t_ns[before]) as f64 / interval_ns as f64;
+        Some((before, after, share))
+    }
+
+    /// The median of the intervals before and behind the one that ends with a sample, ns.
+    fn usual_near(&self, end: usize) -> i64 {
+        let from = end.saturating_sub(AROUND + 1);
+        let to = (end + AROUND + 1).min(self.t_ns.len());
+        let intervals = (from + 1..to).filter(|k| *k != end);
+        usual(intervals.map(|k| self.t_ns[k] - self.t_ns[k - 1]).collect())
+    }
 }
 
-/// The interpolation's hole for a track: three usual intervals.
-pub(super) fn hole(track: &Track) -> i64 {
-    usual_interval(track).saturating_mul(3)
+/// The median; 0 of none.
+fn usual(mut intervals_ns: Vec<i64>) -> i64 {
+    intervals_ns.sort_unstable();
+    intervals_ns
+        .get(intervals_ns.len() / 2)
+        .copied()
+        .unwrap_or(0)
+}
+
+/// How many samples of one track lie where the other has none.
+pub(super) fn unpaired(of: &Between<'_>, other: &Between<'_>) -> usize {
+    of.t_ns
+        .iter()
+        .filter(|t| other.place(**t).is_none())
+        .count()
+}
+
+/// The note that some of all samples lack something, where these are more than a few.
+pub(super) fn told(some: usize, all: usize, what: &str) -> Option<String> {
+    (some as f64 > MANY * all as f64).then(|| format!("{some} of {all} {what}"))
 }
 
 /// The median length of a track's vectors.

@@ -41,9 +41,7 @@ pub(super) struct Layout {
 impl Layout {
     fn is_header(&self, line: &str) -> bool {
         match &self.header {
-            Some(header) => line
-                .trim_start_matches(['\u{feff}', '"'])
-                .starts_with(header.as_str()),
+            Some(header) => line.trim_start_matches('"').starts_with(header.as_str()),
             None => !line.is_empty(),
         }
     }

@@ -4,6 +4,7 @@
 use super::{
     Files, ImportError,
     date::times_ns,
+    has_header,
     imu::{self, Log, STANDARD_GRAVITY, Track},
     table::Table,
 };
@@ -19,11 +20,8 @@ pub(super) fn is_header(line: &str) -> bool {
 pub(super) fn read(files: &Files) -> Result<Log, ImportError> {
     let mut notes = Vec::new();
     let mut track = |first: &str, unit: &str, factor: f64| {
-        let head = |_: &str, text: &str| {
-            text.lines()
-                .next()
-                .is_some_and(|line| is_header(line) && line.contains(first))
-        };
+        let head =
+            |_: &str, text: &str| has_header(text, |line| is_header(line) && line.contains(first));
         let Some((name, text)) = files.only(first, head)? else {
             return Ok(Track::new());
         };

@@ -14,10 +14,11 @@ mod sensor_logger;
 mod shimmer;
 mod table;
 mod wav;
+mod wrapping;
 mod xsens;
 
 use std::{
-    collections::{BTreeMap, HashMap},
+    collections::{BTreeMap, HashMap, HashSet},
     fs, io,
     io::Read,
     path::{Path, PathBuf},
@@ -69,6 +70,7 @@ impl ImportError {
 
 /// Whether a file is called so, in whatever folder.
 fn is_called(file: &str, name: &str) -> bool {
+    let file = file.replace('\\', "/");
     let folder = file.strip_suffix(name);
     folder.is_some_and(|folder| folder.is_empty() || folder.ends_with('/'))
 }
@@ -102,6 +104,8 @@ struct Files {
     texts: Vec<(String, String)>,
     /// Names of sounds beside them, which are not read here.
     sounds: Vec<String>,
+    /// Names of what else is beside them, which is not read at all.
+    others: Vec<String>,
 }
 
 impl Files {
@@ -193,8 +197,9 @@ pub fn ingest(
             losses: Vec::new(),
         });
     }
-    for (k, path) in paths.iter().enumerate() {
-        if paths[..k].contains(path) {
+    let mut seen = HashSet::new();
+    for path in paths {
+        if !seen.insert(fs::canonicalize(path).unwrap_or_else(|_| path.clone())) {
             return Err(ImportError::Content {
                 name: path.display().to_string(),
                 problem: "is given twice; expected each log once".to_owned(),
@@ -238,6 +243,17 @@ pub fn ingest(
                 path.display()
             )
         }));
+        if !files.others.is_empty() {
+            const MOST: usize = 8;
+            let more = files.others.len().saturating_sub(MOST);
+            let named = files.others.iter().take(MOST).cloned();
+            let more = (more > 0).then(|| format!("{more} more"));
+            let others = Vec::from_iter(named.chain(more)).join(", ");
+            beside.push(format!(
+                "{}: left out, for they are neither CSV nor text: {others}",
+                path.display()
+            ));
+        }
     }
     notes.extend(beside);
     notes.extend(undated(&logs));
@@ -444,6 +460,17 @@ fn read(files: &Files, layout: Option<&layout::Layout>) -> Result<Vec<imu::Log>,
         }
         logs.push(log);
     }
+    if let Some(log) = logs.iter().find(|log| has_lost_its_times(log)) {
+        let problem = format!(
+            "has {} samples with hardly any times between them (the first is {:.3} s); expected a time for each: have they lost their digits, as in 1.53859E+12?",
+            log.samples.len(),
+            log.samples[0].t_ns as f64 / 1e9
+        );
+        return Err(ImportError::Content {
+            name: files.name.clone(),
+            problem,
+        });
+    }
     let Some(first) = logs.first_mut() else {
         return Err(ImportError::Content {
             name: empty[0].to_owned(),
@@ -458,6 +485,15 @@ fn read(files: &Files, layout: Option<&layout::Layout>) -> Result<Vec<imu::Log>,
         ));
     }
     Ok(logs)
+}
+
+/// No packet holds so many samples.
+const MOST_IN_PACKET: usize = 100;
+
+/// Whether next to none of many samples has a time of its own.
+fn has_lost_its_times(log: &imu::Log) -> bool {
+    let times = log.samples.chunk_by(|a, b| a.t_ns == b.t_ns).count();
+    log.samples.len() > times * MOST_IN_PACKET
 }
 
 /// The note for a file in which nothing was logged, beside others.
@@ -538,14 +574,18 @@ fn open(path: &Path) -> Result<Files, ImportError> {
         })?;
         Ok(decoded(bytes))
     };
-    let (mut texts, mut sounds) = (Vec::new(), Vec::new());
+    let (mut texts, mut sounds, mut others) = (Vec::new(), Vec::new(), Vec::new());
     let mut is_log = |name: &str| {
         // Hidden files are a system's own: macOS puts one beside each file of a zip.
-        let is_hidden = file_name(name).starts_with('.');
-        if !is_hidden && wav::is_named(name) {
-            sounds.push(file_name(name).to_owned());
+        if file_name(name).starts_with('.') {
+            return false;
         }
-        !is_hidden && is_text(name)
+        if wav::is_named(name) {
+            sounds.push(file_name(name).to_owned());
+        } else if !is_text(name) {
+            others.push(name.to_owned());
+        }
+        is_text(name)
     };
     if path.is_dir() {
         // Apps put at most one level of folders (`meta`) beside their tables.
@@ -560,11 +600,10 @@ fn open(path: &Path) -> Result<Files, ImportError> {
                 .map_err(io)?;
             entries.sort_by_key(fs::DirEntry::file_name);
             for entry in entries {
-                let entry_name = entry.file_name().to_string_lossy().into_owned();
-                if !is_log(&entry_name) {
+                let what = format!("{inside}{}", entry.file_name().to_string_lossy());
+                if what == "meta" || !is_log(&what) {
                     continue;
                 }
-                let what = format!("{inside}{entry_name}");
                 let mut file = fs::File::open(entry.path()).map_err(io)?;
                 let read = text(&mut file, &what)?;
                 texts.push((what, read));
@@ -574,6 +613,7 @@ fn open(path: &Path) -> Result<Files, ImportError> {
             name,
             texts,
             sounds,
+            others,
         });
     }
     let mut file = fs::File::open(path).map_err(io)?;
@@ -602,7 +642,7 @@ fn open(path: &Path) -> Result<Files, ImportError> {
             if entry_name == "xl/workbook.xml" {
                 return Err(content(format!("is {}", foreign::EXCEL)));
             }
-            if !is_log(&entry_name) {
+            if entry.is_dir() || !is_log(&entry_name) {
                 continue;
             }
             let read = text(&mut entry, &entry_name)?;
@@ -612,6 +652,7 @@ fn open(path: &Path) -> Result<Files, ImportError> {
             name,
             texts,
             sounds,
+            others,
         });
     }
     let read = text(&mut file, "it")?;
@@ -623,6 +664,7 @@ fn open(path: &Path) -> Result<Files, ImportError> {
         name,
         texts,
         sounds,
+        others,
     })
 }
 
@@ -651,6 +693,7 @@ fn decoded(bytes: Vec<u8>) -> String {
     match bytes[..] {
         [0xff, 0xfe, ..] => utf_16(u16::from_le_bytes),
         [0xfe, 0xff, ..] => utf_16(u16::from_be_bytes),
+        [0xef, 0xbb, 0xbf, ref rest @ ..] => decoded(rest.to_vec()),
         _ => String::from_utf8(bytes)
             .unwrap_or_else(|error| error.as_bytes().iter().map(|b| char::from(*b)).collect()),
     }

@@ -7,6 +7,7 @@
 
 use std::{
     collections::BTreeMap,
+    f64::consts::TAU,
     fs::File,
     io::{BufReader, Read as _},
     path::Path,
@@ -241,12 +242,25 @@ fn vector([x, y, z]: [f64; 3]) -> rath::Vector3 {
     rath::Vector3 { x, y, z }
 }
 
+/// A phase without jumps of whole turns, on from the last one that is a number, which is NaN before the first.
+fn unwrapped(last_rad: &mut f64, phase_rad: f64) -> f64 {
+    let turns = match last_rad.is_finite() {
+        true => ((*last_rad - phase_rad) / TAU).round(),
+        false => 0.0,
+    };
+    let on = phase_rad + turns * TAU;
+    if on.is_finite() {
+        *last_rad = on;
+    }
+    on
+}
+
 fn write(log: &Log, writer: &mut RecordingWriter) -> Result<u64, ImportError> {
     let state = writer.channel(topics::STATE, MessageKind::RathState)?;
     let phases = writer.channel(topics::PHASES, MessageKind::Phases)?;
     let forces = writer.channel(topics::FORCES, MessageKind::HandleForces)?;
     let tf = writer.channel(topics::TF, MessageKind::Tf)?;
-    let mut unwrapped = log.phase_rad[0].clone();
+    let mut last_rad = vec![f64::NAN; log.phase_rad[0].len()];
     for i in 0..log.t_s.len() {
         // OK because times were checked to lie within nanoseconds in 63 bits.
         let t_ns = (log.t_s[i] * 1e9).round() as i64;
@@ -279,10 +293,10 @@ fn write(log: &Log, writer: &mut RecordingWriter) -> Result<u64, ImportError> {
                 yaw_rad: log.pitch_rad[i],
             },
         )?;
-        for (unwrapped, phase) in unwrapped.iter_mut().zip(&log.phase_rad[i]) {
-            let turns = ((*unwrapped - phase) / std::f64::consts::TAU).round();
-            *unwrapped = phase + turns * std::f64::consts::TAU;
-        }
+        let phases_now = last_rad.iter_mut().zip(&log.phase_rad[i]);
+        let phase_rad: Vec<f64> = phases_now
+            .map(|(last, phase)| unwrapped(last, *phase))
+            .collect();
         let (sin, cos) = log.phase_rad[i]
             .iter()
             .fold((0.0, 0.0), |(sin, cos), phase| {
@@ -293,8 +307,8 @@ fn write(log: &Log, writer: &mut RecordingWriter) -> Result<u64, ImportError> {
             t_ns,
             &rath::Phases {
                 time_s,
-                phase_rad: unwrapped.clone(),
-                order_parameter: f64::hypot(sin, cos) / unwrapped.len() as f64,
+                order_parameter: f64::hypot(sin, cos) / phase_rad.len() as f64,
+                phase_rad,
                 ..rath::Phases::default()
             },
         )?;
@@ -345,6 +359,20 @@ fn write(log: &Log, writer: &mut RecordingWriter) -> Result<u64, ImportError> {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn a_phase_goes_on_past_what_is_no_number() {
+        let mut last = f64::NAN;
+        let known = [3.0, 3.5, f64::NAN, 6.5, 9.0];
+        let found = [3.0, 3.5 - TAU, f64::NAN, 6.5 - TAU, 9.0 - TAU];
+        for (phase, known) in found.into_iter().zip(known) {
+            let on = unwrapped(&mut last, phase);
+            assert!(
+                (on - known).abs() < 1e-12 || on.is_nan() && known.is_nan(),
+                "{on}"
+            );
+        }
+    }
 
     #[test]
     fn tilt_is_the_third_angle() {

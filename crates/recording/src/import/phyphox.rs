@@ -5,7 +5,7 @@
 //! time. `Acceleration` includes gravity, as REP-145 asks; `Linear Acceleration` does not and is used only where nothing else is there.
 
 use super::{
-    Files, ImportError,
+    Files, ImportError, has_header,
     imu::{self, Log, Track},
     is_called,
     table::Table,
@@ -16,10 +16,7 @@ const TIME: &str = "Time (s)";
 
 /// Whether a line is the header of a phyphox table.
 pub(super) fn is_header(line: &str) -> bool {
-    line.trim_start_matches('\u{feff}')
-        .trim_start_matches('"')
-        .starts_with(TIME)
-        && line.contains(" x (")
+    line.trim_start_matches('"').starts_with(TIME) && line.contains(" x (")
 }
 
 const SENSORS: &[(&str, &str)] = &[
@@ -37,7 +34,7 @@ pub(super) fn read(files: &Files) -> Result<Log, ImportError> {
     let mut tracks: [(&str, Track); 3] = Default::default();
     let (mut seen, mut known) = (Vec::new(), false);
     for (name, text) in files.texts() {
-        if !text.lines().next().is_some_and(is_header) {
+        if !has_header(text, is_header) {
             continue;
         }
         let mut table = Table::parse(name, text, is_header)?;

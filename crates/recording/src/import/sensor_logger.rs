@@ -6,7 +6,7 @@
 
 use super::{
     Files, ImportError, file_name,
-    imu::{self, Log, STANDARD_GRAVITY, Track},
+    imu::{self, Between, Log, STANDARD_GRAVITY, Track},
     table::Table,
 };
 
@@ -34,12 +34,15 @@ pub(super) fn read(files: &Files) -> Result<Log, ImportError> {
     let mut force = if !total.is_empty() {
         total
     } else if !plain.is_empty() && !gravity.is_empty() {
-        let hole = imu::hole(&gravity);
+        let [of_gravity, of_plain] = [&gravity, &plain].map(Between::of);
         notes.push("the specific force is Accelerometer plus Gravity".to_owned());
+        let without = imu::unpaired(&of_plain, &of_gravity);
+        let what = "samples of Accelerometer.csv have no gravity and are left out";
+        notes.extend(imu::told(without, plain.len(), what));
         plain
             .iter()
             .filter_map(|&(t_ns, a)| {
-                let g = imu::interpolate(&gravity, t_ns, hole)?;
+                let g = of_gravity.at(t_ns)?;
                 Some((t_ns, std::array::from_fn(|axis| a[axis] + g[axis])))
             })
             .collect()

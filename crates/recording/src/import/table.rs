@@ -20,6 +20,8 @@ pub(super) struct Table {
     header_line: usize,
     /// Rows that have more cells than the header, where they are left out: their lines, the first and how many.
     overlong: (usize, u64),
+    /// Whether its last line ends.
+    ends: bool,
 }
 
 impl Table {
@@ -33,7 +35,6 @@ impl Table {
             name: name.to_owned(),
             problem,
         };
-        let text = text.trim_start_matches('\u{feff}');
         let mut offset = 0;
         let mut found = None;
         for (number, line) in text.split_inclusive('\n').enumerate() {
@@ -55,12 +56,27 @@ impl Table {
                 "has no header line that is known; it begins with {first:?}"
             )));
         };
+        let rest = &text[offset..];
+        Self::below(name, rest, header, header_line)
+    }
+
+    /// Reads a table that begins with its header.
+    fn below(
+        name: &str,
+        text: &str,
+        header: &str,
+        header_line: usize,
+    ) -> Result<Self, ImportError> {
+        let problem = |problem: String| ImportError::Content {
+            name: name.to_owned(),
+            problem,
+        };
         let separator = separator(header);
         let mut reader = csv::ReaderBuilder::new()
             .delimiter(separator)
             .flexible(true)
             .trim(csv::Trim::All)
-            .from_reader(&text.as_bytes()[offset..]);
+            .from_reader(text.as_bytes());
         let columns = reader
             .headers()
             .map_err(|error| problem(format!("its header cannot be read: {error}")))?;
@@ -71,16 +87,24 @@ impl Table {
             // The reader begins a row with the empty lines before it.
             if let Some(mut at) = row.position().cloned() {
                 // OK because a place in the text fits.
-                let rest = &text.as_bytes()[offset + at.byte() as usize..];
+                let rest = &text.as_bytes()[at.byte() as usize..];
                 let ends = rest.iter().take_while(|b| matches!(b, b'\r' | b'\n'));
                 let empty = ends.filter(|b| **b == b'\n').count() as u64;
                 at.set_line(at.line() + empty);
                 row.set_position(Some(at));
             }
+            // OK because a line's number fits where the text does.
+            let line = row.position().map_or(0, |at| at.line() as usize) + header_line - 1;
+            let breaks = row.iter().map(|cell| cell.matches('\n').count());
+            let swallowed: usize = breaks.sum();
+            if swallowed > 0 {
+                let lines = counted(swallowed as u64, "line", "lines");
+                return Err(problem(format!(
+                    "line {line} begins a quotation that takes in {lines} behind it; expected each row on one line: is there a quotation mark too many?"
+                )));
+            }
             // A comma too many, as of a decimal sign, moves all that follow it.
             if row.iter().skip(columns.len()).any(|cell| !cell.is_empty()) {
-                // OK because a line's number fits where the text does.
-                let line = row.position().map_or(0, |at| at.line() as usize) + header_line - 1;
                 if overlong.1 == 0 {
                     overlong.0 = line;
                 }
@@ -98,11 +122,8 @@ impl Table {
             )));
         }
         // With another separator a comma can only be the decimal sign.
-        let decimal_comma = separator != b','
-            && rows
-                .iter()
-                .take(100)
-                .any(|row| row.iter().any(|cell| cell.contains(',')));
+        let has_comma = |row: &csv::StringRecord| row.iter().any(|cell| cell.contains(','));
+        let decimal_comma = separator != b',' && rows.iter().any(has_comma);
         Ok(Table {
             name: name.to_owned(),
             columns,
@@ -110,17 +131,15 @@ impl Table {
             decimal_comma,
             header_line,
             overlong,
+            ends: text.ends_with(['\n', '\r']),
         })
     }
 
     /// Reads a table without a header; as many of `columns` as its first row has cells.
     pub fn headless(name: &str, text: &str, columns: &[&str]) -> Result<Self, ImportError> {
-        let text = text.trim_start_matches('\u{feff}');
         let cells = text.lines().next().unwrap_or_default().split(',').count();
         let header = columns[..cells.min(columns.len())].join(",");
-        let mut table = Self::parse(name, &format!("{header}\n{text}"), |_| true)?;
-        table.header_line = 0;
-        Ok(table)
+        Self::below(name, &format!("{header}\n{text}"), &header, 0)
     }
 
     /// Leaves out a last row that was cut off, and says which rows are left out as broken; `log` is the log that this table belongs to.
@@ -141,15 +160,27 @@ impl Table {
         let before = self.rows.iter().rev().nth(1);
         let usual = before.map_or(usize::MAX, csv::StringRecord::len);
         let (found, expected) = (last.len(), usual.min(self.columns.len()));
-        if found >= expected {
+        let lacks = if found < expected {
+            format!("has {found} of {expected} cells")
+        } else if !self.ends && self.ends_shorter() {
+            "does not end, and its last cell is shorter than those before".to_owned()
+        } else {
             return;
-        }
+        };
         let file = self.told_in(log);
         let line = self.line(self.rows.len() - 1);
         notes.push(format!(
-            "{file}line {line}, the last, has {found} of {expected} cells: it was cut off and is left out"
+            "{file}line {line}, the last, {lacks}: it was cut off and is left out"
         ));
         self.rows.pop();
+    }
+
+    /// Whether the last row's last cell is shorter than those of the rows before it.
+    fn ends_shorter(&self) -> bool {
+        let length = |row: &csv::StringRecord| row.iter().next_back().map_or(0, str::len);
+        let mut lengths = self.rows.iter().rev().take(CELLS).map(length);
+        let last = lengths.next();
+        self.rows.len() >= CELLS && lengths.all(|length| Some(length) > last)
     }
 
     /// Notes that nothing was logged, of one table of several.
@@ -339,6 +370,9 @@ impl Table {
         ])
     }
 }
+
+/// So many cells of a column tell how long they are.
+const CELLS: usize = 20;
 
 /// Of a hundred rows at most so many may be broken.
 const MOST_OVERLONG: u64 = 10;

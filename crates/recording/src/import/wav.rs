@@ -342,9 +342,16 @@ impl Sound {
     }
 }
 
-/// A head for `length` bytes of sound as `fmt` says it is written. What extends the first 16 bytes by less than an extensible format says nothing more.
+/// A head for `length` bytes of sound as `fmt` says it is written. What extends the first 16 bytes by less than an extensible format says nothing more;
+/// and of an extensible one it says how many of a sample's bits are meant, which are its highest (Microsoft, WAVEFORMATEXTENSIBLE): as a whole it is
+/// the same sound.
 fn head(fmt: &[u8], length: u32) -> Vec<u8> {
-    let fmt = if fmt.len() < 40 { &fmt[..16] } else { fmt };
+    let mut fmt = fmt.to_vec();
+    if fmt.len() < 40 {
+        fmt.truncate(16);
+    } else {
+        fmt.copy_within(14..16, 18);
+    }
     // No reader looks at the first size.
     let sizes = [0, fmt.len() as u32, length].map(u32::to_le_bytes);
     let [riff, of_fmt, of_data] = &sizes;
@@ -354,7 +361,7 @@ fn head(fmt: &[u8], length: u32) -> Vec<u8> {
         b"WAVE",
         b"fmt ",
         of_fmt,
-        fmt,
+        &fmt,
         b"data",
         of_data,
     ]

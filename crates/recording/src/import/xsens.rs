@@ -12,7 +12,12 @@ use super::{
     ImportError,
     imu::{self, Log, STANDARD_GRAVITY, Sample},
     table::Table,
+    wrapping::Wrapping,
 };
+use crate::text::counted;
+
+/// A sample may come so many counts late, over a wrap too.
+const LATE: i64 = 1_000_000;
 
 /// Whether a line is the header of an export.
 pub(super) fn is_header(line: &str) -> bool {
@@ -63,7 +68,7 @@ pub(super) fn read(name: &str, text: &str) -> Result<Log, ImportError> {
     }
 
     let (counts, turns) = counts(&table, time)?;
-    let tick_ns = tick_ns(&table, &counts, told_rate(text), &mut notes)?;
+    let tick_ns = tick_ns(&table, &counts, told_rate(text), radians, &mut notes)?;
     let mut samples = Vec::with_capacity(table.len());
     for (row, count) in counts.into_iter().enumerate() {
         let orientation = match (quaternion, euler) {
@@ -98,7 +103,8 @@ pub(super) fn read(name: &str, text: &str) -> Result<Log, ImportError> {
     }
     table.put_in_order(&mut samples, |sample| sample.t_ns)?;
     if turns > 0 {
-        notes.push(format!("SampleTimeFine wrapped {turns} times"));
+        let times = counted(turns.unsigned_abs(), "time", "times");
+        notes.push(format!("SampleTimeFine wrapped {times}"));
     }
     Ok(Log {
         name: imu::device_name(name),
@@ -110,23 +116,20 @@ pub(super) fn read(name: &str, text: &str) -> Result<Log, ImportError> {
 /// SampleTimeFine of every row, going on past its wraps, and how many these are.
 fn counts(table: &Table, time: usize) -> Result<(Vec<i64>, i64), ImportError> {
     let mut counts = Vec::with_capacity(table.len());
-    let (mut turns, mut last) = (0i64, None::<i64>);
+    let mut clock = Wrapping::new(1 << 32, LATE);
     for row in 0..table.len() {
         let fine = table.number(row, time)?;
-        if !(0.0..4_294_967_296.0).contains(&fine) {
+        // OK because the range is checked.
+        let count = (0.0..4_294_967_296.0)
+            .contains(&fine)
+            .then(|| clock.next(fine as i64));
+        let Some(count) = count.flatten() else {
             let problem = format!("has SampleTimeFine {fine}; expected a count below 2^32");
             return Err(table.problem_in(row, &problem));
-        }
-        // OK because the range was checked.
-        let fine = fine as i64;
-        // A step back of more than half the range is the clock's wrap, a smaller one is an error of the log and stays.
-        if last.is_some_and(|last| last - fine > 1 << 31) {
-            turns += 1;
-        }
-        last = Some(fine);
-        counts.push(fine + (turns << 32));
+        };
+        counts.push(count);
     }
-    Ok((counts, turns))
+    Ok((counts, clock.wraps()))
 }
 
 /// The rate that the preamble tells, Hz.
@@ -147,6 +150,7 @@ fn tick_ns(
     table: &Table,
     counts: &[i64],
     told_hz: Option<f64>,
+    of_mt_manager: bool,
     notes: &mut Vec<String>,
 ) -> Result<i64, ImportError> {
     const MICROSECOND: i64 = 1_000;
@@ -157,6 +161,11 @@ fn tick_ns(
     steps.retain(|step| *step > 0);
     steps.sort_unstable();
     let (Some(rate_hz), Some(&step)) = (told_hz, steps.get(steps.len() / 2)) else {
+        if of_mt_manager {
+            notes.push(
+                "no update rate is told: SampleTimeFine is taken to count microseconds".to_owned(),
+            );
+        }
         return Ok(MICROSECOND);
     };
     let fits = |tick_ns: &i64| ((step * tick_ns) as f64 / 1e9 * rate_hz - 1.0).abs() <= TOLERANCE;
