@@ -1,9 +1,10 @@
 //! What happened when: contact lost and regained, jumps, the beat, the onset of instability.
 
 use std::f64::consts::TAU;
+use std::ops::Range;
 
 use crate::beat::adler::turns::Turns;
-use crate::inputs::{Inputs, Window, stretches};
+use crate::inputs::{Inputs, Window, finite, stretches};
 use crate::metrics::Context;
 use crate::phase;
 
@@ -56,14 +57,16 @@ fn contact(inputs: &Inputs, out: &mut Vec<Event>) {
     if inputs.pulled_n().is_some() {
         return;
     }
-    let t_s = inputs.force_times();
-    let parts = stretches(t_s, 0.0);
-    let handles = inputs.normal_n.iter().enumerate();
-    for (handle, force, part) in handles.flat_map(|(i, n)| parts.iter().map(move |p| (i, n, p))) {
+    let handles = inputs.normal_n.iter();
+    let handles = handles.map(|force| finite(inputs.force_times(), force));
+    let parts = handles.enumerate().flat_map(|(handle, (t_s, force))| {
+        let parts = stretches(&t_s, 0.0).into_iter();
+        let part = |of: Range<usize>| (handle, t_s[of.clone()].to_vec(), force[of].to_vec());
+        parts.map(part).collect::<Vec<_>>()
+    });
+    for (handle, t_s, force) in parts {
         let mut held: Option<bool> = None;
-        let all = t_s.iter().zip(force);
-        let samples = all.skip(part.start).take(part.len());
-        for (t_s, n) in samples.filter(|(_, n)| n.is_finite()) {
+        for (t_s, n) in t_s.iter().zip(&force) {
             let holds = *n > 0.0;
             if held.is_some_and(|h| h != holds) {
                 let number = handle + 1;
@@ -255,6 +258,32 @@ fn locking(inputs: &Inputs, out: &mut Vec<Event>) {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    /// What was held before a hole and is slack behind it went slack nobody knows when.
+    #[test]
+    fn what_one_handle_did_while_it_was_not_seen_is_no_event() {
+        let t_s: Vec<f64> = (0..600).map(|k| f64::from(k) / 30.0).collect();
+        let right = t_s.iter().map(|t| match t {
+            5.0..10.0 => f64::NAN,
+            10.0..12.0 => 0.0,
+            _ => 300.0,
+        });
+        let inputs = Inputs {
+            normal_n: vec![vec![300.0; 600], right.collect()],
+            t_s,
+            ..Inputs::default()
+        };
+        let found = events(&inputs, Window::ALL);
+        let contacts: Vec<_> = found
+            .iter()
+            .filter(|e| e.kind.starts_with("contact"))
+            .collect();
+        assert_eq!(contacts.len(), 1, "{contacts:?}");
+        assert_eq!(
+            (contacts[0].kind, contacts[0].t_s),
+            ("contact_regained", 12.0)
+        );
+    }
 
     #[test]
     fn a_hop_is_told_as_it_happened() {

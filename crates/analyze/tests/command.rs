@@ -2056,6 +2056,54 @@ fn the_documentation_names_every_metric() {
     }
 }
 
+/// Unwrapped, three samples a second tell of two turns; and lost messages of a beat on a topic of its own are no pause.
+#[test]
+fn a_beat_on_a_topic_of_its_own_is_as_good_as_beside_the_phases() {
+    let folder = tempfile::tempdir().unwrap();
+    let tau = std::f64::consts::TAU;
+    let roles = folder.path().join("roles.toml");
+    std::fs::write(
+        &roles,
+        "phases = [\"/a.data\", \"/b.data\"]\nbeat_phase = \"/beat.data\"\n",
+    )
+    .unwrap();
+    // The fuller of the phases gives the times, whichever is named first.
+    for (rate_hz, fuller_hz) in [(3, 3), (30, 30), (30, 50)] {
+        let file = folder.path().join("own.mcap");
+        let mut w = RecordingWriter::create(&file, &WriterOptions::default()).unwrap();
+        let names = ["/a", "/b", "/beat"];
+        let channels = names.map(|name| w.channel(name, MessageKind::Float64).unwrap());
+        let mut all = Vec::new();
+        for (j, hz) in [rate_hz, fuller_hz, rate_hz].into_iter().enumerate() {
+            let times = (0..60 * hz).map(|k| k * 1_000_000_000 / hz + 5_000_000 * j as i64);
+            all.extend(times.map(|t_ns| (t_ns, j)));
+        }
+        all.sort_unstable();
+        for (t_ns, j) in all {
+            let t = t_ns as f64 / 1e9;
+            if names[j] == "/beat" && (20.0..23.0).contains(&t) {
+                continue;
+            }
+            let data = tau * 2.03 * t + 0.1 * j as f64;
+            w.message(channels[j], t_ns, &Float64 { data }).unwrap();
+        }
+        w.finish().unwrap();
+        let args = [file.to_str().unwrap(), "--roles", roles.to_str().unwrap()];
+        let found = json(&[&args[..], &["--format", "json"]].concat());
+        for (name, truth) in [
+            ("beat_synchrony", 1.0),
+            ("beat_hz", 2.03),
+            ("synchrony", 0.05f64.cos()),
+        ] {
+            let value = found["metrics"][name]["value"].as_f64().unwrap();
+            assert!((value - truth).abs() < 1e-6, "{rate_hz} {name}: {value}");
+        }
+        let events = found["events"].as_array().unwrap();
+        let ends = events.iter().filter(|e| e["kind"] == "beat_end").count();
+        assert_eq!(ends, 0, "{events:?}");
+    }
+}
+
 #[test]
 fn topics_of_other_times_meet_where_both_have_samples() {
     let folder = tempfile::tempdir().unwrap();

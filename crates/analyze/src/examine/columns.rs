@@ -4,7 +4,8 @@ use std::collections::BTreeMap;
 
 use super::natural::natural;
 use super::pass::{Entry, Pass};
-use crate::inputs::{Inputs, between, nearest};
+use crate::beat::adler::turns::{COUNTED_S, Turns};
+use crate::inputs::{Inputs, between, nearest, stretches};
 use crate::phase::{continuous, wrap};
 use crate::quality::Quality;
 use crate::roles::{AngleUnit, Role, RolesFile};
@@ -156,17 +157,18 @@ impl Pass<'_> {
                 _ => inputs.yaw_rad = x,
             }
         }
-        (inputs.force_t_s, inputs.normal_n) = self.columns(Role::Forces);
-        (inputs.phase_t_s, inputs.phase_rad) = self.columns(Role::Phases);
+        (inputs.force_t_s, inputs.normal_n, _) = self.columns(Role::Forces);
+        let beside;
+        (inputs.phase_t_s, inputs.phase_rad, beside) = self.columns(Role::Phases);
         if let Some(entry) = self.player(Role::BeatPhase) {
             let (t_s, psi) = self.column(entry);
             if inputs.phase_t_s.is_empty() {
                 inputs.phase_t_s.clone_from(&t_s);
             }
-            let beside = self.players(Role::Phases).next();
             inputs.beat_phase_rad = match beside.is_none_or(|p| self.together(p, entry)) {
                 true => at_times(&t_s, &psi, &inputs.phase_t_s),
-                false => wrapped(&t_s, &psi, &inputs.phase_t_s),
+                // Whether lost messages were of a pause nobody knows: for so long a beat goes on.
+                false => turning(&t_s, &psi, &inputs.phase_t_s, COUNTED_S),
             };
         }
         let ours = self
@@ -183,8 +185,8 @@ impl Pass<'_> {
         inputs
     }
 
-    /// All columns of a role on the time axis of the one that has most samples; NaN where a column has no value at a time.
-    fn columns(&self, role: Role) -> (Vec<f64>, Vec<Vec<f64>>) {
+    /// All columns of a role on the time axis of the one that has most samples, and which that is; NaN where a column has no value at a time.
+    fn columns(&self, role: Role) -> (Vec<f64>, Vec<Vec<f64>>, Option<&Entry>) {
         let mut players: Vec<&Entry> = self.players(role).collect();
         players.sort_by(|a, b| natural(&a.path, &b.path));
         let found: Vec<_> = players.iter().map(|entry| self.column(entry)).collect();
@@ -193,17 +195,21 @@ impl Pass<'_> {
             return Default::default();
         };
         let axis = found[first].0.clone();
+        // All of them are left out.
+        if axis.is_empty() {
+            return Default::default();
+        }
         let on_axis = |(entry, (t_s, x)): (&&Entry, (Vec<f64>, Vec<f64>))| match (
             t_s == axis,
             self.together(entry, players[first]),
         ) {
             (true, _) => x,
             (false, true) => at_times(&t_s, &x, &axis),
-            (false, false) if role == Role::Phases => wrapped(&t_s, &x, &axis),
+            (false, false) if role == Role::Phases => turning(&t_s, &x, &axis, 0.0),
             (false, false) => nearest(&t_s, &x, &axis),
         };
         let columns = players.iter().zip(found).map(on_axis).collect();
-        (axis, columns)
+        (axis, columns, Some(players[first]))
     }
 }
 
@@ -212,6 +218,34 @@ fn by_row(kept: &[(usize, f64)], messages: usize) -> Vec<Option<f64>> {
     let mut x = vec![None; messages];
     kept.iter().for_each(|(row, value)| x[*row] = Some(*value));
     x
+}
+
+/// A phase (rad) at other times: unwrapped if it comes so, else turning at about its usual rate between samples. NaN beyond the ends, in holes longer
+/// than `filled_s`, beside samples that are none, and everywhere where it comes too seldom to tell how it turns.
+fn turning(t_s: &[f64], x: &[f64], axis: &[f64], filled_s: f64) -> Vec<f64> {
+    let turns = Turns::of(t_s, x);
+    let mut out = vec![f64::NAN; axis.len()];
+    if turns.folded() {
+        return out;
+    }
+    for part in stretches(t_s, filled_s) {
+        let (t_s, x) = (&t_s[part.clone()], &x[part]);
+        let until_s = t_s[t_s.len() - 1];
+        let places = axis.partition_point(|t| *t < t_s[0])..axis.partition_point(|t| *t <= until_s);
+        for (y, at) in out[places.clone()].iter_mut().zip(&axis[places]) {
+            let next = t_s.partition_point(|t| t < at);
+            *y = x[next];
+            if t_s[next] > *at {
+                let width_s = t_s[next] - t_s[next - 1];
+                let turned = turns.over(width_s, x[next] - x[next - 1]);
+                *y = x[next - 1] + (at - t_s[next - 1]) / width_s * turned;
+            }
+        }
+    }
+    match turns.unwrapped {
+        true => out,
+        false => out.into_iter().map(wrap).collect(),
+    }
 }
 
 /// An angle (rad), wrapped or not, at other times, by the shorter way between samples; −π … π, NaN beyond the ends and in holes.

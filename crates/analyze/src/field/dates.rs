@@ -352,7 +352,7 @@ fn unpacked(log_s: &[f64]) -> Option<(Vec<f64>, f64, f64)> {
         None => (stretches(log_s, 0.0), None),
     };
     let mean = filled_s.or_else(|| mean_step_in(log_s, &parts))?;
-    if !(usual < PACKETS * mean) {
+    if !(usual < PACKETS * mean) || is_of_losses(log_s, usual, &packets) {
         return None;
     }
     let inverse_square = |n: usize| (n as f64).powi(-2);
@@ -375,6 +375,17 @@ fn unpacked(log_s: &[f64]) -> Option<(Vec<f64>, f64, f64)> {
         t_s.extend((0..x.len()).map(|k| centre + step * (k as f64 - middle)));
     }
     Some((t_s, usual, mean))
+}
+
+/// A step so near to a whole number of usual ones is of samples lost between; and so many of all are where the log's times are right.
+const WHOLE: f64 = 0.15;
+const RIGHT: f64 = 0.9;
+
+/// Whether samples only look like packets because many are lost: each comes by itself, a whole number of usual steps after the one before.
+fn is_of_losses(log_s: &[f64], usual_s: f64, packets: &[Range<usize>]) -> bool {
+    let steps = log_s.windows(2).map(|w| (w[1] - w[0]) / usual_s);
+    let whole = steps.filter(|steps| (steps - steps.round()).abs() < WHOLE && *steps > 0.5);
+    2 * packets.len() > log_s.len() && whole.count() as f64 > RIGHT * (log_s.len() - 1) as f64
 }
 
 /// Mean step, holes and all.
@@ -596,6 +607,18 @@ mod tests {
     }
 
     /// Whether one step in twenty is a little more or less than that must not matter.
+    /// Half of the samples are lost, and each of the others has its time.
+    #[test]
+    fn many_lost_samples_are_no_packets() {
+        let mut random = Random(5);
+        for share in [0.42, 0.55] {
+            let all = (0..3000).map(|k| f64::from(k) / 30.0);
+            let log: Vec<f64> = all.filter(|_| random.uniform() > share).collect();
+            let found = dated(log.clone(), None);
+            assert_eq!(worst(&found.t_s, log.into_iter()), 0.0, "{share}");
+        }
+    }
+
     #[test]
     fn packets_of_twenty_are_spread_wherever_the_first_begins() {
         for (each, skipped) in (15..25).flat_map(|each| [0, 7, 12].map(|skipped| (each, skipped))) {

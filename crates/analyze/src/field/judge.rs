@@ -574,7 +574,7 @@ fn cycles_hz(inputs: &Inputs, window: Window) -> Option<f64> {
             inputs.phase_t_s.get(first..=last)?,
             phase.get(first..=last)?,
         );
-        let phase = Turns::of(t_s, phase).straightened(phase);
+        let phase = Turns::of(t_s, phase).straightened(t_s, phase);
         Some((phase.last()? - phase.first()?) / TAU / went_s)
     };
     let all: Vec<f64> = inputs.phase_rad.iter().map(went).collect::<Option<_>>()?;

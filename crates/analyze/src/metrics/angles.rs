@@ -1,8 +1,9 @@
 //! How far it leans: root mean squares of the angles, and the time spent far over.
 
 use super::{Context, Value};
-use crate::phase::continuous;
+use crate::phase::{continuous, wrap};
 use crate::summary::ends;
+use std::f64::consts::FRAC_PI_2;
 
 /// |roll| beyond which a sample counts as excess (deg).
 const EXCESS_DEG: f64 = 15.0;
@@ -17,18 +18,18 @@ fn rms_deg(x: &[f64]) -> Value {
 }
 
 /// That of an angle that is wrapped, with a word where it goes through more than `most_deg`, as `what` does.
+///
+/// Only where the samples show which way it goes: seldom ones do not, nor do those near ±90° of pitch, where roll and heading leap by half a turn.
 fn rms_of_sway(x: &[f64], what: &str, most_deg: f64) -> Value {
     let [low, high] = ends(&continuous(x));
     let turned_deg = (high - low).to_degrees();
-    let turns = turned_deg > most_deg;
-    Value {
-        reason: turns.then(|| {
-            format!(
-                "{what} goes through {turned_deg:.0}°: about zero that says nothing of how it sways"
-            )
-        }),
-        ..rms_deg(x)
-    }
+    let is_seen = x.windows(2).all(|w| wrap(w[1] - w[0]).abs() < FRAC_PI_2);
+    let turns = is_seen && turned_deg > most_deg;
+    rms_deg(x).remark(turns.then(|| {
+        format!(
+            "{what} goes through {turned_deg:.0}°: about zero that says nothing of how it sways"
+        )
+    }))
 }
 
 /// A roll that goes through more than a turn rolls over (deg).
@@ -86,5 +87,7 @@ mod tests {
         assert_eq!(said("rms_roll_deg", 6.2), None);
         let roll = said("rms_roll_deg", 12.6).unwrap();
         assert!(roll.contains("the roll goes through 722°"), "{roll}");
+        // Half a turn and more to a sample: nobody knows which way.
+        assert_eq!(said("rms_roll_deg", 60.0 * 30.0 * 3.5), None);
     }
 }

@@ -2,10 +2,11 @@
 
 use super::contact::mean;
 use super::{Context, Value};
+use crate::beat::adler::turns::{FOLDED, Turns};
 use crate::beat::adler::{Adler, VAGUE_RAD_PER_S};
 use crate::beat::lock::RATIOS;
 use crate::inputs::between;
-use crate::phase::{Circular, circular, continuous, hilbert, relative_phase, unwrap};
+use crate::phase::{Circular, circular, hilbert, relative_phase, unwrap};
 use std::f64::consts::TAU;
 
 /// A relative phase of this resultant or more stays.
@@ -199,12 +200,22 @@ pub fn roll_lock(c: &Context) -> Value {
     let inside = roll.t_s.partition_point(|t| *t < from)..roll.t_s.partition_point(|t| *t <= to);
     let phi = unwrap(&phase[inside.clone()]);
     // Where the beat pauses there is nothing to be in step with.
-    let psi = between(&times, &continuous(&beat), &roll.t_s[inside]);
+    let turns = Turns::of(&times, &beat);
+    if turns.folded() {
+        return Value::missing(FOLDED);
+    }
+    let straight = turns.straightened(&times, &beat);
+    let psi = between(&times, &straight, &roll.t_s[inside]);
     let (phi, psi): (Vec<f64>, Vec<f64>) = phi
         .into_iter()
         .zip(psi)
         .filter(|(_, psi)| psi.is_finite())
         .unzip();
+    if phi.len() as f64 * roll.step_s().unwrap_or(0.0) < SHORTEST_S {
+        return Value::missing(format!(
+            "a beat sounds for less than {SHORTEST_S} s of the roll"
+        ));
+    }
     let firm = |p: u32, q: u32| {
         relative_phase(&phi, &psi, p.into(), q.into()).map_or(0.0, |found| found.resultant)
     };
@@ -253,6 +264,47 @@ mod tests {
             t_s,
             ..Inputs::default()
         }
+    }
+
+    /// A beat of 2 Hz and a roll at half of it, seen too seldom, or for too short between pauses; and one that begins again behind a pause.
+    #[test]
+    fn what_is_seen_too_seldom_or_too_briefly_is_locked_to_nothing() {
+        let of = |rate_hz: f64, sounds: fn(f64) -> bool, anew_s: f64| {
+            let t_s: Vec<f64> = (0..(60.0 * rate_hz) as u32)
+                .map(|k| f64::from(k) / rate_hz)
+                .collect();
+            let psi = |t: f64| TAU * 2.0 * if t < anew_s { t } else { t - anew_s };
+            let beat = t_s
+                .iter()
+                .map(|t| if sounds(*t) { psi(*t) } else { f64::NAN });
+            let inputs = Inputs {
+                beat_phase_rad: beat.collect(),
+                roll_rad: t_s.iter().map(|t| 0.2 * (TAU * t + 1.0).sin()).collect(),
+                phase_rad: vec![t_s.iter().map(|t| TAU * 2.0 * t).collect()],
+                t_s,
+                ..Inputs::default()
+            };
+            metrics(&inputs, Window::ALL)
+        };
+        let seldom = of(1.7, |_| true, 60.0);
+        for name in ["roll_lock", "roll_peak_hz"] {
+            let found = seldom.get(name).unwrap();
+            let why = found.reason.as_deref().unwrap();
+            assert!(
+                why.contains("too few for a motion at the beat's 2.00 Hz"),
+                "{why}"
+            );
+        }
+        let brief = of(
+            30.0,
+            |t| (10.0..12.5).contains(&t) || (45.0..48.0).contains(&t),
+            60.0,
+        );
+        let why = brief.get("roll_lock").unwrap().reason.clone().unwrap();
+        assert!(why.contains("for less than 8 s"), "{why}");
+        let again = of(4.5, |t| !(30.0..40.0).contains(&t), 40.0);
+        assert_eq!(again.get("roll_lock").unwrap().as_word(), Some("1:2"));
+        assert!((again.number("beat_hz").unwrap() - 2.0).abs() < 1e-9);
     }
 
     #[test]

@@ -12,6 +12,8 @@ use crate::line::{Line, NEAR};
 pub enum Need {
     /// Rotation about the pole.
     Roll,
+    /// The same, often enough for a beat that sounds.
+    RollLine,
     /// Tilt of the pole.
     Pitch,
     /// Heading.
@@ -28,6 +30,8 @@ pub enum Need {
     Phases,
     /// Phase of the beat.
     Beat,
+    /// All carriers' phases at a time at which a beat sounds.
+    PhasesInBeat,
     /// Steps of the carriers.
     Steps,
 }
@@ -249,15 +253,16 @@ impl<'a> Context<'a> {
 
     /// Why the height's line is none, where a beat sounds that is faster than the height's samples can show: what they show instead is an alias.
     pub fn aliased(&self) -> Option<String> {
-        self.aliased.get_or_init(|| self.hides_the_beat()).clone()
+        let height = || self.hides_the_beat("height", self.height());
+        self.aliased.get_or_init(height).clone()
     }
 
-    fn hides_the_beat(&self) -> Option<String> {
+    fn hides_the_beat(&self, what: &str, column: &Series<'_>) -> Option<String> {
         self.missing(Need::Beat).is_none().then_some(())?;
         let beat_hz = super::together::beat_hz(self).as_f64()?;
-        let half_rate_hz = 0.5 / self.height().step_s()?;
+        let half_rate_hz = 0.5 / column.step_s()?;
         (beat_hz > half_rate_hz).then(|| format!(
-            "the height has {:.2} samples per second, too few for a motion at the beat's {beat_hz:.2} Hz: more than {:.2} are needed",
+            "the {what} has {:.2} samples per second, too few for a motion at the beat's {beat_hz:.2} Hz: more than {:.2} are needed",
             2.0 * half_rate_hz,
             2.0 * beat_hz
         ))
@@ -295,6 +300,9 @@ impl<'a> Context<'a> {
         };
         match need {
             Need::Roll => empty(!self.roll().x.is_empty(), "roll"),
+            Need::RollLine => self
+                .missing(Need::Roll)
+                .or_else(|| self.hides_the_beat("roll", self.roll())),
             Need::Pitch => empty(!self.pitch().x.is_empty(), "pitch"),
             Need::Yaw => empty(!self.yaw().x.is_empty(), "yaw"),
             Need::Height => empty(!self.height().x.is_empty(), "height"),
@@ -306,7 +314,11 @@ impl<'a> Context<'a> {
             ),
             Need::Support => empty(!self.forces().is_empty(), "handle forces"),
             Need::Phases => empty(!self.phases().is_empty(), "carriers' phases"),
-            Need::Beat => empty(!self.beat().is_empty(), "beat"),
+            Need::Beat => empty(!self.beat_alone().x.is_empty(), "beat"),
+            Need::PhasesInBeat => empty(
+                !self.beat().is_empty(),
+                "all carriers' phases while a beat sounds",
+            ),
             Need::Steps => empty(true, "carrier's steps"),
         }
     }
@@ -315,13 +327,14 @@ impl<'a> Context<'a> {
     fn has(&self, need: Need) -> bool {
         let i = self.inputs;
         match need {
-            Need::Roll => !i.roll_rad.is_empty(),
+            Need::Roll | Need::RollLine => !i.roll_rad.is_empty(),
             Need::Pitch => !i.pitch_rad.is_empty(),
             Need::Yaw => !i.yaw_rad.is_empty(),
             Need::Height | Need::HeightLine => !i.height().1.is_empty(),
             Need::Forces => !i.normal_n.is_empty(),
             Need::Support => !i.normal_n.is_empty() || !i.support_ratio.is_empty(),
             Need::Phases => !i.phase_rad.is_empty(),
+            Need::PhasesInBeat => self.has(Need::Phases) && self.has(Need::Beat),
             Need::Beat => i.beat_phase_rad.iter().any(|p| p.is_finite()),
             Need::Steps => !i.step_s.is_empty(),
         }
@@ -334,10 +347,10 @@ impl<'a> Context<'a> {
         }
         let s = &self.inputs.sources;
         match need {
-            Need::Roll | Need::Pitch | Need::Yaw => &s.attitude,
+            Need::Roll | Need::RollLine | Need::Pitch | Need::Yaw => &s.attitude,
             Need::Height | Need::HeightLine => &s.height,
             Need::Forces | Need::Support => &s.forces,
-            Need::Phases => &s.phases,
+            Need::Phases | Need::PhasesInBeat => &s.phases,
             Need::Beat => &s.beat,
             Need::Steps => "imu",
         }

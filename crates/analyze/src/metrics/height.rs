@@ -44,10 +44,7 @@ pub fn growth_ratio(c: &Context) -> Value {
         let most = 100.0 * by_cut(n);
         format!("a third of the window holds {n:.1} swings: where they are cut alone changes it by up to {most:.0} %")
     });
-    Value {
-        reason: cut,
-        ..Value::number(last / first)
-    }
+    Value::number(last / first).remark(cut)
 }
 
 /// Share of a growth from which it is worth a word that it hangs on where swings are cut.

@@ -102,6 +102,14 @@ impl Value {
         self
     }
 
+    /// With a remark, where it has a value: else what it says already is why not.
+    pub fn remark(mut self, remark: Option<String>) -> Self {
+        if self.datum != Datum::Missing {
+            self.reason = remark;
+        }
+        self
+    }
+
     /// With another source than its column's.
     pub fn source(mut self, source: impl Into<String>) -> Self {
         self.source = source.into();
@@ -285,7 +293,7 @@ pub const METRICS: &[Metric] = &[
         name: "beat_synchrony",
         unit: "1",
         label: "locking to the beat",
-        needs: &[Need::Phases, Need::Beat],
+        needs: &[Need::Phases, Need::Beat, Need::PhasesInBeat],
         compute: together::beat_synchrony,
         origin: "Lachaux et al. 1999",
         definition: "Mean over carriers of |⟨exp(i(φ_j − ψ))⟩| over the part of W in which a beat sounds; `per` lists the carriers.",
@@ -303,7 +311,7 @@ pub const METRICS: &[Metric] = &[
         name: "beat_lead_deg",
         unit: "deg",
         label: "lead over the beat",
-        needs: &[Need::Phases, Need::Beat],
+        needs: &[Need::Phases, Need::Beat, Need::PhasesInBeat],
         compute: beat::beat_lead_deg,
         origin: "Mardia & Jupp 2000",
         definition: "Circular mean, over the carriers who follow the beat (|⟨exp(i(φ_j − ψ))⟩| ≥ 0.5), of each one's circular mean of φ_j − ψ over the part of W in which a beat sounds, positive ahead of the beat; `per` lists all carriers. Phases that steps tell are counted as a model's: 0 on the way up, a step at −90°.",
@@ -312,7 +320,7 @@ pub const METRICS: &[Metric] = &[
         name: "detuning_rad_per_s",
         unit: "rad/s",
         label: "detuning from the beat",
-        needs: &[Need::Phases, Need::Beat],
+        needs: &[Need::Phases, Need::Beat, Need::PhasesInBeat],
         compute: beat::detuning_rad_per_s,
         origin: "Adler 1946",
         definition: "Δω = ω_j − Ω, what a carrier would do alone less the mean beat: the mean of the carriers, `per` lists them, the reason their 95 % intervals. From all phases about the first beat (60 s before to 90 s after it), whatever W: the most likely ones under Adler's equation with a growing pull.",
@@ -321,7 +329,7 @@ pub const METRICS: &[Metric] = &[
         name: "pull_rad_per_s",
         unit: "rad/s",
         label: "pull of the beat",
-        needs: &[Need::Phases, Need::Beat],
+        needs: &[Need::Phases, Need::Beat, Need::PhasesInBeat],
         compute: beat::pull_rad_per_s,
         origin: "Adler 1946",
         definition: "K of Adler's equation φ̇_j = ω_j + K m(t) sin(ψ + Δ_j − φ_j) + noise, m(t) = 1 − exp(−(t − t₀)/τ) from the first beat t₀ on: as implied by how carriers come to the beat or slip past it, from the same phases as the detuning, with what carriers do to each other beside it. No value where any stronger pull explains them too; the reason gives the bound.",
@@ -330,7 +338,7 @@ pub const METRICS: &[Metric] = &[
         name: "coupling_rad_per_s",
         unit: "rad/s",
         label: "coupling of carriers",
-        needs: &[Need::Phases, Need::Beat],
+        needs: &[Need::Phases, Need::Beat, Need::PhasesInBeat],
         compute: beat::coupling_rad_per_s,
         origin: "Kuramoto 1975",
         definition: "K_c of φ̇_j = … + (K_c/N) Σ_k sin(φ_k − φ_j): how strongly carriers mind each other, everybody everybody alike, found together with the pull. No value where its 95 % interval reaches farther than 1 rad/s to either side; the reason gives it.",
@@ -339,7 +347,7 @@ pub const METRICS: &[Metric] = &[
         name: "captured",
         unit: "bool",
         label: "captured by the beat",
-        needs: &[Need::Phases, Need::Beat],
+        needs: &[Need::Phases, Need::Beat, Need::PhasesInBeat],
         compute: beat::captured,
         origin: "Adler 1946",
         definition: "Whether every carrier stays with the beat over the part of W in which it sounds: |⟨exp(i(φ_j − ψ))⟩| ≥ 0.9, no turn of φ_j − ψ, and, where detuning and pull are known, inside the capture range, |Δω| ≤ K.",
@@ -348,7 +356,7 @@ pub const METRICS: &[Metric] = &[
         name: "roll_lock",
         unit: "-",
         label: "roll to beat",
-        needs: &[Need::Roll, Need::Beat],
+        needs: &[Need::Roll, Need::Beat, Need::RollLine],
         compute: beat::roll_lock,
         origin: "Tass et al. 1998",
         definition: "The ratio q:p of 1:1, 1:2, 2:1, 2:3, 3:2 cycles of roll to cycles of the beat that holds most firmly over W, by |⟨exp(i(pφ − qψ))⟩| with φ from the analytic signal of the roll, 2 s left out at both ends; `none` below 0.9, no value below 8 s. The reason gives all of them.",
@@ -438,16 +446,16 @@ pub const METRICS: &[Metric] = &[
         name: "roll_peak_hz",
         unit: "Hz",
         label: "roll, strongest line",
-        needs: &[Need::Roll],
+        needs: &[Need::RollLine],
         compute: lines::roll_peak_hz,
         origin: "as peak_hz",
-        definition: "Frequency of the largest magnitude of the unwindowed real Fourier transform of the roll about its mean over W.",
+        definition: "Frequency of the largest magnitude of the unwindowed real Fourier transform of the roll about its mean over W; none, and nothing that rests on it, where a beat sounds at more than half the roll's sampling rate.",
     },
     Metric {
         name: "subharmonic_ratio",
         unit: "1",
         label: "roll power, f/2 over f",
-        needs: &[Need::Roll, Need::HeightLine],
+        needs: &[Need::Roll, Need::HeightLine, Need::RollLine],
         compute: lines::subharmonic_ratio,
         origin: "docs/metrics.md",
         definition: "Roll power within 0.1·f of f/2 over roll power within 0.1·f of f, f = peak_hz; from a Hann-tapered periodogram of W, which has to hold 20 periods of f.",

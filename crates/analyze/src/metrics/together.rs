@@ -4,10 +4,9 @@ use super::beat::carriers;
 use super::contact::mean;
 use super::{Context, Value};
 use crate::beat::adler::turns::{FOLDED, Turns};
-use crate::inputs::stretches;
+use crate::inputs::{mean_step_s, stretches};
 use crate::phase;
 use crate::steps::rate_of;
-use crate::summary::ends;
 use std::f64::consts::TAU;
 
 /// How many surrogates the chance level of measured phases is made from.
@@ -15,29 +14,36 @@ const SURROGATES: usize = 400;
 
 const ALONE: &str = "one carrier alone is always in step";
 
-/// A phase that moves less than this all the window long stands still (rad).
+/// A phase that is always so near to its mean stands still (rad).
 const STILL_RAD: f64 = 0.01;
+/// So long nobody who walks stands still, and seldomer nobody sees a step (s).
+const STILL_S: f64 = 2.0;
+const SEEN_S: f64 = 0.25;
 
-/// Whoever stands still is in step with all others who do, whatever they would do when they walk.
-fn standing(phases: &[&[f64]]) -> Option<String> {
+/// Whoever stands still keeps step with all others who do, whatever they would do when they walk.
+fn standing(t_s: &[f64], phases: &[&[f64]]) -> Option<String> {
+    let span_s = t_s.last()? - t_s[0];
+    if span_s < STILL_S || mean_step_s(t_s)? > SEEN_S {
+        return None;
+    }
     let still = |x: &&&[f64]| {
-        let [low, high] = ends(x);
-        high - low < STILL_RAD
+        let mean = phase::circular(x.iter().copied()).map_or(f64::NAN, |all| all.mean_rad);
+        x.iter().all(|x| phase::wrap(x - mean).abs() < STILL_RAD)
     };
     let count = phases.iter().filter(still).count();
     (count > 1).then(|| {
         let of = phases.len();
-        format!("the phases of {count} of {of} carriers stand still: that these are in step says nothing")
+        format!(
+            "the phases of {count} of {of} carriers stand still: how these keep step says nothing"
+        )
     })
 }
 
 pub fn synchrony(c: &Context) -> Value {
     match &c.phases().slices()[..] {
         [_] => Value::missing(ALONE),
-        phases => Value {
-            reason: standing(phases),
-            ..Value::number(mean(&phase::order_parameter(phases)))
-        },
+        phases => Value::number(mean(&phase::order_parameter(phases)))
+            .remark(standing(&c.phases().t_s, phases)),
     }
 }
 
@@ -88,16 +94,14 @@ pub fn step_rate_hz(c: &Context) -> Value {
 }
 
 pub fn plv(c: &Context) -> Value {
-    let phases = c.phases();
-    let phases = phases.slices();
+    let (t_s, phases) = (&c.phases().t_s, c.phases().slices());
     let per = phase::locking(&phases);
     if per.is_empty() {
         return Value::missing("a pair needs two carriers");
     }
-    Value {
-        reason: standing(&phases),
-        ..Value::number(mean(&per)).per(per)
-    }
+    Value::number(mean(&per))
+        .per(per)
+        .remark(standing(t_s, &phases))
 }
 
 pub fn beat_synchrony(c: &Context) -> Value {
@@ -130,8 +134,9 @@ pub fn beat_hz(c: &Context) -> Value {
 mod tests {
     use crate::inputs::{Inputs, Window};
     use crate::metrics::metrics;
+    use crate::phase;
     use crate::random::Random;
-    use std::f64::consts::TAU;
+    use std::f64::consts::{PI, TAU};
 
     /// p of the synchrony of two carriers found from steps, whose tempo wanders alike or each by itself.
     fn p_value(together: bool, seed: u64) -> f64 {
@@ -174,21 +179,32 @@ mod tests {
     #[test]
     fn who_stands_still_is_in_step_for_nothing() {
         let walks = |hz: f64| (0..300).map(move |k| TAU * hz * f64::from(k) / 30.0);
-        let stands = || vec![0.3; 300];
-        let said = |phase_rad: Vec<Vec<f64>>| {
+        // About half a turn, which is wrapped to and fro.
+        let stands = || {
+            (0..300)
+                .map(|k| phase::wrap(PI + 1e-3 * f64::from(k % 3 - 1)))
+                .collect()
+        };
+        let said = |phases: &[Vec<f64>; 3], rate_hz: f64| {
+            let samples = 0..phases[0].len() as u32;
             let inputs = Inputs {
-                phase_t_s: (0..300).map(|k| f64::from(k) / 30.0).collect(),
-                phase_rad,
+                phase_t_s: samples.map(|k| f64::from(k) / rate_hz).collect(),
+                phase_rad: phases.to_vec(),
                 ..Inputs::default()
             };
             let found = metrics(&inputs, Window::ALL);
             ["synchrony", "plv"].map(|name| found.get(name).unwrap().reason.clone())
         };
-        for reason in said(vec![stands(), walks(2.0).collect(), stands()]) {
+        let two = [stands(), walks(2.0).collect(), stands()];
+        for reason in said(&two, 30.0) {
             assert!(reason.unwrap().starts_with("the phases of 2 of 3 carriers"));
         }
-        let one = said(vec![stands(), walks(2.0).collect(), walks(2.0).collect()]);
-        assert_eq!(one, [None, None]);
+        let one = [stands(), walks(2.0).collect(), walks(2.0).collect()];
+        assert_eq!(said(&one, 30.0), [None, None]);
+        // Who is seen once a second, or for a second, may walk all the same.
+        assert_eq!(said(&two, 1.0), [None, None]);
+        let brief = two.map(|x: Vec<f64>| x[..30].to_vec());
+        assert_eq!(said(&brief, 30.0), [None, None]);
     }
 
     #[test]
@@ -218,7 +234,7 @@ mod tests {
         let t_s: Vec<f64> = (0..120).map(|k| f64::from(k) / rate_hz).collect();
         let phase = t_s.iter().map(|t| TAU * 2.1507 * t);
         let beat_phase_rad = match wrapped {
-            true => phase.map(crate::phase::wrap).collect(),
+            true => phase.map(phase::wrap).collect(),
             false => phase.collect(),
         };
         let inputs = Inputs {

@@ -35,10 +35,10 @@ pub fn csv(analyses: &[Analysis]) -> String {
     out
 }
 
-/// A cell by RFC 4180; one that a spreadsheet would run as a formula gets a leading apostrophe, unless it is a number.
+/// A cell by RFC 4180; one that a spreadsheet would run as a formula gets a leading apostrophe, unless it is of numbers.
 pub fn quoted(cell: &str) -> String {
-    let formula =
-        cell.starts_with(['=', '+', '-', '@']) && cell.parse::<f64>().is_err() && cell.len() > 1;
+    let numbers = cell.split(' ').all(|part| part.parse::<f64>().is_ok());
+    let formula = cell.starts_with(['=', '+', '-', '@']) && !numbers && cell.len() > 1;
     let cell = if formula {
         format!("'{cell}")
     } else {
@@ -58,6 +58,8 @@ mod tests {
     fn cells_are_quoted_where_they_have_to_be() {
         for (cell, expected) in [
             ("a", "a"),
+            ("-34.4 -20.6", "-34.4 -20.6"),
+            ("-1 x", "'-1 x"),
             ("a,b", "\"a,b\""),
             ("say \"x\"", "\"say \"\"x\"\"\""),
             ("=cmd()", "'=cmd()"),

@@ -107,6 +107,10 @@ fn eight(x: f64) -> String {
     let text = figures(x);
     match text.contains('e') {
         true => format!("{x:.1e}"),
-        false => text.chars().take(7).collect(),
+        false if text.len() <= 7 => text,
+        false => {
+            let whole = text.find('.').unwrap_or(text.len());
+            format!("{x:.*}", 6usize.saturating_sub(whole))
+        }
     }
 }

@@ -48,6 +48,12 @@ const SLIPPING: Case = Case {
 const OFFSET_RAD: f64 = 0.4;
 
 fn found(case: &Case, seed: u64) -> Adler {
+    let (t_s, phases, beat) = walked(case, seed);
+    adler(&t_s, &[&phases[0], &phases[1]], &beat, case.error > 0.0).unwrap()
+}
+
+/// Times, wrapped phases, and the beat's phase, unwrapped.
+fn walked(case: &Case, seed: u64) -> (Vec<f64>, [Vec<f64>; 2], Vec<f64>) {
     let (mut random, dt, omega) = (Random(7919 * seed), 2e-3, TAU * 2.15);
     // Exact phases come at 30 Hz (every 16 or 17 steps of these), measured ones at 100 Hz.
     let every = if case.error > 0.0 { 5 } else { 17 };
@@ -95,7 +101,7 @@ fn found(case: &Case, seed: u64) -> Adler {
             *x = (*x + omega * t).rem_euclid(TAU);
         }
     }
-    adler(&t_s, &[&seen[0], &seen[1]], &beat, measured).unwrap()
+    (t_s, seen, beat)
 }
 
 #[test]
@@ -210,6 +216,37 @@ fn a_pause_soon_after_the_beginning_does_not_hide_the_pull() {
         let [pull, detuning, open] = coverage(Case { silent_s, ..MUSIC }, 10);
         assert!(pull >= 0.8 && detuning >= 0.8, "{silent_s:?}");
         assert!(open == 0.0, "{silent_s:?}");
+    }
+}
+
+/// Lost messages: within a beat, about its beginning, and so many during its build-up that nobody counts the turns.
+#[test]
+fn lost_messages_neither_hide_a_pull_nor_make_one() {
+    let (t_s, phases, beat) = walked(&MUSIC, 1);
+    for (from_s, to_s) in [
+        (20.0, 20.3),
+        (20.0, 24.5),
+        (4.5, 7.0),
+        (4.0, 9.9),
+        (7.0, 13.0),
+    ] {
+        let kept: Vec<usize> = (0..t_s.len())
+            .filter(|k| !(from_s..to_s).contains(&t_s[*k]))
+            .collect();
+        let pick = |x: &[f64]| -> Vec<f64> { kept.iter().map(|k| x[*k]).collect() };
+        let [one, other] = [0, 1].map(|c| pick(&phases[c]));
+        let beat = pick(&beat);
+        let wrapped = beat.iter().map(|psi| psi.rem_euclid(TAU)).collect();
+        for beat in [beat, wrapped] {
+            let a = adler(&pick(&t_s), &[&one, &other], &beat, false).unwrap();
+            let [low, high] = a.pull_ci95_rad_per_s;
+            let what = format!("{from_s} … {to_s}: {a:?}");
+            assert!(low < 2.7 && 2.7 < high && high - low < 1.0, "{what}");
+            assert!(a.strained().is_none(), "{what}");
+            for (found, known) in a.detuning_rad_per_s.iter().zip(MUSIC.detuning) {
+                assert!((found - known).abs() < 0.03, "{what}");
+            }
+        }
     }
 }
 

@@ -1,9 +1,13 @@
 //! How far a phase turns between its samples.
 
 use crate::beat::tempo::PERIOD_S;
+use crate::inputs::stretches;
 use crate::median::median;
 use crate::phase::{comes_unwrapped, wrap};
 use std::f64::consts::TAU;
+
+/// Over lost messages so long a steady beat's turns are still known, s.
+pub const COUNTED_S: f64 = 5.0;
 
 /// Why a phase that comes wrapped tells no rate.
 pub const FOLDED: &str =
@@ -26,7 +30,13 @@ impl Turns {
             let each = each.map(|(t, x)| (t[1] - t[0], x[1] - x[0]));
             each.filter(|(_, turned)| turned.is_finite())
         };
-        let unwrapped = comes_unwrapped(phase_rad);
+        // One that begins again behind a pause did not fall.
+        let parts = stretches(t_s, 0.0);
+        let apart = parts.into_iter().flat_map(|part| {
+            let known = phase_rad[part].iter().copied();
+            known.chain([f64::NAN])
+        });
+        let unwrapped = comes_unwrapped(&Vec::from_iter(apart));
         let turned = |by: f64| if unwrapped { by } else { wrap(by) };
         let mut rates: Vec<f64> = steps().map(|(dt, by)| turned(by) / dt).collect();
         let mut steps_s: Vec<f64> = steps().map(|(dt, _)| dt).collect();
@@ -46,8 +56,11 @@ impl Turns {
         }
     }
 
-    /// The phase without jumps of whole turns, rad: each sample at its nearest turn to the last, but as it is where it comes unwrapped and none is missing.
-    pub fn straightened(&self, phase_rad: &[f64]) -> Vec<f64> {
+    /// The phase without jumps of whole turns, rad: each sample where the usual rate takes the last one to, to the nearest turn; but as it is where it
+    /// comes unwrapped and none is missing.
+    pub fn straightened(&self, t_s: &[f64], phase_rad: &[f64]) -> Vec<f64> {
+        let rate = Some(self.usual_rad_per_s).filter(|rate| rate.is_finite());
+        let rate = rate.unwrap_or(0.0);
         let mut turns = 0.0;
         let mut last: Option<(usize, f64)> = None;
         let mut out = phase_rad.to_vec();
@@ -55,7 +68,8 @@ impl Turns {
             if let Some((before, y)) = last
                 && !(self.unwrapped && before + 1 == k)
             {
-                turns -= ((*x - y) / TAU).round();
+                let expected = rate * (t_s[k] - t_s[before]);
+                turns -= ((*x - y - expected) / TAU).round();
             }
             last = Some((k, *x));
             *x += turns * TAU;

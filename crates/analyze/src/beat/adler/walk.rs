@@ -1,6 +1,6 @@
 //! Phases and beat about the first beat, on the grid of Adler's equation.
 
-use super::turns::{FOLDED, Turns};
+use super::turns::{COUNTED_S, FOLDED, Turns};
 use super::unknowns::{BUILD_UP, ERROR, NOISE, OFFSET, OWN, PULL, SHARED, place};
 use crate::beat::smooth::smooth;
 use crate::imu::track::period_s;
@@ -8,6 +8,7 @@ use crate::inputs::placed;
 use crate::median::median;
 use nalgebra::{DVector, Matrix3, Vector3};
 use std::f64::consts::TAU;
+use std::ops::Range;
 
 /// Step of the equation, s: short for any pull that is looked for.
 const STEP_S: f64 = 0.2;
@@ -31,10 +32,10 @@ const ENDS_S: f64 = 2.0;
 /// the archive's carriers, and a twin's detector errs by about as much.
 const LEAST: [f64; 2] = [5e-4, 5e-4];
 const LEAST_MEASURED: [f64; 2] = [0.01, 0.01];
-/// Over lost messages so long a steady beat's turns are still known, s.
-const COUNTED_S: f64 = 5.0;
 /// A pull that overshoots nothing, rad/s.
 const MODERATE: f64 = 2.0;
+/// A step so many times as long as usual is of messages that were lost.
+const LOST: f64 = 1.5;
 /// Times so near to each other are the same, in steps.
 const ROUNDING: f64 = 1e-6;
 /// Fewer phases say nothing.
@@ -157,7 +158,7 @@ impl Walk {
         if beat_rad.len() != n || phase_rad.iter().any(|p| p.len() != n) {
             return Err("no beat");
         }
-        let onset = onset(t_s, beat_rad)?;
+        let onset = onset(t_s, beat_rad, |_| false)?;
         let from = t_s.partition_point(|t| *t < t_s[onset] - BEFORE_S);
         let to = t_s.partition_point(|t| *t <= t_s[onset] + AFTER_S);
         let first_heard = !beat_rad[..onset].iter().any(|b| b.is_finite());
@@ -166,7 +167,7 @@ impl Walk {
             let turns = Turns::of(t_s, &x[from..to]);
             match turns.folded() {
                 true => Err(FOLDED),
-                false => Ok((turns.straightened(&x[from..to]), turns)),
+                false => Ok((turns.straightened(t_s, &x[from..to]), turns)),
             }
         };
         let (beat, turns) = cut(beat_rad)?;
@@ -184,12 +185,23 @@ impl Walk {
             true => 0,
             false => parts as usize,
         };
-        if parts == 1.0 && t_s.windows(2).all(|t| t[1] - t[0] <= 1.5 * step_s) {
-            return Walk::on(t_s, &phases, beat, measured, first_heard, unheard).map(seen);
+        if parts == 1.0 && t_s.windows(2).all(|t| t[1] - t[0] <= LOST * step_s) {
+            let played = Played {
+                beat,
+                lost: vec![false; t_s.len()],
+            };
+            return Walk::on(t_s, &phases, played, measured, first_heard, unheard).map(seen);
         }
         if (t_s[t_s.len() - 1] - t_s[0]) / step_s + 1.0 > 2.0 * t_s.len() as f64 {
             return Err(TOO_LITTLE);
         }
+        // Nor does anybody know where in messages that were lost.
+        let before_s = t_s[onset - from] - t_s[(onset - from).saturating_sub(1)];
+        let unheard = match before_s > LOST * step_s {
+            true => (before_s / step_s * parts).ceil() as usize,
+            false => unheard,
+        };
+        let longest_s = LOST * step_s;
         let step_s = step_s / parts;
         let phases: Vec<Vec<f64>> = phases
             .iter()
@@ -197,24 +209,25 @@ impl Walk {
             .collect();
         let places = phases.first().map_or(0, Vec::len);
         let even: Vec<f64> = (0..places).map(|k| t_s[0] + k as f64 * step_s).collect();
-        let beat = played_on(t_s, &beat, &turns, &even);
-        Walk::on(&even, &phases, beat, measured, first_heard, unheard).map(seen)
+        let played = Played::on(t_s, &beat, &turns, longest_s, &even);
+        Walk::on(&even, &phases, played, measured, first_heard, unheard).map(seen)
     }
 
     /// On an even axis; phases straightened; over so many of its steps before the first beat nobody knows whether it sounds.
     fn on(
         t_s: &[f64],
         phase_rad: &[Vec<f64>],
-        beat_rad: Vec<f64>,
+        played: Played,
         measured: bool,
         first_heard: bool,
         unheard: usize,
     ) -> Result<Self, &'static str> {
-        let onset = onset(t_s, &beat_rad)?;
+        let beat_rad = &played.beat;
+        let onset = onset(t_s, beat_rad, |k| played.lost[k])?;
         let step_s = period_s(t_s).ok_or(TOO_LITTLE)?;
         let longest_s = match measured {
             true => STEP_S,
-            false => STEP_S.min(SLIP_RAD / fastest_slip_rad_per_s(t_s, phase_rad, &beat_rad)),
+            false => STEP_S.min(SLIP_RAD / fastest_slip_rad_per_s(t_s, phase_rad, beat_rad)),
         };
         let hop = (longest_s / step_s).round().max(1.0) as usize;
         let first = onset % hop;
@@ -225,9 +238,10 @@ impl Walk {
         let sounds: Vec<Option<bool>> = (first..t_s.len().saturating_sub(hop))
             .step_by(hop)
             .map(|k| match k < onset {
-                true => sounding(&beat_rad[k..onset.min(k + hop + 1)])
+                true => played
+                    .sounding(k..onset.min(k + hop + 1))
                     .filter(|sounds| !sounds && onset - k >= hop + unheard),
-                false => sounding(&beat_rad[k..=k + hop]),
+                false => played.sounding(k..k + hop + 1),
             })
             .collect();
         let silent_to_s = -(unheard as f64 - 0.5) * step_s;
@@ -254,7 +268,7 @@ impl Walk {
             begins,
             fresh: begins && first_heard,
             unheard_s: match measured {
-                true => TAU / omega_rad_per_s,
+                true => (TAU / omega_rad_per_s).max(unheard as f64 * step_s),
                 false => unheard as f64 * step_s,
             },
             before_s: -latest.min(0.0),
@@ -370,10 +384,14 @@ impl Walk {
     }
 }
 
-/// Where a beat begins that lasts.
-fn onset(t_s: &[f64], beat_rad: &[f64]) -> Result<usize, &'static str> {
+/// Where a beat begins that lasts, as far as anybody knows who did not hear it where it is `lost`.
+fn onset(
+    t_s: &[f64],
+    beat_rad: &[f64],
+    lost: impl Fn(usize) -> bool,
+) -> Result<usize, &'static str> {
     let mut begun: Option<usize> = None;
-    for (k, psi) in beat_rad.iter().enumerate() {
+    for (k, psi) in beat_rad.iter().enumerate().filter(|(k, _)| !lost(*k)) {
         match (begun, psi.is_finite()) {
             (_, false) => begun = None,
             (None, true) => begun = Some(k),
@@ -406,13 +424,6 @@ fn mean_rate(t_s: &[f64], phase_rad: &[f64]) -> f64 {
     turned / seen_s
 }
 
-/// Whether a beat sounds at all samples or at none; `None` if only at some.
-fn sounding(beat_rad: &[f64]) -> Option<bool> {
-    let sounds = beat_rad.first().is_some_and(|psi| psi.is_finite());
-    let alike = |psi: &f64| psi.is_finite() == sounds;
-    beat_rad.iter().all(alike).then_some(sounds)
-}
-
 /// Recorded phases and the beat's share a message, and what it comes late by: the beat's phase off its slow course tells that.
 fn dated_by_the_beat(t_s: &[f64], beat: &mut [f64], phase: &mut [Vec<f64>]) {
     let mut start = 0;
@@ -431,28 +442,50 @@ fn dated_by_the_beat(t_s: &[f64], beat: &mut [f64], phase: &mut [Vec<f64>]) {
     }
 }
 
-/// The beat's phase on an even axis, rad: through messages that were lost between two of a beat it goes on at its usual rate, to the nearest
-/// turn, where it comes wrapped. NaN where none sounds, and in holes longer than [`COUNTED_S`].
-fn played_on(t_s: &[f64], beat_rad: &[f64], turns: &Turns, even: &[f64]) -> Vec<f64> {
-    let mut out = vec![f64::NAN; even.len()];
-    let mut k = 0;
-    for (t, b) in t_s.windows(2).zip(beat_rad.windows(2)) {
-        let width = t[1] - t[0];
-        let turned = turns.over(width, b[1] - b[0]);
-        while k < even.len() && even[k] <= t[1] {
-            let share = (even[k] - t[0]) / width;
-            // At a sample it is that sample, also where there is none beside it.
-            if share < ROUNDING {
-                out[k] = b[0];
-            } else if share > 1.0 - ROUNDING {
-                out[k] = b[1];
-            } else if width <= COUNTED_S {
-                out[k] = b[0] + share * turned;
+/// The beat on an even axis.
+struct Played {
+    /// Its phase, rad; NaN where none sounds, and in holes longer than [`COUNTED_S`].
+    beat: Vec<f64>,
+    /// Where messages were lost that would have told whether one sounds.
+    lost: Vec<bool>,
+}
+
+impl Played {
+    /// Through messages that were lost between two of a beat it goes on at its usual rate, to the nearest turn, where it comes wrapped. Steps longer
+    /// than `longest_s` lost some: what is so long that turns are not counted, or between a beat and none, may have been either.
+    fn on(t_s: &[f64], beat_rad: &[f64], turns: &Turns, longest_s: f64, even: &[f64]) -> Self {
+        let mut beat = vec![f64::NAN; even.len()];
+        let mut lost = vec![false; even.len()];
+        let mut k = 0;
+        for (t, b) in t_s.windows(2).zip(beat_rad.windows(2)) {
+            let width = t[1] - t[0];
+            let turned = turns.over(width, b[1] - b[0]);
+            let goes_on = b[0].is_finite() == b[1].is_finite() && width <= COUNTED_S;
+            while k < even.len() && even[k] <= t[1] {
+                let share = (even[k] - t[0]) / width;
+                // At a sample it is that sample, also where there is none beside it.
+                if share < ROUNDING {
+                    beat[k] = b[0];
+                } else if share > 1.0 - ROUNDING {
+                    beat[k] = b[1];
+                } else if goes_on {
+                    beat[k] = b[0] + share * turned;
+                } else {
+                    lost[k] = width > longest_s;
+                }
+                k += 1;
             }
-            k += 1;
         }
+        Played { beat, lost }
     }
-    out
+
+    /// Whether a beat sounds at all of some samples or at none; `None` if only at some, or if nobody knows.
+    fn sounding(&self, samples: Range<usize>) -> Option<bool> {
+        let (beat, lost) = (&self.beat[samples.clone()], &self.lost[samples]);
+        let sounds = beat.first().is_some_and(|psi| psi.is_finite());
+        let alike = beat.iter().all(|psi| psi.is_finite() == sounds);
+        (alike && !lost.contains(&true)).then_some(sounds)
+    }
 }
 
 /// A measured phase in the middle of each window, at the step on which the window ends; NaN between them and near the phase's ends.
