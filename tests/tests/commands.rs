@@ -331,7 +331,7 @@ fn a_motion_that_nobody_carries_is_said() {
             "body.gravity_m_per_s2=[0,0,9.81]",
             "no handle ever met its shoulder",
         ),
-        ("body.mass_kg=60000", "m below its shoulders"),
+        ("body.mass_kg=60000", "m below their shoulders"),
         (
             "effects.contact=false",
             "without effects.contact nobody carries it",

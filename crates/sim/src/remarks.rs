@@ -77,9 +77,9 @@ impl Remarks {
     /// Takes the next sample.
     pub fn look(&mut self, sample: &Sample) {
         let t_s = sample.t_s;
-        let mut shoulders_m = 0.0;
+        let mut up_m = 0.0;
         for (i, (handle, shoulder)) in sample.handle_m.iter().zip(&sample.shoulder_m).enumerate() {
-            shoulders_m += shoulder[2] / sample.shoulder_m.len() as f64;
+            up_m += (handle[2] - shoulder[2]) / sample.shoulder_m.len() as f64;
             let normal_n = sample.normal_n[i];
             if normal_n > 0.0 {
                 self.untouched = false;
@@ -90,7 +90,6 @@ impl Remarks {
             self.force_n.look(i + 1, normal_n, t_s);
         }
         if !sample.shoulder_m.is_empty() {
-            let up_m = sample.pose.position_m[2] - shoulders_m;
             self.above_m.look(1, up_m, t_s);
             self.below_m.look(1, -up_m, t_s);
         }
@@ -117,7 +116,7 @@ impl Remarks {
                 None => "without effects.contact nobody carries it",
             };
             said.push(format!(
-                "the load was {} m {where_to} its shoulders at {t_s:.1} s: {why}",
+                "the load's handles were {} m {where_to} their shoulders at {t_s:.1} s: {why}",
                 short(value)
             ));
         }
@@ -139,6 +138,9 @@ impl Remarks {
                     "farther than its strap is long; `effects.sling` holds for small swings: give it more damping_s, or the contact more damping"
                 }
                 Some(_) => "the straps of `effects.sling` let it",
+                None if scene.effects.hold.is_some() || scene.effects.friction.is_some() => {
+                    "what keeps it there (`effects.hold`, `friction`) lets it go so far"
+                }
                 None => {
                     "contact asks for height alone; `effects.hold`, `friction` or `sling` keep a load with its carriers"
                 }
