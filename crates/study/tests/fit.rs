@@ -215,6 +215,23 @@ fn nothing_is_fitted_across_a_hole() {
     assert!(reason(&found, "pull").contains("no pull shows"));
 }
 
+/// A sample that is lost now and then makes no step of the others longer.
+#[test]
+fn single_lost_samples_move_nothing() {
+    let field = field_of(&scene_of("music solver.tolerance=1e-6"));
+    let left = only(&field, |k, _| k % 300 != 117);
+    let whole = fit(&field, analyze::Window::from(15.0));
+    let found = fit(&left, analyze::Window::from(15.0));
+    let damping = find(&found, "damping");
+    assert!((damping.value - 400.0).abs() < 0.5, "{damping:?}");
+    assert!(
+        damping.interval[1] - damping.interval[0] < 1.5,
+        "{damping:?}"
+    );
+    let (a, b) = (find(&whole, "pendulum"), find(&found, "pendulum"));
+    assert!((a.value / b.value - 1.0).abs() < 2e-3, "{a:?} {b:?}");
+}
+
 /// Noise is drawn at 30 Hz: at other rates neighbouring increments share some of it.
 #[test]
 fn the_recorder_s_rate_does_not_decide_whether_there_is_a_pull() {

@@ -60,7 +60,7 @@ pub fn run(args: &Args) -> Result<Input> {
         let known = given.as_ref().or(told.scene.as_ref());
         let scene = known.unwrap_or(&usual);
         (field.onset_s, field.build_up_s) = match &scene.effects.music {
-            Some(music) => (music.onset_s, music.build_up_s),
+            Some(music) => (music.onset_s + told.zero_s, music.build_up_s),
             None => (0.0, 0.0),
         };
         let coupling = scene.effects.coupling.as_ref();

@@ -107,7 +107,7 @@ pub fn run() -> ExitCode {
             words.insert(1, "run".into());
         } else if let Some(message) = unknown(&first) {
             recording::note!("study: {message}");
-            return ExitCode::from(1);
+            return ExitCode::from(2);
         }
     }
     let whole = |()| Input::Whole;

@@ -3,7 +3,7 @@
 use super::squares::{Block, bootstrapped, jackknifed, solve, unexplained, whoever_errs};
 use super::{BLOCK_S, CARRIES, EDGE, Field, Outcome, budgeted, even, pair};
 use analyze::imu::budget::Budget;
-use analyze::inputs::{Inputs, Window, about_mean, between, drawn, mean_step_s};
+use analyze::inputs::{Inputs, Window, about_mean, between, drawn, mean_step_in, mean_step_s};
 use analyze::mechanism::fit_roll;
 use analyze::spectrum::{Options, welch};
 use analyze::spline::spline_derivatives;
@@ -48,8 +48,9 @@ pub(super) fn contact(field: &Field) -> Result<Vec<Outcome>, String> {
     if field.compression_m.is_empty() || i.normal_n.len() != field.compression_m.len() {
         return Err("the compression of the handles is not recorded".into());
     }
-    let step_s = mean_step_s(i.force_times()).ok_or("no forces")?;
     let parts = even(i.force_times());
+    // Of the samples that follow each other: a lost one makes no step of theirs longer.
+    let step_s = mean_step_in(i.force_times(), &parts).ok_or("no forces")?;
     // Of every `skip`-th sample: sums over blocks, all handles together.
     let sums = |skip: usize| {
         let step_s = step_s * skip as f64;
@@ -291,7 +292,8 @@ pub(super) fn pendulum(field: &Field, window: Window) -> Result<Vec<Outcome>, St
     let (t_s, roll, total) = roll_and_load(&field.inputs)?;
     let range = window.range(&t_s);
     let t_s = &t_s[range.clone()];
-    let step_s = mean_step_s(t_s).ok_or("no samples in the window")?;
+    let parts = even(t_s);
+    let step_s = mean_step_in(t_s, &parts).ok_or("no samples in the window")?;
     let (roll, total) = (&roll[range.clone()], &total[range]);
     if roll.iter().chain(total).any(|x| !x.is_finite()) {
         return Err("roll or forces have gaps".into());
@@ -305,7 +307,6 @@ pub(super) fn pendulum(field: &Field, window: Window) -> Result<Vec<Outcome>, St
     let roll_hz = roll_hz
         .filter(|hz| *hz > 0.0)
         .ok_or("the roll does not move")?;
-    let parts = even(t_s);
     // Of every `skip`-th sample of each part.
     let blocks = |skip: usize| {
         let step_s = step_s * skip as f64;

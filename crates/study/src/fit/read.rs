@@ -20,6 +20,8 @@ pub struct Told {
     pub window: Window,
     /// The scene that it was made from, where one is attached.
     pub scene: Option<Scene>,
+    /// Where its scene's time 0 lies after its first message, s.
+    pub zero_s: f64,
     /// What is lost, where it is damaged: one sentence.
     pub damage: Option<String>,
     /// How the clocks of sensors differ, where that is not put right but by motion, or not known.
@@ -86,6 +88,14 @@ impl Field {
                 "{name}: nothing in it moves: no state and no inertial sensor was found"
             ));
         }
+        // Whoever writes states and phases says when they were, in the time of their scene.
+        let start_ns = recording.info().start_ns;
+        let own_time = |path: &str| path.ends_with(".time_s");
+        let (own_times, _) = recording.signals(&own_time)?;
+        let zero_s = (["/rath/state.time_s", "/rath/phases.time_s"].iter())
+            .filter_map(|path| own_times.iter().find(|signal| signal.path == *path))
+            .filter_map(|s| Some(s.times_s(start_ns).first()? - s.values.first()?))
+            .find(|zero_s| zero_s.is_finite());
         let scene = recording
             .attachment("scene.toml")
             .and_then(|text| String::from_utf8(text).ok())
@@ -121,6 +131,7 @@ impl Field {
         let told = Told {
             window: analysis.window,
             scene,
+            zero_s: zero_s.unwrap_or(0.0),
             damage: analysis.damage(),
             clocks_apart,
         };

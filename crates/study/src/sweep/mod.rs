@@ -215,8 +215,13 @@ impl Plan {
     /// The values of the axes at a point.
     pub fn values(&self, point: u64) -> Vec<toml::Value> {
         let mut values = self.points.values(point);
-        for (value, whole) in values.iter_mut().zip(&self.whole) {
-            *value = as_key(value.clone(), *whole);
+        let axes = self.whole.iter().zip(&self.spec.axes);
+        for (value, (whole, axis)) in values.iter_mut().zip(axes) {
+            let drawn = number(value).filter(|_| *whole && axis.is_sampled());
+            *value = match drawn {
+                Some(x) => toml::Value::Integer(axis.whole(x)),
+                None => as_key(value.clone(), *whole),
+            };
         }
         values
     }
@@ -447,9 +452,15 @@ impl Plan {
         }
         let (columns, stats, outcome) = observe(scene, Some(MOST_EVALUATIONS), &mut keeper);
         // The writer knows best why it stopped a run.
-        let ended = match keeper.recorder.map_or(Ok(()), Recorder::finish) {
-            Ok(()) => outcome.map_err(|e| e.to_string()),
-            Err(error) => Err(of_its_run(&error)?),
+        let failure = keeper.recorder.as_mut().and_then(Recorder::failure);
+        let ended = match (failure, outcome) {
+            (Some(error), _) => Err(of_its_run(&error)?),
+            // As of a run that `sim record` gives up, nothing is kept.
+            (None, Err(stopped)) => Err(stopped.to_string()),
+            (None, Ok(())) => match keeper.recorder.map_or(Ok(()), Recorder::finish) {
+                Ok(()) => Ok(()),
+                Err(error) => Err(of_its_run(&error)?),
+            },
         };
         let measured = self.weigh(scene, &columns, stats, ended);
         Ok(match unwatched && keeper.doubtful {

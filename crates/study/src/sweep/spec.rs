@@ -361,6 +361,21 @@ impl Axis {
         }
     }
 
+    /// The whole number for a value that was drawn between its ends: each as likely as any other, those at the ends too.
+    pub fn whole(&self, drawn: f64) -> i64 {
+        let (from, to) = (self.from.unwrap_or(0.0), self.to.unwrap_or(0.0));
+        let (least, most) = (from.round(), to.round());
+        let share = match self.spacing {
+            Spacing::Linear if from != to => (drawn - from) / (to - from),
+            // By ratios no two are alike.
+            _ => return drawn.round() as i64,
+        };
+        let end = (most - least).signum();
+        let spread = least - 0.5 * end + share * (most - least + end);
+        // OK because it lies between two that a key takes.
+        spread.round().clamp(least.min(most), least.max(most)) as i64
+    }
+
     /// Value `k` of its own.
     pub fn value(&self, k: u64) -> toml::Value {
         match self.count {
@@ -385,4 +400,29 @@ pub fn flatten(table: &toml::Table) -> Vec<(String, toml::Value)> {
         }
     }
     out
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn whole_numbers_are_drawn_as_often_as_each_other() {
+        for (from, to, ends) in [(2.0, 6.0, [2, 6]), (6.0, 2.0, [2, 6]), (1.8, 4.1, [2, 4])] {
+            let text = format!("key = \"k\"\nfrom = {from:?}\nto = {to:?}\n");
+            let axis: Axis = toml::from_str(&text).unwrap();
+            let mut seen = std::collections::BTreeMap::new();
+            for k in 0..6000 {
+                let drawn = axis.at((f64::from(k) + 0.5) / 6000.0);
+                *seen.entry(axis.whole(drawn)).or_insert(0) += 1;
+            }
+            let count = i64::from(ends[1] - ends[0] + 1);
+            assert_eq!(seen.len() as i64, count);
+            assert!(
+                seen.keys()
+                    .all(|x| (ends[0].into()..=ends[1].into()).contains(x))
+            );
+            assert!(seen.values().all(|n| *n == 6000 / count), "{seen:?}");
+        }
+    }
 }
