@@ -2056,6 +2056,35 @@ fn the_documentation_names_every_metric() {
     }
 }
 
+/// A lean to the left by 15° is one of 345°.
+#[test]
+fn angles_may_be_told_from_nought_to_a_turn() {
+    let folder = tempfile::tempdir().unwrap();
+    let file = folder.path().join("turn.mcap");
+    let mut w = RecordingWriter::create(&file, &WriterOptions::default()).unwrap();
+    let names = ["/roll", "/pitch"];
+    let channels = names.map(|name| w.channel(name, MessageKind::Float64).unwrap());
+    for k in 0..1800i64 {
+        // The pitch comes between two of the roll.
+        for (j, channel) in channels.iter().enumerate() {
+            let t_ns = k * 1_000_000_000 / 30 + 15_000_000 * j as i64;
+            let sway = 15.0 * (std::f64::consts::TAU * 0.5 * t_ns as f64 / 1e9).sin();
+            let data = sway.rem_euclid(360.0);
+            w.message(*channel, t_ns, &Float64 { data }).unwrap();
+        }
+    }
+    w.finish().unwrap();
+    let roles = folder.path().join("roles.toml");
+    let said = "roll = \"/roll.data\"\npitch = \"/pitch.data\"\nangle_unit = \"deg\"\n";
+    std::fs::write(&roles, said).unwrap();
+    let args = [file.to_str().unwrap(), "--roles", roles.to_str().unwrap()];
+    let found = json(&[&args[..], &["--format", "json"]].concat());
+    for name in ["rms_roll_deg", "rms_pitch_deg"] {
+        let rms = found["metrics"][name]["value"].as_f64().unwrap();
+        assert!((rms - 15.0 / 2f64.sqrt()).abs() < 0.03, "{name}: {rms}");
+    }
+}
+
 /// Unwrapped, three samples a second tell of two turns; and lost messages of a beat on a topic of its own are no pause.
 #[test]
 fn a_beat_on_a_topic_of_its_own_is_as_good_as_beside_the_phases() {

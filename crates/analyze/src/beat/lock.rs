@@ -19,13 +19,16 @@ const IN_TIME: (f64, f64) = (0.15, 0.25);
 const NEIGHBOURS: usize = 4;
 
 /// How many beats each gap between beats holds, one where none is missing in it; `None` for a pause, in which nobody knows. Their numbers tell,
-/// where they have some; else the nearest whole number.
+/// where these go up; else, as where nobody numbered them or a drum was started anew, the nearest whole number.
 pub fn beats_between(beat_s: &[f64], number: Option<&[f64]>) -> Vec<Option<u32>> {
     let number = number.filter(|n| n.len() == beat_s.len());
-    let told = |k: usize| number.map_or(1.0, |n| n[k + 1] - n[k]);
+    let told = |k: usize| {
+        let held = number.map(|n| n[k + 1] - n[k]);
+        held.filter(|held| *held >= 1.0)
+    };
     let gaps: Vec<f64> = beat_s.windows(2).map(|b| b[1] - b[0]).collect();
     let each: Vec<f64> = (0..gaps.len())
-        .map(|k| gaps[k] / told(k).max(1.0))
+        .map(|k| gaps[k] / told(k).unwrap_or(1.0))
         .collect();
     let of = |k: usize| {
         let from = k.saturating_sub(NEIGHBOURS);
@@ -33,9 +36,8 @@ pub fn beats_between(beat_s: &[f64], number: Option<&[f64]>) -> Vec<Option<u32>>
         let (before, behind) = (&each[from..k], &each[k + 1..to]);
         let usual_s = median(&mut [before, behind].concat()).unwrap_or(each[k]);
         let beats = gaps[k] / usual_s;
-        if number.is_some() {
-            let held = told(k);
-            return (held >= 1.0 && beats < held + PAUSE).then_some(held as u32);
+        if let Some(held) = told(k) {
+            return (beats < held + PAUSE).then_some(held as u32);
         }
         let held = beats.round().max(1.0);
         let tempos = median(&mut before.to_vec()).zip(median(&mut behind.to_vec()));
@@ -201,6 +203,14 @@ mod tests {
             .map(f64::from)
             .collect();
         assert_eq!(held(&beats_between(&long, Some(&number))), 119);
+        // Nobody numbered them, or the drum was started anew on the way.
+        for number in [
+            vec![0.0; beat_s.len()],
+            (0..beat_s.len()).map(|k| (k % 50) as f64).collect(),
+        ] {
+            let even: Vec<f64> = all[..beat_s.len()].to_vec();
+            assert_eq!(held(&beats_between(&even, Some(&number))), even.len() - 1);
+        }
         // A count that goes on through a pause as if none were.
         let on: Vec<f64> = (0..100).map(f64::from).collect();
         assert!(beats_between(&long, Some(&on)).contains(&None));

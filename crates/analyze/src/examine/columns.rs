@@ -1,6 +1,7 @@
 //! Who plays which role, and the columns that metrics are computed from.
 
 use std::collections::BTreeMap;
+use std::f64::consts::{PI, TAU};
 
 use super::natural::natural;
 use super::pass::{Entry, Pass};
@@ -114,6 +115,13 @@ impl Pass<'_> {
         let mut x = by_row(&entry.kept, self.arrivals[topic].len());
         let unit = self.unit(entry);
         x.iter_mut().flatten().for_each(|x| *x *= unit);
+        // Some tell a lean to the other side from 180 to 360°. What goes on beyond a turn, or is no angle in this unit, stays as it is.
+        let mut known = x.iter().flatten().filter(|x| x.is_finite());
+        let is_lean = matches!(entry.role, Some(Role::Roll | Role::Pitch | Role::Yaw));
+        if is_lean && known.all(|x| (0.0..=TAU).contains(x)) {
+            let beyond = x.iter_mut().flatten().filter(|x| **x > PI);
+            beyond.for_each(|x| *x -= TAU);
+        }
         let each = axis.t_s.iter().zip(&axis.rows);
         each.filter_map(|(t, row)| Some((*t, x[*row]?))).unzip()
     }
@@ -144,8 +152,8 @@ impl Pass<'_> {
             }
             let (x, own) = match (t_s == inputs.t_s, role) {
                 (true, _) => (x, None),
-                (false, Role::Yaw) => (wrapped(&t_s, &x, &inputs.t_s), None),
-                (false, _) => (between(&t_s, &x, &inputs.t_s), Some((t_s, x))),
+                (false, Role::Height) => (between(&t_s, &x, &inputs.t_s), Some((t_s, x))),
+                (false, _) => (wrapped(&t_s, &x, &inputs.t_s), None),
             };
             match role {
                 Role::Roll => inputs.roll_rad = x,
