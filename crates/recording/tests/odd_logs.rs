@@ -106,6 +106,15 @@ fn a_byte_order_mark_changes_no_unit() {
     }
 }
 
+/// Marks without end are no text of any kind, and no reason to fall over.
+#[test]
+fn a_file_of_marks_is_refused() {
+    let folder = folder();
+    let path = file(folder.path(), "marks.csv", &"\u{feff}".repeat(1_000_000));
+    let error = ingest(folder.path(), &[path], None).err().expect("refused");
+    assert!(error.to_string().contains("is no log of"), "{error}");
+}
+
 #[test]
 fn a_count_that_wraps_with_a_sample_late_wraps_once() {
     let folder = folder();

@@ -129,7 +129,7 @@ impl<'a> Between<'a> {
         for packet in track.chunk_by(|a, b| a.0 == b.0) {
             let (at_ns, count) = (packet[0].0, packet.len() as i64);
             let before_ns = last_ns.map_or(usual_ns, |last| usual_ns.min(at_ns - last));
-            t_ns.extend((1..=count).map(|k| at_ns - (count - k) * before_ns / count));
+            t_ns.extend((1..=count).map(|k| at_ns - before_ns / count * (count - k)));
             last_ns = Some(at_ns);
         }
         Between {

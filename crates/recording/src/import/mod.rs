@@ -487,13 +487,16 @@ fn read(files: &Files, layout: Option<&layout::Layout>) -> Result<Vec<imu::Log>,
     Ok(logs)
 }
 
-/// No packet holds so many samples.
-const MOST_IN_PACKET: usize = 100;
+/// A clock of whole seconds gives no more samples one time.
+const MOST_OF_ONE_TIME: usize = 2000;
+/// And so many have more than two.
+const SEVERAL: usize = 100;
 
 /// Whether next to none of many samples has a time of its own.
 fn has_lost_its_times(log: &imu::Log) -> bool {
     let times = log.samples.chunk_by(|a, b| a.t_ns == b.t_ns).count();
-    log.samples.len() > times * MOST_IN_PACKET
+    let all = log.samples.len();
+    all > times * MOST_OF_ONE_TIME || times <= 2 && all > SEVERAL
 }
 
 /// The note for a file in which nothing was logged, beside others.
@@ -684,19 +687,20 @@ fn entries_of(file: &mut fs::File) -> io::Result<Option<usize>> {
     Ok(count.filter(|count| *count != u16::MAX).map(usize::from))
 }
 
-/// UTF-8; UTF-16 by its byte order mark, as spreadsheets write it; or else Latin-1.
-fn decoded(bytes: Vec<u8>) -> String {
+/// UTF-8, without its byte order mark; UTF-16 by that, as spreadsheets write it; or else Latin-1.
+fn decoded(mut bytes: Vec<u8>) -> String {
     let utf_16 = |unit: fn([u8; 2]) -> u16| {
         let units: Vec<u16> = bytes[2..].as_chunks().0.iter().map(|b| unit(*b)).collect();
         String::from_utf16_lossy(&units)
     };
     match bytes[..] {
-        [0xff, 0xfe, ..] => utf_16(u16::from_le_bytes),
-        [0xfe, 0xff, ..] => utf_16(u16::from_be_bytes),
-        [0xef, 0xbb, 0xbf, ref rest @ ..] => decoded(rest.to_vec()),
-        _ => String::from_utf8(bytes)
-            .unwrap_or_else(|error| error.as_bytes().iter().map(|b| char::from(*b)).collect()),
+        [0xff, 0xfe, ..] => return utf_16(u16::from_le_bytes),
+        [0xfe, 0xff, ..] => return utf_16(u16::from_be_bytes),
+        [0xef, 0xbb, 0xbf, ..] => drop(bytes.drain(..3)),
+        _ => {}
     }
+    String::from_utf8(bytes)
+        .unwrap_or_else(|error| error.as_bytes().iter().map(|b| char::from(*b)).collect())
 }
 
 fn is_text(name: &str) -> bool {
