@@ -258,7 +258,7 @@ fn slips_get_one_sentence() {
     assert_eq!(files(folder.path()), ["mine.toml"], "nothing half-made");
     std::fs::write(folder.path().join("mine.toml"), base).expect("written");
     for (args, code, expected) in [
-        (&["papr"][..], 1, "Did you mean `paper`"),
+        (&["papr"][..], 2, "Did you mean `paper`"),
         (&["absent.toml"], 1, "absent.toml"),
         (&["mine.toml", "--shard", "9/8"], 2, "K/N"),
         (&["status", "nowhere"], 1, "nowhere"),
