@@ -1,7 +1,6 @@
 //! What happened when: contact lost and regained, jumps, the beat, the onset of instability.
 
 use std::f64::consts::TAU;
-use std::ops::Range;
 
 use crate::beat::adler::turns::Turns;
 use crate::inputs::{Inputs, Window, finite, stretches};
@@ -57,34 +56,35 @@ fn contact(inputs: &Inputs, out: &mut Vec<Event>) {
     if inputs.pulled_n().is_some() {
         return;
     }
-    let handles = inputs.normal_n.iter();
-    let handles = handles.map(|force| finite(inputs.force_times(), force));
-    let parts = handles.enumerate().flat_map(|(handle, (t_s, force))| {
-        let parts = stretches(&t_s, 0.0).into_iter();
-        let part = |of: Range<usize>| (handle, t_s[of.clone()].to_vec(), force[of].to_vec());
-        parts.map(part).collect::<Vec<_>>()
-    });
-    for (handle, t_s, force) in parts {
-        let mut held: Option<bool> = None;
-        for (t_s, n) in t_s.iter().zip(&force) {
-            let holds = *n > 0.0;
-            if held.is_some_and(|h| h != holds) {
-                let number = handle + 1;
-                out.push(match holds {
-                    true => Event {
-                        t_s: *t_s,
-                        kind: "contact_regained",
-                        what: format!("handle {number} presses with {n:.*} N", decimals(*n)),
-                    },
-                    false => Event {
-                        t_s: *t_s,
-                        kind: "contact_lost",
-                        what: format!("handle {number} goes slack"),
-                    },
-                });
-            }
-            held = Some(holds);
+    for (handle, force) in inputs.normal_n.iter().enumerate() {
+        let (t_s, force) = finite(inputs.force_times(), force);
+        for part in stretches(&t_s, 0.0) {
+            of_stretch(handle, &t_s[part.clone()], &force[part], out);
         }
+    }
+}
+
+/// The same of one handle in a stretch without a hole.
+fn of_stretch(handle: usize, t_s: &[f64], force_n: &[f64], out: &mut Vec<Event>) {
+    let mut held: Option<bool> = None;
+    for (t_s, n) in t_s.iter().zip(force_n) {
+        let holds = *n > 0.0;
+        if held.is_some_and(|h| h != holds) {
+            let number = handle + 1;
+            out.push(match holds {
+                true => Event {
+                    t_s: *t_s,
+                    kind: "contact_regained",
+                    what: format!("handle {number} presses with {n:.*} N", decimals(*n)),
+                },
+                false => Event {
+                    t_s: *t_s,
+                    kind: "contact_lost",
+                    what: format!("handle {number} goes slack"),
+                },
+            });
+        }
+        held = Some(holds);
     }
 }
 

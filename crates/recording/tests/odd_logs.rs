@@ -16,6 +16,11 @@ fn laid_out(folder: &Path, text: &str) -> Result<Imported, String> {
     ingest(folder, &[path], layout.to_str()).map_err(|error| error.to_string())
 }
 
+/// What is said of a table that is refused.
+fn refused(folder: &Path, text: &str) -> String {
+    laid_out(folder, text).err().expect("refused")
+}
+
 fn note<'a>(got: &'a Imported, what: &str) -> Option<&'a str> {
     let mut notes = got.ingested.notes.iter().map(String::as_str);
     notes.find(|note| note.contains(what))
@@ -142,8 +147,7 @@ fn a_quotation_mark_too_many_is_an_error_where_it_stands() {
         )
     };
     let text = (0..100).map(row).collect::<String>();
-    let error = laid_out(folder.path(), &format!("t,x,y,z,note\n{text}")).err();
-    let error = error.expect("refused");
+    let error = refused(folder.path(), &format!("t,x,y,z,note\n{text}"));
     assert!(
         error.ends_with("log.csv: line 52 begins a quotation that takes in 49 lines behind it; expected each row on one line: is there a quotation mark too many?"),
         "{error}"
@@ -161,7 +165,7 @@ fn a_log_cut_within_its_last_number_loses_that_row_alone() {
         assert_eq!(got.ingested.notes.len(), usize::from(left == 49), "{cut}");
     }
     let half = format!("{}500,0,0,9.81E-", whole);
-    let error = laid_out(folder.path(), &half).err().expect("refused");
+    let error = refused(folder.path(), &half);
     assert!(
         error.contains("line 52, column \"z\": found \"9.81E-\""),
         "{error}"
@@ -172,8 +176,7 @@ fn a_log_cut_within_its_last_number_loses_that_row_alone() {
 fn times_that_lost_their_digits_are_refused() {
     let folder = folder();
     let rows = "1.53859E+12,0,0,9.8\n".repeat(300);
-    let error = laid_out(folder.path(), &format!("t,x,y,z\n{rows}")).err();
-    let error = error.expect("refused");
+    let error = refused(folder.path(), &format!("t,x,y,z\n{rows}"));
     assert!(
         error.contains("has 300 samples with hardly any times between them"),
         "{error}"

@@ -606,7 +606,6 @@ mod tests {
         }
     }
 
-    /// Whether one step in twenty is a little more or less than that must not matter.
     /// Half of the samples are lost, and each of the others has its time.
     #[test]
     fn many_lost_samples_are_no_packets() {
@@ -619,6 +618,7 @@ mod tests {
         }
     }
 
+    /// Whether one step in twenty is a little more or less than that must not matter.
     #[test]
     fn packets_of_twenty_are_spread_wherever_the_first_begins() {
         for (each, skipped) in (15..25).flat_map(|each| [0, 7, 12].map(|skipped| (each, skipped))) {

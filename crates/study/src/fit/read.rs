@@ -28,6 +28,10 @@ pub struct Told {
     pub clocks_apart: Vec<String>,
 }
 
+const COMPRESSION: &str = "/handles/forces.compression_m";
+/// Times of the scene, of which the first that is there counts.
+const OWN_TIMES: [&str; 2] = ["/rath/state.time_s", "/rath/phases.time_s"];
+
 const LEFT: &str =
     "clocks differ and were left as they are, which no interval knows of: --put-clocks-right";
 const BY_MOTION: &str = "the carriers' clocks were put right by motion alone, to 20 ms, and a millisecond moves the stiffness by some 70 N/m: tap the sensors together";
@@ -74,8 +78,11 @@ impl Field {
             Recording::open(file, &options)?
         };
         let analysis = examine(&name, &recording, &request)?;
-        let (mut signals, _) =
-            recording.signals(&|path| path.starts_with("/handles/forces.compression_m"))?;
+        let wanted = |path: &str| path.starts_with(COMPRESSION) || OWN_TIMES.contains(&path);
+        let (signals, _) = recording.signals(&wanted)?;
+        let (mut signals, own_times): (Vec<_>, Vec<_>) = signals
+            .into_iter()
+            .partition(|signal| signal.path.starts_with(COMPRESSION));
         signals.sort_by(|a, b| natural(&a.path, &b.path));
         let forces = analysis.inputs.force_times().len();
         let compression_m: Vec<Vec<f64>> = signals
@@ -90,9 +97,7 @@ impl Field {
         }
         // Whoever writes states and phases says when they were, in the time of their scene.
         let start_ns = recording.info().start_ns;
-        let own_time = |path: &str| path.ends_with(".time_s");
-        let (own_times, _) = recording.signals(&own_time)?;
-        let zero_s = (["/rath/state.time_s", "/rath/phases.time_s"].iter())
+        let zero_s = (OWN_TIMES.iter())
             .filter_map(|path| own_times.iter().find(|signal| signal.path == *path))
             .filter_map(|s| Some(s.times_s(start_ns).first()? - s.values.first()?))
             .find(|zero_s| zero_s.is_finite());
