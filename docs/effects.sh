@@ -46,17 +46,18 @@ costs() {
 }
 
 workspace() { # [EFFECT]...: a workspace in which these are not: their files, their lines in mod.rs, and what other effects ask about
-    # them. Commands, replay and the hard cases, which name effects as a user does, are in none.
+    # them. Commands, replay, remarks and the hard cases, which name effects as a user does, are in none.
     rm -rf "$COPY"
     mkdir -p "$COPY"
     cp -rp Cargo.toml Cargo.lock crates schemas tests "$COPY"
     sim=$COPY/crates/sim
-    rm -r "$sim/src/main.rs" "$sim/src/commands" "$sim/src/replay" "$sim/src/cases"
-    sed -i '/^pub mod replay;/d; /^pub mod cases;/d' "$sim/src/lib.rs"
+    rm -r "$sim/src/main.rs" "$sim/src/commands" "$sim/src/replay" "$sim/src/remarks.rs" "$sim/src/cases"
+    sed -i '/^pub mod replay;/d; /^pub mod remarks;/d; /^pub mod cases;/d' "$sim/src/lib.rs"
     sed -i -z 's/\[\[bin\]\]\nname = "sim"\npath = "src\/main.rs"\n//' "$sim/Cargo.toml"
     effects=$sim/src/effects
     # Why an effect does nothing is for `sim explain` alone.
-    sed -i '/^fn .*(e: &Effects) -> Option/,/^}/{/^fn/b; s/^}/    None\n}/; t; d}' "$effects/mod.rs"
+    sed -i '/^fn .*-> Option<Cow/,/^}/d' "$effects/mod.rs"
+    sed -i -z -E 's/(    entry!\(\n        [a-z_]+,\n        "[^"]*"),\n(        [^\n]*\n)+    \),/\1\n    ),/g' "$effects/mod.rs"
     for e in "$@"; do
         rm "$effects/$e.rs"
         sed -i "/^pub mod $e;/d; /^    pub $e: Option</d" "$effects/mod.rs"
@@ -73,6 +74,7 @@ absent() { # [GROUP]...: the effects to leave out together, a build for each gro
     there=$TARGET/without/target/release/examples/cost
     workspace
     mkdir "$TMP/whole"
+    failed=
     for group in "$@"; do
         settings=duration_s=20.0
         for e in $group; do settings="$settings $(without "$e")"; done
@@ -80,11 +82,12 @@ absent() { # [GROUP]...: the effects to leave out together, a build for each gro
         count "$there" "$TMP/$group.toml" >"$TMP/whole/$group"
     done
     for group in "$@"; do
-        workspace $group || continue
+        workspace $group || { failed="$failed, $group"; continue; }
         whole=$(cat "$TMP/whole/$group")
         less=$(count "$there" "$TMP/$group.toml")
         echo "$group | $((whole / 20)) | $((less / 20)) | $(percent $((whole - less)) "$less") %"
     done
+    [ -z "$failed" ] || { echo "does not compile without${failed#,}" >&2; return 1; }
 }
 
 freedoms() {

@@ -20,7 +20,8 @@
 //! What carriers do to each other is K_c [rad/s], from everybody to everybody alike, with the others' phases as they were observed. It is
 //! always looked for: left out, a pull of 2.7 beside a coupling of 0.5 came out as 3.5. Carriers whom a coupling holds together before the
 //! music (K_c beyond their detunings' difference) do not show both apart. Measured phases of steady walkers err by more than these wander, and
-//! a coupling of 1 or more is then found too weak, and the detunings with it. Whether one K and one K_c say all that recorded phases do is tested:
+//! a coupling of 1 or more is then found too weak, and the detunings with it; where all have settled unseen, such phases err by more than √(K² − Δω²) lets
+//! them wander, and tell neither K nor K_c. Whether one K and one K_c say all that recorded phases do is tested:
 //! σ, which takes up what they leave, must be the σ that second differences over a tenth of a second show.
 //! Source: R. Adler, Proc. IRE 34 (1946) 351; Pikovsky, Rosenblum & Kurths, Synchronization (2001), ch. 7 and 9;
 //! Särkkä, Bayesian Filtering and Smoothing (2013), ch. 9 and 12.
@@ -132,7 +133,7 @@ const COUPLING_LOST_RAD_PER_S: f64 = 0.03;
 /// beat to one and a half after it, whatever comes later.
 ///
 /// # Errors
-/// As a sentence: no beat, or too little walked about its beginning.
+/// As a sentence: no beat, too little walked about its beginning, or steps of carriers who had all settled before.
 pub fn adler(
     t_s: &[f64],
     phase_rad: &[&[f64]],
@@ -140,6 +141,11 @@ pub fn adler(
     measured: bool,
 ) -> Result<Adler, &'static str> {
     let mut walk = Walk::new(t_s, phase_rad, beat_rad, measured)?;
+    let unseen = walk.came_unseen();
+    if measured && !unseen.contains(&false) {
+        return Err(walk::UNSEEN);
+    }
+    let settled = unseen.contains(&true);
     walk.company = company::company(&walk);
     let (x, best) = walk.highest()?;
     let cover = best.information.variances().ok_or(walk::TOO_LITTLE)?;
@@ -155,7 +161,6 @@ pub fn adler(
     let own: Vec<usize> = (0..carriers).map(|c| place(OWN, c)).collect();
     let sd = cover[PULL].max(0.0).sqrt();
     let mut ends = [false, true].map(|up| walk.end(&x, best.value, sd, up));
-    let settled = walk.someone_came_unseen();
     // At its limit the search tells no pull from a stronger one.
     if settled || ends[1] >= MOST {
         ends[1] = f64::INFINITY;

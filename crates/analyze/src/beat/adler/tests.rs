@@ -293,19 +293,32 @@ fn unwrapped_phases_need_no_two_samples_to_a_turn() {
 
 #[test]
 fn the_settled_give_a_bound_and_no_pull() {
-    for (noise, error) in [(0.01, 0.06), (0.0, 0.0)] {
-        let always = Case {
-            onset_s: -50.0,
-            build_up_s: 1.0,
-            noise,
-            error,
-            ..MUSIC
-        };
-        let a = found(&always, 1);
+    let always = |noise: f64, error: f64| Case {
+        onset_s: -50.0,
+        build_up_s: 1.0,
+        noise,
+        error,
+        ..MUSIC
+    };
+    for noise in [0.01, 0.0] {
+        let a = found(&always(noise, 0.0), 1);
         assert!(a.pull_ci95_rad_per_s[1].is_infinite(), "{a:?}");
         assert!(a.detuning_half_rad_per_s[0].is_infinite(), "{a:?}");
         assert_eq!(a.inside(), None);
     }
+    // Steps err by more than the settled wander: twins gave bounds above the truth.
+    let (t_s, phases, beat) = walked(&always(0.01, 0.06), 1);
+    let by_steps = adler(&t_s, &[&phases[0], &phases[1]], &beat, true);
+    assert_eq!(by_steps, Err(walk::UNSEEN));
+    // One of two who is first seen late leaves a bound.
+    let (t_s, mut phases, beat) = walked(&PEOPLE, 1);
+    let late = t_s.partition_point(|t| *t < PEOPLE.onset_s + 12.0);
+    phases[0][..late].fill(f64::NAN);
+    let by_steps = adler(&t_s, &[&phases[0], &phases[1]], &beat, true).unwrap();
+    assert!(
+        by_steps.pull_ci95_rad_per_s[1].is_infinite(),
+        "{by_steps:?}"
+    );
     // Who was heard walking alone gives at least |Δω|.
     let sudden = Case {
         build_up_s: 0.01,

@@ -42,6 +42,7 @@ const ROUNDING: f64 = 1e-6;
 const FEWEST: usize = 20;
 
 pub const TOO_LITTLE: &str = "too little is walked about the first beat";
+pub const UNSEEN: &str = "nobody saw how the carriers came to the beat, and steps do not show how closely they follow it";
 
 /// What a carrier sees of the others, (1/N) Σ_{j≠i} e^{iφ_j}, real and imaginary, at the beginning, in the middle and at the end of a step. Who is
 /// not seen is not in it.
@@ -294,10 +295,10 @@ impl Walk {
         }
     }
 
-    /// Whether a carrier is with the beat, never a turn past it, and nobody saw how that came: without the music's beginning, or first seen long
-    /// after it. Any own frequency then goes with any pull that makes up for it, and a pull that still grows looks like one that is weak.
-    pub fn someone_came_unseen(&self) -> bool {
-        self.phase.iter().any(|phase| {
+    /// Of each carrier, whether it is with the beat, never a turn past it, and nobody saw how that came: without the music's beginning, or first seen
+    /// long after it. Any own frequency then goes with any pull that makes up for it, and a pull that still grows looks like one that is weak.
+    pub fn came_unseen(&self) -> Vec<bool> {
+        let unseen = |phase: &Vec<f64>| {
             let mut seen = phase.iter().zip(&self.t_s).filter(|(y, _)| y.is_finite());
             let late = seen.next().is_some_and(|(_, t)| *t > LATE_S);
             let behind = phase.iter().zip(&self.beat).map(|(y, b)| y - b);
@@ -305,7 +306,8 @@ impl Walk {
                 .filter(|d| d.is_finite())
                 .fold((f64::MAX, f64::MIN), |(a, b), d| (a.min(d), b.max(d)));
             (late || !self.begins) && high - low < TAU
-        })
+        };
+        self.phase.iter().map(unseen).collect()
     }
 
     /// Where the climb begins. Once near what the increments say; where a pull is soon all there, or carriers come from far behind, these lead to a summit

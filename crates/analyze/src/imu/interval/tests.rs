@@ -1,9 +1,11 @@
+use super::draws::walked;
 use super::*;
-use crate::imu::budget::Budget;
 use crate::imu::orientation::Options;
-use crate::imu::rath::{Settings, motion};
+use crate::imu::rath::{Mounting, Settings, motion};
+use crate::imu::track::Instrument;
 use crate::imu::track::Track;
 use crate::metrics::Need;
+use crate::random::Random;
 use nalgebra::{UnitQuaternion, Vector3};
 use std::f64::consts::{PI, TAU};
 
@@ -12,6 +14,10 @@ const MOST: Window = Window {
     start_s: 5.0,
     end_s: 35.0,
 };
+
+fn beyond(name: &str, motion: &Motion, window: Window) -> f64 {
+    Beyond::of(motion, window).unwrap().sd(name)
+}
 
 /// What a sensor at the centre of mass makes of a roll [rad] and of a support [1] over time, its gyroscope's scale off and its accelerometer biased.
 fn felt(
@@ -413,7 +419,7 @@ fn what_the_window_holds_beyond_the_budget_is_known_by_hand() {
         (&growing, "growth_ratio", all, grown, 0.02),
         (&filling, "rms_z_m", all, ends_m, 0.03),
     ] {
-        let found = beyond_the_budget(name, motion, window);
+        let found = beyond(name, motion, window);
         assert!(
             (found / known - 1.0).abs() < within,
             "{name}: {found}, by hand {known}"
@@ -460,7 +466,7 @@ fn a_course_that_is_seen_stands_for_one_that_is_not() {
         (0.0, "rms_z_m", whole_m.hypot(lost_m) - whole_m),
         (0.005, "growth_ratio", 1f64.hypot(lost_m / third_m) - 1.0),
     ] {
-        let found = beyond_the_budget(name, &of(heave_m), MOST);
+        let found = beyond(name, &of(heave_m), MOST);
         assert!(
             (found / known - 1.0).abs() < 0.05,
             "{name}: {found}, by hand {known}"
@@ -509,9 +515,9 @@ fn touch_downs_of_a_sensor_off_the_centre_err_by_parts_of_a_sample() {
         AS_IT_SITS,
         Some(0.0),
     );
-    assert_eq!(beyond_the_budget("t_float", &found, MOST), 0.0);
+    assert_eq!(beyond("t_float", &found, MOST), 0.0);
     found.settings.lever_m = [0.0, 0.0, 0.1];
-    let fast = beyond_the_budget("t_float", &found, MOST);
+    let fast = beyond("t_float", &found, MOST);
     let said = |found: &Motion, name: &str| -> String {
         let all = metrics(found, MOST);
         all.get(name).unwrap().reason.clone().unwrap_or_default()
@@ -533,7 +539,7 @@ fn touch_downs_of_a_sensor_off_the_centre_err_by_parts_of_a_sample() {
     }
     found.accel_up_m_per_s2 = half(&found.accel_up_m_per_s2);
     found.stretches[0].end = 2000;
-    let slow = beyond_the_budget("t_float", &found, MOST);
+    let slow = beyond("t_float", &found, MOST);
     for (found, known) in [(fast, 0.3 * 0.01), (slow, 0.4 * 0.02)] {
         assert!(
             (found / (108.0 * known / 30.0) - 1.0).abs() < 0.02,
