@@ -325,7 +325,7 @@ fn window_lag(x: &[f64], y: &[f64]) -> Option<(f64, f64)> {
 }
 
 /// As far as quartz clocks ever part.
-const MOST_DRIFT: f64 = 2e-4;
+pub const MOST_DRIFT: f64 = 2e-4;
 /// Events at either end of the device's list from which a search begins: all but one of them may be the device's own.
 const ENDS: usize = 12;
 /// Nobody times an event better than this, s: half a sample of two sensors at 200 Hz.

@@ -48,6 +48,8 @@ struct Worn {
     or_ahead_s: Vec<f64>,
     /// Standard error of its clock, where taps have set it, s.
     clock_sd_s: f64,
+    /// Whether it tells too little of the window to be one of those who are compared.
+    left_out: bool,
 }
 
 /// Times (s) and the phases there (rad), one column for each who walks.
@@ -126,7 +128,39 @@ impl Carriers {
             ahead_s: 0.0,
             or_ahead_s: Vec::new(),
             clock_sd_s,
+            left_out: false,
         });
+    }
+
+    /// Leaves those out of the phases whose sensors are on for less than half of `window` where others are on for more: their absence would leave little of
+    /// it that all are known in.
+    pub fn leave_out(&mut self, window: Window) -> Vec<Quality> {
+        let share = |worn: &Worn| {
+            let phases = worn.steps.as_ref().ok()?;
+            let (first_s, last_s) = (phases.t_s.first()?, phases.t_s.last()?);
+            let on_s = last_s.min(window.end_s) - first_s.max(window.start_s);
+            Some(on_s.max(0.0))
+        };
+        let longest_s = self.worn.iter().filter_map(share).fold(0.0, f64::max);
+        let mut out = Vec::new();
+        for worn in &mut self.worn {
+            let Some(on_s) = share(worn).filter(|on_s| 2.0 * on_s < longest_s) else {
+                continue;
+            };
+            worn.left_out = true;
+            out.push(Quality::remark(
+                &worn.topic,
+                "left_out",
+                format!("tells steps in {on_s:.1} s of the window, another sensor in {longest_s:.1} s: synchrony and all that compares carriers are without it"),
+            ));
+        }
+        out
+    }
+
+    /// Those whose phases are compared.
+    fn compared(&self) -> impl Iterator<Item = (&Worn, &Steps)> {
+        let each = self.worn.iter().filter(|worn| !worn.left_out);
+        each.filter_map(|worn| Some((worn, worn.steps.as_ref().ok()?)))
     }
 
     /// Puts two carriers on one clock: the offsets under which their heaves, added up, are the rath's heave, and their difference its tilt.
@@ -142,11 +176,16 @@ impl Carriers {
     /// pace does. Offsets that are as good are kept for the interval of the synchrony. Of more than two each is too small a part of what moves
     /// the load: their clocks are left alone, and the synchrony is without an interval.
     ///
-    /// With `leave` it is only said how they differ.
-    pub fn align(&mut self, motion: Option<&Motion>, leave: bool) -> Vec<Quality> {
-        let walking: Vec<&Worn> = self.worn.iter().filter(|w| w.steps.is_ok()).collect();
+    /// With `leave` it is only said how they differ. Clocks that taps have set, those of `set` (topics), stay as they are; where only some are, nothing tells how the
+    /// others go beside them.
+    pub fn align(&mut self, motion: Option<&Motion>, set: &[String], leave: bool) -> Vec<Quality> {
+        let walking: Vec<&Worn> = self.compared().map(|(worn, _)| worn).collect();
         let found = match (&walking[..], motion) {
             ([] | [_], _) => return Vec::new(),
+            (all, _) if all.iter().all(|worn| set.contains(&worn.topic)) => return Vec::new(),
+            (all, _) if all.iter().any(|worn| set.contains(&worn.topic)) => {
+                Err("taps tell how some of them go, and not the others")
+            }
             ([one, other], Some(motion)) => offsets([one, other], motion),
             ([_, _], None) => Err("no sensor tells how the load moves"),
             _ => Err("of more than two each is too small a part of what moves the load"),
@@ -170,7 +209,8 @@ impl Carriers {
             false => (Clocks::SetByMotion, "put right before comparing phases"),
         };
         let mut out = Vec::new();
-        let walking = self.worn.iter_mut().filter(|w| w.steps.is_ok());
+        let compared = |w: &&mut Worn| w.steps.is_ok() && !w.left_out;
+        let walking = self.worn.iter_mut().filter(compared);
         for (k, (worn, offset_s)) in walking.zip(offsets_s).enumerate() {
             if !leave {
                 worn.ahead_s = offset_s;
@@ -236,23 +276,21 @@ impl Carriers {
         phase: impl Fn(&Steps) -> Vec<f64>,
         ahead_s: impl Fn(&Worn) -> f64,
     ) -> Option<Phases> {
-        let walking: Vec<(&Worn, &Steps)> = self
-            .worn
-            .iter()
-            .filter_map(|w| Some((w, w.steps.as_ref().ok()?)))
-            .collect();
+        let walking: Vec<(&Worn, &Steps)> = self.compared().collect();
         let first = walking.first()?;
         let times: Vec<Vec<f64>> = walking
             .iter()
             .map(|(worn, s)| s.t_s.iter().map(|t| t - ahead_s(worn)).collect())
             .collect();
-        let start = times.iter().map(|t| t[0]).fold(f64::MIN, f64::max);
+        let start = times.iter().map(|t| t[0]).fold(f64::MAX, f64::min);
         let end = times
             .iter()
             .map(|t| t[t.len() - 1])
-            .fold(f64::MAX, f64::min);
+            .fold(f64::MIN, f64::max);
         let step = period_s(&first.1.t_s)?;
-        if end - start < 1.0 {
+        // Who were never on together are not compared.
+        let longest_s: f64 = times.iter().map(|t| t[t.len() - 1] - t[0]).sum();
+        if !(1.0..=longest_s).contains(&(end - start)) {
             return None;
         }
         let axis: Vec<f64> = (0..=((end - start) / step) as usize)
@@ -261,7 +299,17 @@ impl Carriers {
         let phases = walking
             .iter()
             .zip(&times)
-            .map(|((_, s), t)| interpolate(t, &phase(s), &axis))
+            .map(|((_, s), t)| {
+                let on = Window {
+                    start_s: t[0],
+                    end_s: t[t.len() - 1],
+                };
+                let mut out = vec![f64::NAN; axis.len()];
+                let here = on.range(&axis);
+                let seen = interpolate(t, &phase(s), &axis[here.clone()]);
+                out[here].copy_from_slice(&seen);
+                out
+            })
             .collect();
         Some((axis, phases))
     }
@@ -310,9 +358,13 @@ impl Carriers {
         metrics: &mut Metrics,
         detected: &Metrics,
         synchrony_else: &[f64],
-        by_others: f64,
+        by_others: Result<f64, String>,
     ) {
         let moved = self.worn.iter().any(|worn| worn.ahead_s != 0.0);
+        let (by_others, unknown) = match by_others {
+            Ok(half) => (half, None),
+            Err(why) => (0.0, Some(why)),
+        };
         let clocks = if moved {
             MOVED_ERROR.hypot(by_others)
         } else {
@@ -342,6 +394,7 @@ impl Carriers {
                 ("beat_lead_deg", _) if moved => {
                     value.withhold("the carriers' clocks were put on each other by motion, which does not tell their own lag from the load's: tap the sensors together");
                 }
+                ("synchrony" | "plv", _) if unknown.is_some() => value.reason.clone_from(&unknown),
                 ("synchrony", Some([low, high, _])) => value.ci95 = Some([low, high]),
                 ("pull_rad_per_s", _) => {
                     if let Some([low, high]) = &mut value.ci95 {
@@ -482,14 +535,24 @@ fn judged((all, as_they_are): Matches, step_s: f64) -> Result<Option<Offsets>, &
 
 /// Half of what the moments of a window at which not everybody's phase is known may make of the synchrony, 95 %: they are to the others as parts of their
 /// length are to each other.
-pub fn by_holes(t_s: &[f64], phases: &[Vec<f64>], window: Window) -> f64 {
+///
+/// # Errors
+/// Where they are more than a fifth of the window: fewer than four such parts tell little of each other.
+pub fn by_holes(t_s: &[f64], phases: &[Vec<f64>], window: Window) -> Result<f64, String> {
     let range = window.range(t_s);
     let known = |k: &usize| phases.iter().all(|p| p[*k].is_finite());
     let whole = range.len();
     let seen: Vec<usize> = range.filter(known).collect();
     let lost = whole - seen.len();
     if lost == 0 || seen.is_empty() || phases.len() < 2 {
-        return 0.0;
+        return Ok(0.0);
+    }
+    let share = lost as f64 / whole as f64;
+    if share > MOST_UNKNOWN {
+        return Err(format!(
+            "without an interval: in {:.0} % of the window somebody's phase is not known, who stands still or is not recorded",
+            100.0 * share
+        ));
     }
     let of: Vec<Vec<f64>> = phases
         .iter()
@@ -501,9 +564,11 @@ pub fn by_holes(t_s: &[f64], phases: &[Vec<f64>], window: Window) -> f64 {
     let all = mean(&together);
     let parts: Vec<f64> = together.chunks(lost).map(|part| mean(part) - all).collect();
     let spread = (parts.iter().map(|d| d * d).sum::<f64>() / parts.len() as f64).sqrt();
-    1.96 * lost as f64 / whole as f64 * spread
+    Ok(1.96 * share * spread)
 }
 
+/// Of a window so much may lack somebody's phase.
+const MOST_UNKNOWN: f64 = 0.2;
 /// Half the 95 % interval of a synchrony from gait phases, 1: by simulated twins (docs/field.md).
 const PHASE_ERROR: f64 = 0.0020;
 /// What a detector leaves in a pull of carriers who slip past the beat, half the 95 % interval, of the pull: by twins.
@@ -541,7 +606,7 @@ mod tests {
                 };
                 carriers.add(&format!("/imu/{k}"), &track, Options::default(), 9.81, 0.0);
             }
-            let said = carriers.align(None, false);
+            let said = carriers.align(None, &[], false);
             assert!(
                 said.len() == 1 && said[0].kind == "clocks_apart" && said[0].text.contains(why),
                 "{said:?}"
@@ -553,7 +618,7 @@ mod tests {
                 ..Default::default()
             };
             let mut metrics = metrics_of(&inputs, Window::ALL, |name| name == "synchrony");
-            carriers.interval(&mut metrics, &Metrics::default(), &[], 0.0);
+            carriers.interval(&mut metrics, &Metrics::default(), &[], Ok(0.0));
             let synchrony = metrics.get("synchrony").unwrap();
             assert!(synchrony.as_f64().unwrap() > 0.9 && synchrony.ci95.is_none());
             assert!(
@@ -588,7 +653,8 @@ mod tests {
             };
             metrics_of(&inputs, Window::ALL, |name| name == "synchrony").number("synchrony")
         };
-        let half = |apart_hz, hidden| by_holes(&t_s, &phases(apart_hz, hidden), Window::ALL);
+        let half =
+            |apart_hz, hidden| by_holes(&t_s, &phases(apart_hz, hidden), Window::ALL).unwrap();
         assert_eq!(half(1.0 / 7.0, false), 0.0);
         assert!(half(0.0, true) < 1e-9);
         let [whole, left] =
@@ -598,6 +664,11 @@ mod tests {
             (whole - left).abs() < half && half < 0.12,
             "{whole} {left} ± {half}"
         );
+        // One who is not seen for a third of the time may have done anything.
+        let mut late = phases(1.0 / 7.0, false);
+        late[1][..2000].fill(f64::NAN);
+        let why = by_holes(&t_s, &late, Window::ALL).unwrap_err();
+        assert!(why.starts_with("without an interval: in 33 %"), "{why}");
     }
 
     /// What matches tell of clocks that are right, 0.2 s off, and further off than is looked for (music, one clock 8.3, 6.2 and 13.1 s off).
@@ -647,6 +718,44 @@ mod tests {
         carriers
     }
 
+    /// A third whose phone goes flat after 20 s does not take the others' minute; one that lasts for 40 is compared as long as it lasts.
+    #[test]
+    fn who_is_on_for_less_than_half_is_left_out() {
+        for (on_s, left_out) in [(20.0, true), (40.0, false)] {
+            let mut carriers = pair(0.0);
+            let mut short = walker(0.0);
+            let n = short.t_s.partition_point(|t| *t < on_s);
+            short.t_s.truncate(n);
+            short.accel_m_per_s2.truncate(n);
+            short.gyro_rad_per_s.truncate(n);
+            carriers.add("/imu/2", &short, Options::without_latency(), 9.81, 0.0);
+            let window = Window {
+                start_s: 5.0,
+                end_s: 60.0,
+            };
+            let said = carriers.leave_out(window);
+            assert_eq!(said.len(), usize::from(left_out));
+            let (t_s, phases) = carriers.phases().unwrap();
+            assert!(t_s[t_s.len() - 1] > 59.9);
+            assert_eq!(phases.len(), if left_out { 2 } else { 3 });
+            let late = t_s.partition_point(|t| *t < on_s + 1.0);
+            assert!(phases[1][late].is_finite());
+            assert!(phases.get(2).is_none_or(|p| p[late].is_nan()));
+        }
+    }
+
+    /// Taps that set the clock of one say nothing of the other's.
+    #[test]
+    fn clocks_of_which_some_are_set_are_apart() {
+        let names = ["/imu/0".to_owned(), "/imu/1".to_owned()];
+        for set in 0..=2 {
+            let mut carriers = pair(0.001);
+            let said = carriers.align(None, &names[..set], false);
+            assert_eq!(carriers.apart, set < 2);
+            assert_eq!(said.len(), usize::from(set < 2));
+        }
+    }
+
     /// Of two columns by how much the second is behind, rad.
     fn behind((t_s, phases): &Phases) -> f64 {
         let [a, b] = &phases[..] else {
@@ -664,9 +773,16 @@ mod tests {
         carriers.worn[1].ahead_s = 0.1;
         let phases = carriers.phases().unwrap();
         assert!(behind(&phases).abs() < 0.02, "{}", behind(&phases));
-        // From the later beginning to the earlier end of both.
-        let (t_s, _) = &phases;
-        assert!(t_s[0].abs() < 0.011 && (t_s[t_s.len() - 1] - 59.89).abs() < 0.011);
+        // From the earlier beginning to the later end, each known but for half a second at its own ends.
+        let (t_s, columns) = &phases;
+        assert!((t_s[0] + 0.1).abs() < 0.011 && (t_s[t_s.len() - 1] - 59.99).abs() < 0.011);
+        for (column, ahead_s) in columns.iter().zip([0.0, 0.1]) {
+            for (t, phase) in t_s.iter().zip(column) {
+                let from_end_s = (t + ahead_s).min(59.99 - ahead_s - t);
+                assert!(phase.is_finite() || from_end_s < 0.52, "{t}");
+                assert!(phase.is_nan() || from_end_s > 0.48, "{t}");
+            }
+        }
         for steps in carriers.step_s() {
             for step in steps.iter().filter(|t| (5.0..55.0).contains(*t)) {
                 let off = step * WALK_HZ - (step * WALK_HZ).round();
@@ -732,7 +848,7 @@ mod tests {
         let mut carriers = pair(0.0);
         let with = |carriers: &Carriers, synchrony, others: &[f64], by_clocks| {
             let mut metrics = of(synchrony);
-            carriers.interval(&mut metrics, &detected, others, by_clocks);
+            carriers.interval(&mut metrics, &detected, others, Ok(by_clocks));
             metrics
         };
         let near = |a: [f64; 2], b: [f64; 2]| (a[0] - b[0]).abs() + (a[1] - b[1]).abs() < 1e-12;

@@ -2,7 +2,7 @@
 //!
 //! The clock of the rath's own sensor is everybody's. A device keeps its own where too little is shared, and that is said.
 
-use crate::clock::{Clock, ClockError, from_events, from_signals, taps};
+use crate::clock::{Clock, ClockError, MOST_DRIFT, from_events, from_signals, taps};
 use crate::imu::Track;
 use crate::imu::track::period_s;
 use crate::inputs::Window;
@@ -16,6 +16,10 @@ const SHARE: f64 = 0.6;
 const SEARCH_S: f64 = 300.0;
 /// A tap of one and the same tap of the other are this near, s: half a sample of each at 50 Hz.
 const TOLERANCE_S: f64 = 0.02;
+/// What is noticed so near the taps tells how often something is, s.
+const ABOUT_S: f64 = 5.0;
+/// Clocks that chance finds more often are not set.
+const MOST_BY_CHANCE: f64 = 1e-3;
 /// Taps so far apart are those before a walk and those behind it, s.
 const WALK_S: f64 = 10.0;
 /// A beat that comes so soon after the last tap is one, s.
@@ -36,8 +40,8 @@ pub struct Clocks {
     turning: (Vec<f64>, Vec<f64>),
     /// Clocks are left as they are; it is only said how they differ.
     leave: bool,
-    /// Whether taps tell how any other clock goes.
-    pub any_set: bool,
+    /// Topics of the sensors of whose clocks taps tell how they go.
+    pub set: Vec<String>,
     /// Whether any differs by more than taps err, and was left.
     pub any_apart: bool,
     /// What there is to say.
@@ -65,13 +69,15 @@ impl Clocks {
         let tap_s = felt(track);
         let fit = from_events(&tap_s, &self.tap_s, SEARCH_S, TOLERANCE_S);
         let taps = tap_s.len().min(self.tap_s.len());
-        self.found(topic, fit, taps).map_or(0.0, |mut clock| {
+        let found = self.found(topic, fit, taps, [&tap_s, &self.tap_s.clone()]);
+        found.map_or(0.0, |mut clock| {
             // A tap falls anywhere between two samples, of either sensor; the scatter does not show it where both samplings keep step.
             let spread_s = |t_s: &[f64]| period_s(t_s).unwrap_or_default() / 12f64.sqrt();
             let sampled_s = spread_s(&track.t_s).hypot(spread_s(&self.turning.0));
             let floor_s = sampled_s / (clock.points as f64).sqrt();
             clock.offset_sd_s = clock.offset_sd_s.max(floor_s);
             self.say(topic, &clock, clock.ahead());
+            self.set.push(topic.to_owned());
             if self.leave {
                 return 0.0;
             }
@@ -126,7 +132,8 @@ impl Clocks {
         let fit = from_events(&self.tap_s, onset_s, SEARCH_S, TOLERANCE_S);
         // A tap is felt at the largest sample of its ringing, up to a sample behind its beginning, every time alike; between two sensors that cancels.
         let felt_late_s = 0.5 * period_s(&self.turning.0).unwrap_or_default();
-        if let Some(clock) = self.found(topic, fit, self.tap_s.len()) {
+        let events = [&self.tap_s.clone()[..], onset_s];
+        if let Some(clock) = self.found(topic, fit, self.tap_s.len(), events) {
             let clock = Clock {
                 offset_sd_s: clock.offset_sd_s.hypot(HEARD_SD_S).hypot(felt_late_s),
                 ..clock
@@ -164,14 +171,19 @@ impl Clocks {
         beat_s.drain(..beat_s.iter().position(heard).unwrap_or_default());
     }
 
-    /// A clock that rests on enough of `taps`; otherwise it is said why there is none.
+    /// A clock that rests on enough of `taps` and on more of the events, the device's and the reference's, than chance pairs; otherwise it is said why there is none.
     fn found(
         &mut self,
         topic: &str,
         clock: Result<Clock, ClockError>,
         taps: usize,
+        events_s: [&[f64]; 2],
     ) -> Option<Clock> {
         let why = match clock {
+            Ok(clock) if by_chance(&clock, events_s) > MOST_BY_CHANCE => format!(
+                "the {} found here stand among so much else that chance finds as many",
+                clock.points
+            ),
             Ok(clock) if clock.points >= FEWEST.max((SHARE * taps as f64).ceil() as usize) => {
                 return Some(clock.believed());
             }
@@ -229,8 +241,41 @@ impl Clocks {
                 clock.points,
             ),
         ));
-        self.any_set = true;
     }
+}
+
+/// Probability that so many events pair at any of the offsets that are looked through, if none is shared: others about them, the device's or the reference's, come
+/// as often as chance has it.
+///
+/// ```text
+/// p = M P(N ≥ n),    N Poisson of mean λ = 2 ε m ρ
+/// ```
+/// n the pairs found, m events of one device, ρ what else the other noticed about these per second, ε the tolerance, M the offsets and drifts that differ by it.
+fn by_chance(clock: &Clock, [device_s, reference_s]: [&[f64]; 2]) -> f64 {
+    let there: Vec<f64> = device_s.iter().map(|t| clock.reference_s(*t)).collect();
+    let expected = |few: &[f64], others: &[f64]| {
+        let (mut about_s, mut end_s) = (0.0, f64::MIN);
+        let mut count = 0;
+        for t in few {
+            let (from, to) = ((t - ABOUT_S).max(end_s), t + ABOUT_S);
+            about_s += to - from;
+            count += others.partition_point(|o| *o < to) - others.partition_point(|o| *o < from);
+            end_s = to;
+        }
+        let else_per_s = count.saturating_sub(clock.points) as f64 / f64::max(about_s, ABOUT_S);
+        2.0 * TOLERANCE_S * few.len() as f64 * else_per_s
+    };
+    let mean = expected(&there, reference_s).max(expected(reference_s, &there));
+    let mut term = (1..=clock.points).fold((-mean).exp(), |p, k| p * mean / k as f64);
+    let mut tail = 0.0;
+    for k in clock.points + 1..clock.points + 100 {
+        tail += term;
+        term *= mean / k as f64;
+    }
+    let span_s = |t: &[f64]| t.last().unwrap_or(&0.0) - t.first().unwrap_or(&0.0);
+    let offsets = (SEARCH_S / TOLERANCE_S).min((device_s.len() * reference_s.len()) as f64);
+    let drifts = 1.0 + MOST_DRIFT * span_s(device_s) / TOLERANCE_S;
+    offsets * drifts * tail
 }
 
 /// Taps that a sensor felt, s.
@@ -285,6 +330,33 @@ mod tests {
         assert!(said(-17.4).ends_with(" and -17 ± 21 ppm fast"));
     }
 
+    /// Four taps in silence set a clock; four that are found among talk and drums of four onsets a second do not.
+    #[test]
+    fn what_chance_pairs_as_often_sets_no_clock() {
+        let taps_s = [3.0, 3.7, 5.1, 5.5];
+        let mut random = crate::random::Random(5);
+        let mut dense: Vec<f64> = (0..240).map(|_| 60.0 * random.uniform()).collect();
+        dense.extend(taps_s);
+        dense.sort_by(f64::total_cmp);
+        let walk = (0..100).map(|k| 20.0 + 0.47 * f64::from(k));
+        let silent: Vec<f64> = taps_s.into_iter().chain(walk).collect();
+        for (onsets_s, set) in [(silent, true), (dense, false)] {
+            let clock = Clock {
+                offset_s: 0.0,
+                offset_sd_s: 1e-3,
+                drift_ppm: 0.0,
+                drift_sd_ppm: None,
+                at_s: 0.0,
+                points: 4,
+            };
+            let p = by_chance(&clock, [&taps_s, &onsets_s]);
+            assert_eq!(p < MOST_BY_CHANCE, set, "{p}");
+            // Whichever of the two is called the device.
+            let p = by_chance(&clock, [&onsets_s, &taps_s]);
+            assert_eq!(p < MOST_BY_CHANCE, set, "{p}");
+        }
+    }
+
     #[test]
     fn taps_are_no_beats() {
         let left = |tap_s: &[f64]| {
@@ -326,6 +398,6 @@ mod tests {
         assert!((numbers[0] - 120.0).abs() < 1.0, "{}", first.text);
         assert!((numbers[2] - 80.0).abs() < 10.0, "{}", first.text);
         assert_eq!(second.kind, "turns_otherwise", "{}", second.text);
-        assert!(!clocks.any_set);
+        assert!(clocks.set.is_empty());
     }
 }

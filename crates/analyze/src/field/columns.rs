@@ -6,7 +6,7 @@ use std::sync::Arc;
 use recording::read::{ReadError, Recording};
 use recording::signal::{Signal, field_of, seconds_since};
 
-use super::dates::{Dated, dated, delay_s, ends_s, mixed};
+use super::dates::{Dated, are_two, dated, delay_s, ends_s, mixed};
 use crate::imu::Track;
 use crate::imu::stray::strays;
 
@@ -32,6 +32,8 @@ pub(super) const STAMPS: [[&str; 2]; 2] = [
 ];
 /// Fields of a beat: its number and its own time.
 pub(super) const BEAT: [&str; 2] = ["number", "time_s"];
+/// Two sensors' accelerations differ by more than this, m/s², RMS.
+const TWO_M_PER_S2: f64 = 1.0;
 /// More samples than this share left out are worth a word.
 const MANY: f64 = 0.01;
 
@@ -43,6 +45,8 @@ pub(super) struct Sensor {
     /// Whether it has a gyroscope, and an accelerometer.
     pub turns: bool,
     pub feels: bool,
+    /// Whether it is two, whose samples come by turns.
+    pub two: bool,
     pub remarks: Vec<(&'static str, String)>,
 }
 
@@ -201,6 +205,7 @@ impl Columns {
             }
             columns[0] = &once;
         }
+        let two = are_two(&columns[4..], TWO_M_PER_S2);
         let [t_s, x, y, z, accel @ ..] = columns;
         let track = Track::from_columns(t_s, [x, y, z], accel);
         let dropped = track.dropped - if turns { without } else { 0 };
@@ -216,6 +221,7 @@ impl Columns {
             track: track.without(&strays),
             turns,
             feels,
+            two,
             remarks,
         })
     }
@@ -248,7 +254,7 @@ impl Columns {
         });
         let log_s = seconds_since(&any.times_ns, self.start_ns);
         let (t_s, remark) = match own_s {
-            Some(own_s) => (never_early(own_s, &log_s), None),
+            Some(own_s) => never_early(own_s, &log_s),
             None => {
                 let Dated { t_s, remark, .. } = dated(log_s, None);
                 (t_s, remark)
@@ -320,9 +326,12 @@ pub(super) fn came(recording: &Recording, topic: &str) -> Result<Signal, ReadErr
     })
 }
 
-/// Beats' own times on the log's clock: moved so that none lies behind its log time, and stretched where the delays surely grow or fall. Beats are
-/// few: the clocks' drift from the earliest of them alone would bend how carriers come to the beat.
-fn never_early(own_s: &[f64], log_s: &[f64]) -> Vec<f64> {
+/// No two clocks of quartz part faster, ppm: delays that grow faster are a queue's, or of a clock that was set.
+const MOST_PPM: f64 = 200.0;
+
+/// Beats' own times on the log's clock: moved so that none lies behind its log time, and stretched where the delays surely grow or fall as clocks part. Beats
+/// are few: the clocks' drift from the earliest of them alone would bend how carriers come to the beat.
+fn never_early(own_s: &[f64], log_s: &[f64]) -> (Vec<f64>, Option<(&'static str, String)>) {
     let n = own_s.len() as f64;
     let delay_s: Vec<f64> = log_s.iter().zip(own_s).map(|(l, s)| l - s).collect();
     let mean = |x: &[f64]| x.iter().sum::<f64>() / n;
@@ -334,11 +343,20 @@ fn never_early(own_s: &[f64], log_s: &[f64]) -> Vec<f64> {
     }
     // Squares of the slope and of three of its standard errors.
     let sure = td * td * (n - 2.0) > 9.0 * (dd * tt - td * td);
-    let slope = if sure { td / tt } else { 0.0 };
+    let found = if sure { td / tt } else { 0.0 };
+    let of_clocks = (1e6 * found).abs() <= MOST_PPM;
+    let slope = if of_clocks { found } else { 0.0 };
+    let remark = (!of_clocks).then(|| {
+        let text = format!(
+            "what beats come late by changes by {:+.0} ppm: no two clocks part like that, so messages queued up or a clock was set, and the least late tell when all were",
+            1e6 * found
+        );
+        ("late_beats", text)
+    });
     let late = |(d, s): (&f64, &f64)| d - slope * (s - middle_s);
     let least_s = delay_s.iter().zip(own_s).map(late).fold(f64::MAX, f64::min);
     let moved = |s: &f64| s + least_s + slope * (s - middle_s);
-    own_s.iter().map(moved).collect()
+    (own_s.iter().map(moved).collect(), remark)
 }
 
 #[cfg(test)]
@@ -459,11 +477,12 @@ mod tests {
         let mut random = crate::random::Random(11);
         let own_s: Vec<f64> = (0..200).map(|k| 100.0 + 0.5 * f64::from(k)).collect();
         let late_s: Vec<f64> = (0..200).map(|_| -0.004 * random.uniform().ln()).collect();
-        // 3 ms fast in a second is seen by 100 s, whose delays scatter by 4 ms; 1 µs is not.
+        // 0.15 ms fast in a second is seen by 100 s, whose delays scatter by 4 ms; 1 µs is not, and 3 ms is of no clock.
         for (drift, delays, seen) in [
             (0.0, 1.0, 0.0),
-            (3e-3, 0.0, 3e-3),
-            (3e-3, 1.0, 3e-3),
+            (1.5e-4, 0.0, 1.5e-4),
+            (1.5e-4, 1.0, 1.5e-4),
+            (3e-3, 1.0, 0.0),
             (1e-6, 1.0, 0.0),
         ] {
             let there = |t: f64| 7.0 + t + drift * (t - 100.0);
@@ -472,7 +491,8 @@ mod tests {
                 .zip(&late_s)
                 .map(|(t, l)| there(*t) + delays * l)
                 .collect();
-            let found = never_early(&own_s, &log_s);
+            let (found, remark) = never_early(&own_s, &log_s);
+            assert_eq!(remark.is_some(), drift == 3e-3);
             let least = found
                 .iter()
                 .zip(&log_s)

@@ -146,19 +146,27 @@ pub fn dated(log_s: Vec<f64>, stamp_s: Option<Vec<f64>>) -> Dated {
 /// Where samples in the order of their times come twice as often as they do before, and tell of two courses by turns: a clock was set back there. A queue that
 /// is emptied comes as often, but nothing comes before it; a sensor that doubles its rate tells of one course.
 pub fn mixed(t_s: &[f64], x: &[&[f64]]) -> Vec<Range<usize>> {
-    let by_turns = |within: &Range<usize>| {
-        x.iter().any(|x| {
-            let apart = |by: usize| -> f64 {
-                let pairs = x[within.clone()].windows(by + 1);
-                let apart = pairs.map(|w| (w[by] - w[0]).powi(2));
-                apart.filter(|a| a.is_finite()).sum()
-            };
-            apart(1) > BY_TURNS * apart(2)
-        })
-    };
     let mut found = twice(t_s);
-    found.retain(by_turns);
+    found.retain(|within| x.iter().any(|x| goes_back_and_forth(&x[within.clone()])));
     found
+}
+
+/// Whether samples in the order of their times tell of two courses by turns all the time: two sensors publish under one name. What goes back and forth by less
+/// than `least` (RMS) may be one that trembles at half its rate.
+pub fn are_two(x: &[&[f64]], least: f64) -> bool {
+    x.iter()
+        .any(|x| mean_square(x, 1) > least * least && goes_back_and_forth(x))
+}
+
+fn goes_back_and_forth(x: &[f64]) -> bool {
+    mean_square(x, 1) > BY_TURNS * mean_square(x, 2)
+}
+
+/// Of the differences of what stands so far apart, about.
+fn mean_square(x: &[f64], by: usize) -> f64 {
+    let apart = x.windows(by + 1).map(|w| (w[by] - w[0]).powi(2));
+    let sum: f64 = apart.filter(|a| a.is_finite()).sum();
+    sum / x.len().max(1) as f64
 }
 
 fn twice(t_s: &[f64]) -> Vec<Range<usize>> {
@@ -434,6 +442,21 @@ mod tests {
             .zip(b)
             .map(|(a, b)| (a - b).abs())
             .fold(0.0, f64::max)
+    }
+
+    /// One that hangs upright and one that lies, by turns; and one sensor alone, smooth or noisy.
+    #[test]
+    fn two_sensors_under_one_name_are_found() {
+        let mut random = Random(3);
+        let sway = |k: usize| (0.07 * k as f64).sin();
+        let one: Vec<f64> = (0..1000).map(|k| 9.8 + sway(k)).collect();
+        let noisy: Vec<f64> = one.iter().map(|x| x + 3.0 * random.normal()).collect();
+        let both: Vec<f64> = (0..1000)
+            .map(|k| if k % 2 == 0 { 9.8 } else { 0.0 } + sway(k))
+            .collect();
+        assert!(are_two(&[&one, &both], 1.0));
+        assert!(!are_two(&[&one, &noisy], 1.0) && !are_two(&[&both], 10.0));
+        assert!(!are_two(&[&[]], 1.0) && !are_two(&[], 1.0));
     }
 
     #[test]

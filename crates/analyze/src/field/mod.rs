@@ -233,6 +233,7 @@ impl Field {
                 strays_s,
                 turns,
                 feels,
+                two,
                 remarks,
             }) = dated.and_then(|dated| columns.sensor(topic, dated))
             else {
@@ -251,6 +252,17 @@ impl Field {
             }
             let is_rath = roles.topic(Role::Imu) == Some(topic.as_str());
             let carries = roles.patterns(Role::Carriers).contains(topic);
+            if two {
+                let why = "its samples tell of two sensors by turns, which publish under one name: give each a topic of its own";
+                field
+                    .quality
+                    .push(Quality::remark(topic, "two_sensors", why.to_owned()));
+                if is_rath {
+                    field.topic = Some(topic.clone());
+                    field.no_motion = Some(why.to_owned());
+                }
+                continue;
+            }
             let within = window.range(&track.t_s);
             let mut lost = |kind, told: String, samples: &[usize], what: Option<Lost>| {
                 field.quality.push(Quality {
@@ -293,6 +305,9 @@ impl Field {
                     field.quality.push(Quality::remark(topic, kind, told));
                     if let Some(lost) = lost.filter(|_| is_rath) {
                         field.lose(topic, kind, lost, true);
+                    } else if lost.is_some() && carries {
+                        // Whatever it reads, the accelerometer alone tells steps.
+                        track.gyro_rad_per_s.fill([0.0; 3]);
                     }
                 }
             }
@@ -370,8 +385,9 @@ impl Field {
         if clocks.any_apart {
             field.carriers.clocks = inputs::Clocks::LeftApart;
         }
-        if !one_clock && !clocks.any_set {
-            field.align(roles, leave);
+        field.quality.extend(field.carriers.leave_out(window));
+        if !one_clock {
+            field.align(roles, &clocks.set, leave);
         }
         field.quality.append(&mut clocks.remarks);
         if truth {
@@ -441,6 +457,12 @@ impl Field {
                     ));
                     self.lose(topic, "mounting", Lost::Mounting, true);
                 }
+                if motion.forward_is_unknown() {
+                    let text = "its x stands upright, and which way of it is forward nothing tells: roll and pitch may be each other, or mixed; give imu_mounting_roll_pitch_yaw_deg in a roles file";
+                    self.quality
+                        .push(Quality::remark(topic, "forward", text.to_owned()));
+                    self.lose(topic, "forward", Lost::Forward, true);
+                }
                 if let Some(turned) = motion.turned() {
                     self.quality.push(Quality {
                         t_s: Some(turned.t_s),
@@ -477,10 +499,10 @@ impl Field {
     }
 
     /// Puts the carriers' clocks on each other, by the motion of the rath that they all drive, or says how with `leave`.
-    fn align(&mut self, roles: &Roles, leave: bool) {
+    fn align(&mut self, roles: &Roles, set: &[String], leave: bool) {
         if roles.patterns(Role::Carriers).len() >= 2 {
-            self.quality
-                .extend(self.carriers.align(self.motion.as_ref(), leave));
+            let motion = self.motion.as_ref();
+            self.quality.extend(self.carriers.align(motion, set, leave));
         }
     }
 
@@ -664,7 +686,7 @@ impl Field {
                 &mut together,
                 &detected.unwrap_or_default(),
                 &others,
-                by_clocks.hypot(by_holes),
+                by_holes.map(|by_holes| by_clocks.hypot(by_holes)),
             );
             for lost in &self.carriers_lost {
                 interval::without_those(&mut together, *lost, carriers::gives);

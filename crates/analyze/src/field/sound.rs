@@ -1,4 +1,11 @@
 //! Sound in a recording: `foxglove.RawAudio` messages, 16-bit PCM, joined to one channel in the order of time.
+//!
+//! A message's timestamp is when its sound begins; a recorder logs it when its sound is complete. So timestamps date messages where they are on the log's clock,
+//! and log times otherwise. Samples are counted by a clock of their own, which is held against these dates:
+//! ```text
+//! t = t_0 + s + d(s)        d the straight line through what is least late in the first and in the last third
+//! ```
+//! s the sound before a message (s), t its date; as [`dates`](super::dates), from where the method is.
 
 use std::collections::VecDeque;
 use std::ops::Range;
@@ -9,6 +16,7 @@ use recording::schema::foxglove::RawAudio;
 use recording::text::counted;
 
 use crate::beat::{BeatError, Beats, beats_among, onsets};
+use crate::median::median;
 use crate::roles::SOUND;
 
 /// Sound is thinned to no less than this, Hz: enough for what a drum begins.
@@ -21,7 +29,16 @@ const HOLE_S: [f64; 2] = [0.002, 0.1];
 /// Some messages come late by themselves: behind a hole all do for so long, s, in which quartz drifts by less than a millisecond.
 const LATE_FOR_S: f64 = 5.0;
 
-/// What is heard in a recording; times on the sound's own clock, s since the recording's first message.
+/// Behind its timestamp a message comes by so many of its lengths and so long at most, s, and before it by no more than clocks are rounded: else the
+/// timestamps are not on the log's clock.
+const LATE: (f64, f64) = (1.5, 0.1);
+const EARLY_S: f64 = 0.002;
+/// No sound is counted by a clock that is farther off, ppm.
+const MOST_PPM: f64 = 1000.0;
+/// Less is not put right, s: rounding.
+const LEAST_OFF_S: f64 = 1e-4;
+
+/// What is heard in a recording; times on the clock of its messages, s since the recording's first one.
 pub struct Heard {
     /// Topic of the sound.
     pub topic: String,
@@ -33,9 +50,10 @@ pub struct Heard {
     pub remarks: Vec<String>,
 }
 
-/// A message with sound, by its log time.
+/// A message with sound.
 #[derive(Clone, Copy)]
 struct Block {
+    /// Its date: of its log, or of its timestamp.
     t_ns: i64,
     /// Its number among them in the file.
     number: usize,
@@ -49,6 +67,15 @@ fn frames_of(audio: &RawAudio) -> Option<(u32, usize)> {
     usable.then(|| (audio.sample_rate, audio.data.len() / (2 * channels)))
 }
 
+/// When a message says that its sound begins, ns since 1970.
+fn stamp_ns(audio: &RawAudio) -> Option<i64> {
+    let stamp = audio.timestamp.as_ref()?;
+    stamp
+        .seconds
+        .checked_mul(1_000_000_000)?
+        .checked_add(stamp.nanos.into())
+}
+
 /// Where messages belong, in samples as recorded.
 #[derive(Default)]
 struct Plan {
@@ -58,6 +85,8 @@ struct Plan {
     holes: Vec<Range<usize>>,
     frames: usize,
     cut: bool,
+    /// Sound before each message that is listened to, and how late this is by its date, s.
+    late_s: Vec<(f64, f64)>,
 }
 
 impl Plan {
@@ -116,6 +145,7 @@ impl Plan {
             }
             let late_s = late_s(plan.frames, block);
             plan.start[block.number] = Some(plan.frames);
+            plan.late_s.push((plan.frames as f64 / rate_hz, late_s));
             plan.frames += block.frames;
             while before.back().is_some_and(|b| b.1 >= late_s) {
                 before.pop_back();
@@ -129,13 +159,78 @@ impl Plan {
     }
 }
 
+/// How a sound's samples stand to its messages' dates.
+#[derive(Clone, Copy, Debug, PartialEq)]
+struct Pace {
+    at_s: f64,
+    off_s: f64,
+    slope: f64,
+}
+
+impl Pace {
+    /// Of the sound before each message and how late that is, s.
+    fn of(late_s: &[(f64, f64)]) -> Self {
+        let n = late_s.len();
+        let least = |part: &[(f64, f64)]| part.iter().copied().min_by(|a, b| a.1.total_cmp(&b.1));
+        let none = Pace {
+            at_s: 0.0,
+            off_s: 0.0,
+            slope: 0.0,
+        };
+        let ends = [&late_s[..n.div_ceil(3)], &late_s[n - n.div_ceil(3)..]].map(least);
+        let [Some(a), Some(b)] = ends else {
+            return none;
+        };
+        let apart_s = b.0 - a.0;
+        let slope = if apart_s > 0.0 {
+            (b.1 - a.1) / apart_s
+        } else {
+            0.0
+        };
+        let believed = (1e6 * slope).abs() <= MOST_PPM;
+        match a.1.abs().max((b.1 - a.1).abs()) > LEAST_OFF_S {
+            true => Pace {
+                at_s: a.0,
+                off_s: a.1,
+                slope: if believed { slope } else { 0.0 },
+            },
+            false => none,
+        }
+    }
+
+    /// When a moment of the sound is, s.
+    fn dated(&self, s: f64) -> f64 {
+        s + self.off_s + self.slope * (s - self.at_s)
+    }
+}
+
+/// Dates messages by their timestamps (ns, `None` where one has none), if these are on the log's clock.
+fn by_stamps(blocks: &mut [Block], stamps_ns: &[Option<i64>], rate_hz: f64) {
+    let stamps: Option<Vec<i64>> = stamps_ns.iter().copied().collect();
+    let Some(stamps) = stamps.filter(|s| s.windows(2).any(|w| w[0] != w[1])) else {
+        return;
+    };
+    let each = || blocks.iter().zip(&stamps);
+    let mut late_s: Vec<f64> = each().map(|(b, s)| seconds(*s, b.t_ns)).collect();
+    let mut long_s: Vec<f64> = blocks.iter().map(|b| b.frames as f64 / rate_hz).collect();
+    let near = late_s.iter().all(|late_s| late_s.abs() <= LONGEST_S);
+    let (Some(late_s), Some(long_s)) = (median(&mut late_s), median(&mut long_s)) else {
+        return;
+    };
+    if near && (-EARLY_S..=LATE.0 * long_s + LATE.1).contains(&late_s) {
+        for (block, stamp) in blocks.iter_mut().zip(stamps) {
+            block.t_ns = stamp;
+        }
+    }
+}
+
 fn seconds(from_ns: i64, to_ns: i64) -> f64 {
     to_ns.saturating_sub(from_ns) as f64 / 1e9
 }
 
 /// Listens to the first topic with sound. `None` where there is no sound.
 ///
-/// Messages are joined in the order of their log times, channels are averaged, sound of more than 32 kHz is thinned; what is lost between messages is
+/// Messages are joined in the order of their dates, channels are averaged, sound of more than 32 kHz is thinned; what is lost between messages is
 /// not a number. Messages that are not `pcm-s16` of one rate or cannot be decoded are counted and passed over.
 ///
 /// # Errors
@@ -155,11 +250,13 @@ pub fn listen(recording: &Recording) -> Result<Option<Heard>, ReadError> {
         })
     };
     let (mut rate, mut refused, mut blocks) = (0, 0, Vec::new());
+    let mut stamps_ns = Vec::new();
     each(
         &mut |t_ns, audio| match audio.as_ref().and_then(frames_of) {
             Some((its, frames)) if rate == 0 || rate == its => {
                 rate = its;
                 let number = blocks.len();
+                stamps_ns.push(audio.as_ref().and_then(stamp_ns));
                 blocks.push(Block {
                     t_ns,
                     number,
@@ -170,7 +267,9 @@ pub fn listen(recording: &Recording) -> Result<Option<Heard>, ReadError> {
         },
     )?;
     let some = !blocks.is_empty();
+    by_stamps(&mut blocks, &stamps_ns, f64::from(rate));
     let plan = Plan::of(blocks, f64::from(rate));
+    let pace = Pace::of(&plan.late_s);
     let factor = (rate / RATE_HZ).max(1) as usize;
     let rate_hz = f64::from(rate) / factor as f64;
     let mut sound = vec![0f32; plan.frames / factor];
@@ -211,6 +310,12 @@ pub fn listen(recording: &Recording) -> Result<Option<Heard>, ReadError> {
             missing as f64 / f64::from(rate)
         ));
     }
+    if pace.slope != 0.0 {
+        remarks.push(format!(
+            "its samples are counted {:+.0} ppm slower than its messages are dated, which is put right",
+            1e6 * pace.slope
+        ));
+    }
     if plan.cut {
         remarks.push(format!("only {LONGEST_S} s in one are listened to"));
     }
@@ -220,10 +325,14 @@ pub fn listen(recording: &Recording) -> Result<Option<Heard>, ReadError> {
         let begins = onsets(&sound, rate_hz);
         if let Ok(begins) = &begins {
             onset_s = begins.times_s();
-            onset_s.iter_mut().for_each(|t| *t += start_s);
+            onset_s
+                .iter_mut()
+                .for_each(|t| *t = start_s + pace.dated(*t));
         }
         beats = begins.and_then(|begins| beats_among(&begins)).map(|mut b| {
-            b.beat_s.iter_mut().for_each(|t| *t += start_s);
+            b.beat_s
+                .iter_mut()
+                .for_each(|t| *t = start_s + pace.dated(*t));
             b
         });
     }
@@ -343,6 +452,33 @@ mod tests {
             println!("{} of {} beats, {worst} s off", found.len(), whole.len());
             assert!(worst < 0.012 && whole.len() - found.len() <= 10, "{worst}");
         }
+    }
+
+    /// A recorder logs a message when its sound is complete, and its samples are counted 100 ppm too slowly: the timestamps know.
+    #[test]
+    fn sound_is_where_its_timestamps_say() {
+        let (sound, _) = drums(&Drums::default());
+        let of = |by_ppm: f64, logged_late_s: f64| {
+            let messages = sound.chunks_exact(BLOCK).take(400).enumerate();
+            out_of_a_file(messages.map(|(k, block)| {
+                let data = block
+                    .iter()
+                    .flat_map(|s| ((8000.0 * s) as i16).to_le_bytes());
+                let begins_s = 0.1 * k as f64 * (1.0 + 1e-6 * by_ppm);
+                let t_ns = 1_000_000_000 + (1e9 * begins_s) as i64;
+                let message = RawAudio::pcm_s16(t_ns, data.collect(), 22_050, 1);
+                (t_ns + (1e9 * logged_late_s) as i64, message)
+            }))
+        };
+        let (plain, found) = (of(0.0, 0.0), of(100.0, 0.1));
+        assert_eq!(found.onset_s.len(), plain.onset_s.len());
+        for (a, b) in plain.onset_s.iter().zip(&found.onset_s) {
+            // The recording begins with its first log time.
+            let there = a * (1.0 + 1e-4) - 0.1;
+            assert!((b - there).abs() < 2e-5, "{b} {there}");
+        }
+        assert!(found.remarks[0].contains("+100 ppm"), "{:?}", found.remarks);
+        assert!(plain.remarks.is_empty());
     }
 
     /// Each a sample long and 3 ms behind the one before: a hole before every one of them.

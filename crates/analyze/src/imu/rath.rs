@@ -150,6 +150,12 @@ impl Motion {
 }
 
 impl Motion {
+    /// Whether nothing tells which way is forward: the sensor's x stands upright, and nobody says how it sits.
+    pub fn forward_is_unknown(&self) -> bool {
+        let x = self.body_from_sensor * Vector3::x();
+        self.settings.mounting == Mounting::Levelled && x.xy().norm() < LEVEL
+    }
+
     /// What of a window was sampled and is in no stretch, and how much was sampled, s.
     pub fn left_out_s(&self, window: Window) -> [f64; 2] {
         let within = |w: &Window| window.overlap_s(*w);
@@ -533,11 +539,12 @@ fn mean_up(earth_from: &[UnitQuaternion<f64>], over: Range<usize>) -> Vector3<f6
     up.sum::<Vector3<f64>>() / some.len().max(1) as f64
 }
 
+/// Least level part of the sensor's x that tells which way is forward, 1: about 17° from upright.
+const LEVEL: f64 = 0.3;
+
 /// Body from sensor: z is the mean upward direction as the sensor sees it over some samples (all where these are none), x what is level of the
 /// sensor's own x. The shortest turn where that x stands nearly upright: it says little of forward then.
 fn level(estimate: &Estimate, over: Range<usize>) -> UnitQuaternion<f64> {
-    /// Least level part of the sensor's x, 1: about 17° from upright.
-    const LEVEL: f64 = 0.3;
     let up = mean_up(&estimate.earth_from_sensor, over);
     let Some(up) = up.try_normalize(0.0) else {
         return UnitQuaternion::identity();

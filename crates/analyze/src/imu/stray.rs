@@ -2,6 +2,7 @@
 //! half new. One of them turns the attitude and throws the height for seconds, so they count as lost.
 
 use super::track::{Instrument, Track};
+use nalgebra::Vector3;
 
 /// So far from both neighbours, in the instrument's unit, on the same side. A fall onto stone is felt by what is carried as up to some 50 m/s² (re-contact after a
 /// float passes 4 g), through a sensor's own low-pass filter, and so over more than one sample: it rises and falls by less than this between them. Nobody turns a
@@ -16,6 +17,10 @@ const fn beyond(of: Instrument) -> f64 {
 const AGREE: f64 = 0.25;
 /// Of a message filled with zeros: what its neighbours feel at least, m/s². In free flight a coarse sensor may read zero.
 const FELT_M_PER_S2: f64 = 5.0;
+/// Of a rate of nothing: what its neighbours turn by at least, rad/s, about one axis to the same side. A coarse sensor that swings through nought may read zero.
+const TURNED_RAD_PER_S: f64 = 0.2;
+/// Neighbours are no further apart than this, in steps: one more may be lost on either side.
+const BESIDE: f64 = 4.5;
 /// With longer steps, s, a whole blow fits between two neighbours.
 const LONGEST_STEP_S: f64 = 0.05;
 
@@ -39,7 +44,7 @@ pub fn strays(track: &Track) -> Vec<usize> {
     }
     let is = |k: usize| {
         let (a, b) = (k - 1, k + 1);
-        let beside = track.t_s[b] - track.t_s[a] < 3.0 * usual_s;
+        let beside = track.t_s[b] - track.t_s[a] < BESIDE * usual_s;
         beside
             && (is_empty(track, k)
                 || Instrument::BOTH
@@ -54,10 +59,18 @@ pub fn strays(track: &Track) -> Vec<usize> {
     found
 }
 
-/// An accelerometer's reading of nothing at all between others of something.
+/// A reading of nothing at all, of either instrument, between others of something.
 fn is_empty(track: &Track, k: usize) -> bool {
-    let felt = |k: usize| nalgebra::Vector3::from(track.accel_m_per_s2[k]).norm();
-    felt(k) == 0.0 && felt(k - 1) > FELT_M_PER_S2 && felt(k + 1) > FELT_M_PER_S2
+    let about = |of| [k - 1, k, k + 1].map(|k| Vector3::from(track.readings(of)[k]));
+    let felt = about(Instrument::Accelerometer);
+    let turned = about(Instrument::Gyroscope);
+    let feels = |v: Vector3<f64>| v.norm() > FELT_M_PER_S2;
+    let along = turned[0].dot(&turned[2]);
+    let least = turned[0].norm().min(turned[2].norm());
+    (felt[1] == Vector3::zeros() && feels(felt[0]) && feels(felt[2]))
+        || (turned[1] == Vector3::zeros()
+            && least > TURNED_RAD_PER_S
+            && along > 0.5 * turned[0].norm() * turned[2].norm())
 }
 
 fn leaps(x: &[[f64; 3]], of: Instrument, k: usize) -> bool {
@@ -96,6 +109,20 @@ mod tests {
         track.gyro_rad_per_s[400] = [0.0, 34.9, 0.0];
         track.gyro_rad_per_s[404] = [-34.9, 34.9, 0.0];
         assert_eq!(strays(&track), [100, 200, 300, 400, 404]);
+    }
+
+    /// A rate of nothing while it turns, of which there are none where it swings through nought; and one beside a sample that was lost.
+    #[test]
+    fn a_rate_of_nothing_and_one_beside_a_lost_sample_are_found() {
+        let mut track = swaying(100.0);
+        let turns = |track: &Track, k: usize| track.gyro_rad_per_s[k][0].abs();
+        let fast = (500..600).find(|k| turns(&track, *k) > 1.9).unwrap();
+        let turning = (600..700).find(|k| turns(&track, *k) < 0.02).unwrap();
+        track.gyro_rad_per_s[fast] = [0.0; 3];
+        track.gyro_rad_per_s[turning] = [0.0; 3];
+        track.accel_m_per_s2[100] = [0.0, 0.0, -156.9];
+        let beside = track.without(&[99]);
+        assert_eq!(strays(&beside), [99, fast - 1]);
     }
 
     /// Blows of one sample and of two, one that leaves the sensor elsewhere, a buzz, free flight, and all that at 10 Hz.

@@ -19,13 +19,16 @@ pub enum Lost {
     Mounting,
     /// That it sits there as it did before.
     Turned,
+    /// Which way is forward.
+    Forward,
 }
 
 /// Takes the intervals from numbers that rest on what was lost, which is in no budget. An accelerometer's missing peaks hardly turn the attitude.
 pub fn without(metrics: &mut Metrics, lost: Lost) {
-    let attitude = lost != Lost::Peaks(Instrument::Accelerometer);
-    without_those(metrics, lost, |name| {
-        attitude || is_of_height(name) || name == "t_float"
+    without_those(metrics, lost, |name| match lost {
+        Lost::Peaks(Instrument::Accelerometer) => is_of_height(name) || name == "t_float",
+        Lost::Forward => !is_of_height(name) && name != "t_float" || name == "subharmonic_ratio",
+        _ => true,
     });
 }
 
@@ -46,6 +49,10 @@ pub fn without_those(metrics: &mut Metrics, lost: Lost, rests_on: impl Fn(&str) 
         Lost::Turned => (
             Instrument::Accelerometer,
             "shows gravity elsewhere in the sensor's axes from a moment of the window on",
+        ),
+        Lost::Forward => (
+            Instrument::Accelerometer,
+            "shows the sensor's x upright, which does not tell forward",
         ),
     };
     let why = format!("without an interval: the {} {why}", instrument.name());

@@ -83,12 +83,20 @@ pub fn metrics(motion: &Motion, window: Window) -> Metrics {
         );
         without_an_interval(&mut out, &why, |_| true);
     }
+    if let Some(why) = estimate.too_little_height(window) {
+        without_an_interval(&mut out, &why, |name| {
+            OF_COURSE.contains(&name) || name == "h2_ratio"
+        });
+    }
     withhold_what_is_too_small(&mut out, &motion.settings.budget);
     out
 }
 
 /// Where more than this of a window is left out, its metrics have no interval: what a rath did meanwhile is as much a part of them.
 const MOST_UNSEEN: f64 = 0.1;
+
+/// Nor those of the height where more than this of it is not known: the parts of that length by which it is told what the missing may be are too few.
+const MOST_HEIGHT_UNKNOWN: f64 = 1.0 / 3.0;
 
 /// Takes what rests on so small a motion that the sensor's own wandering is as large.
 fn withhold_what_is_too_small(metrics: &mut Metrics, budget: &Budget) {
@@ -193,6 +201,19 @@ impl<'a> Estimate<'a> {
             }
             _ => {}
         }
+    }
+
+    /// That too little of the height is known.
+    fn too_little_height(&self, window: Window) -> Option<String> {
+        let height_m = &self.motion.inputs.height_m[window.range(&self.motion.inputs.t_s)];
+        let unknown = height_m.iter().filter(|m| m.is_nan()).count();
+        let share = unknown as f64 / height_m.len().max(1) as f64;
+        (share > MOST_HEIGHT_UNKNOWN).then(|| {
+            format!(
+                "without an interval: of {:.0} % of the window there is no height",
+                100.0 * share
+            )
+        })
     }
 
     /// What equally good sensors give.

@@ -634,6 +634,43 @@ fn what_rests_on_what_was_lost_has_no_interval() {
         let why = left.get("t_float").unwrap().reason.clone().unwrap();
         assert!(why.starts_with("without an interval: the "), "{why}");
     }
+    // Which way is forward does not matter to what goes up and down.
+    let mut left = whole.clone();
+    without(&mut left, Lost::Forward);
+    let kept = sure(&left);
+    assert!(!of_angles.iter().any(|n| kept.contains(n)), "{kept:?}");
+    assert!(
+        ["dz_pp_m", "t_float", "peak_hz"]
+            .iter()
+            .all(|n| kept.contains(n))
+    );
+}
+
+/// Where most of the height is not known, because a radio falls silent for half a second again and again, or because the window is hardly longer than what
+/// has none at its end, parts of what is known tell nothing of the rest.
+#[test]
+fn a_height_of_which_little_is_known_has_no_interval() {
+    let heave = |t: f64| 1.0 - 0.01 / G * (TAU * 2.0f64).powi(2) * (TAU * 2.0 * t).sin();
+    let whole = felt(|_| 0.0, heave, 1.0, [0.0; 3], AS_IT_SITS, Some(0.0));
+    let sure = |motion: &Motion, window| {
+        let found = metrics(motion, window);
+        let value = found.get("rms_z_m").unwrap();
+        assert!(value.as_f64().is_some(), "{value:?}");
+        value.ci95.is_some()
+    };
+    assert!(sure(&whole, MOST));
+    let mut torn = whole.clone();
+    for (t, z) in torn.inputs.t_s.iter().zip(&mut torn.inputs.height_m) {
+        if t % 9.0 < 5.5 {
+            *z = f64::NAN;
+        }
+    }
+    assert!(!sure(&torn, MOST));
+    let short = |start_s| Window {
+        start_s,
+        end_s: 40.0,
+    };
+    assert!(sure(&whole, short(20.0)) && !sure(&whole, short(36.0)));
 }
 
 /// A walk of density w has a mean square of w² T/6 about its mean (∫∫ |t − s|/2 over T²); a minute of it is none.
