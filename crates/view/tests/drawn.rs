@@ -3,11 +3,12 @@
 mod common;
 
 use analyze::request::Request;
-use common::{ROWS, imus, imus_logged, json_channel, run, run_logged, taken};
+use common::{ROWS, Taken, imus, imus_logged, json_channel, run, run_logged, taken};
 use recording::cdr::Imu;
 use recording::read::Recording;
 use recording::topics::MessageKind;
 use recording::write::{RecordingWriter, WriterOptions};
+use view::blueprint::{self, Play};
 use view::load::{Detail, load, options};
 
 #[test]
@@ -406,4 +407,30 @@ fn messages_that_overtake_each_other_are_drawn_when_they_were_taken() {
         );
         assert!((x - sine(k as i64 * 10_000_000)).abs() < 1e-12, "{k}: {x}");
     }
+}
+
+#[test]
+fn the_plots_of_a_sensor_show_no_other_topic() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("imu.mcap");
+    let mut writer = RecordingWriter::create(&path, &WriterOptions::default()).unwrap();
+    let imu = writer.channel("/imu", MessageKind::Imu).unwrap();
+    let other = json_channel(&mut writer, "/imu/gyro", "");
+    for k in 0..300 {
+        let (t_ns, x) = (k * 10_000_000, (0.1 * k as f64).sin());
+        let message = Imu::raw(t_ns, "imu", [x, 0.0, 0.0], [0.0, 0.0, 9.81]);
+        writer.message(imu, t_ns, &message).unwrap();
+        let text = format!("{{\"v_m\":{x}}}");
+        writer.message(other, t_ns, text.as_bytes()).unwrap();
+    }
+    writer.finish().unwrap();
+    let recording = Recording::open(&path, &options(&Request::default())).unwrap();
+    let (take, _) = load("imu", &recording, Detail::Thinned, &Request::default()).unwrap();
+    let mut sink = Taken::default();
+    let sent = view::send_part(&mut sink, "id", &take, None).unwrap();
+    blueprint::send(&mut sink, "views", &sent.layout, Play::Playing).unwrap();
+    assert!(sink.entities().contains("/topics/imu/gyro/m/f0"));
+    let gyro = ["x", "y", "z"].map(|axis| format!("/topics/imu/gyro/{axis}"));
+    let queries = sink.queries();
+    assert!(queries.iter().any(|query| *query == gyro), "{queries:?}");
 }

@@ -92,7 +92,9 @@ fn sensor(
         }
         let path = place(store, &sensor.topic, name);
         let range = spread(&made, take.growing);
-        plots.push(plot(store, title, &path, made, range)?);
+        // Other topics may be placed below it: `/imu/gyro` beside `/imu`. An axis without values may get some while the recording grows.
+        let paths = curves.iter().map(|c| format!("{path}/{}", c.name));
+        plots.push(plot(store, title, &path, made, range)?.contents(paths));
     }
     // One f for all of a recording; where nothing tells it, the sensor's own line.
     let f_hz = spectra::drive_hz(take)

@@ -8,6 +8,8 @@ use std::process::Command;
 use analyze::request::Request;
 use re_chunk::Chunk;
 use re_log_types::LogMsg;
+use re_sdk_types::archetypes::Transform3D;
+use re_sdk_types::blueprint::archetypes::ViewContents;
 use recording::cdr::{Header, Imu, Quaternion, TfMessage, Time, Transform, TransformStamped};
 use recording::read::Recording;
 use recording::schema::rath;
@@ -184,6 +186,29 @@ impl Sink for Taken {
 }
 
 impl Taken {
+    /// Of a blueprint's views what each queries.
+    pub fn queries(&self) -> Vec<Vec<String>> {
+        let of = |chunk: Chunk| {
+            let component = ViewContents::descriptor_query().component;
+            let mut rows = chunk.iter_slices::<String>(component);
+            let row = rows.next()?;
+            Some(row.iter().map(|query| query.to_string()).collect())
+        };
+        self.chunks(true).filter_map(of).collect()
+    }
+
+    /// Translations of an entity, in the order in which they were sent.
+    pub fn translations(&self, entity: &str) -> Vec<[f32; 3]> {
+        let component = Transform3D::descriptor_translation().component;
+        let chunks = self.chunks(false);
+        let of = chunks.filter(|c| c.entity_path().to_string() == entity);
+        let places = |c: Chunk| {
+            let rows = c.iter_slices::<[f32; 3]>(component);
+            rows.flat_map(<[[f32; 3]]>::to_vec).collect::<Vec<_>>()
+        };
+        of.flat_map(places).collect()
+    }
+
     fn chunks(&self, blueprint: bool) -> impl Iterator<Item = Chunk> {
         self.0.iter().filter_map(move |message| match message {
             LogMsg::ArrowMsg(id, arrow) if id.is_blueprint() == blueprint => {
