@@ -80,6 +80,9 @@ impl Sink for re_grpc_client::write::Client {
 /// How far a recording has been sent, so that more of it can follow.
 #[derive(Default)]
 pub struct Progress {
+    /// First time of the recording when it was begun, ns: rows are placed relative to it. It stays when earlier messages follow, or when those are no
+    /// longer taken for its beginning.
+    start_ns: i64,
     next: u64,
     /// Latest time that was sent of each entity, ns.
     last_ns: HashMap<String, i64>,
@@ -93,14 +96,12 @@ pub struct Progress {
 pub struct Store<'s> {
     id: StoreId,
     sink: &'s mut dyn Sink,
-    /// First time of the recording, ns; rows are placed relative to it.
-    start_ns: i64,
     progress: Progress,
     blueprint: bool,
 }
 
 impl<'s> Store<'s> {
-    /// Begins the recording `id`, called `name`, whose first message is at `start_ns`; or goes on with it after `progress`.
+    /// Begins the recording `id`, called `name`, whose first message is at `start_ns`; or goes on with it after `progress`, on the same time axis.
     pub fn recording(
         sink: &'s mut dyn Sink,
         id: &str,
@@ -113,7 +114,6 @@ impl<'s> Store<'s> {
             return Ok(Store {
                 id,
                 sink,
-                start_ns,
                 progress,
                 blueprint: false,
             });
@@ -150,13 +150,13 @@ impl<'s> Store<'s> {
             info,
         }))?;
         let progress = Progress {
+            start_ns,
             next: first + 1,
             ..Progress::default()
         };
         Ok(Store {
             id,
             sink,
-            start_ns,
             progress,
             blueprint,
         })
@@ -240,15 +240,16 @@ impl<'s> Store<'s> {
             return Ok(());
         };
         self.progress.last_ns.insert(key, *last);
+        let start_ns = self.progress.start_ns;
         // The few that are dated long before all others would make the axis as long.
-        let early_ns = self.start_ns.saturating_sub(TAKEN_BEFORE_NS);
+        let early_ns = start_ns.saturating_sub(TAKEN_BEFORE_NS);
         let dated = new.iter().map(|&t| match t < early_ns {
-            true => self.start_ns,
+            true => start_ns,
             false => t,
         });
-        let since = dated.clone().map(|t| t.saturating_sub(self.start_ns));
+        let since = dated.clone().map(|t| t.saturating_sub(start_ns));
         let mut times = vec![TimeColumn::new_duration_nanos(TIME, since)];
-        if self.start_ns >= FIRST_WALL_CLOCK_NS {
+        if start_ns >= FIRST_WALL_CLOCK_NS {
             times.push(TimeColumn::new_timestamp_nanos_since_epoch(UTC, dated));
         }
         let columns = columns.into_iter().map(|column| SerializedComponentColumn {

@@ -10,6 +10,7 @@ use recording::topics::MessageKind;
 use recording::write::{RecordingWriter, WriterOptions};
 use view::blueprint::{self, Play};
 use view::load::{Detail, load, options};
+use view::take::{Curve, Take, Topic};
 
 #[test]
 fn a_run_of_two_shows_everything() {
@@ -433,4 +434,37 @@ fn the_plots_of_a_sensor_show_no_other_topic() {
     let gyro = ["x", "y", "z"].map(|axis| format!("/topics/imu/gyro/{axis}"));
     let queries = sink.queries();
     assert!(queries.iter().any(|query| *query == gyro), "{queries:?}");
+}
+
+/// An earlier message comes late, then it is no longer taken for the beginning.
+#[test]
+fn the_time_axis_stays_while_a_recording_grows() {
+    let mut sink = Taken::default();
+    let mut progress = None;
+    for (k, start_ns) in [1000, 400, 2000].into_iter().enumerate() {
+        let count = 2 * (k as i64 + 1);
+        let curve = Curve {
+            name: "x".into(),
+            times_ns: (0..count).map(|k| 3000 + k).collect(),
+            values: (0..count).map(|k| k as f64).collect(),
+        };
+        let take = Take {
+            start_ns,
+            end_ns: 4000,
+            growing: true,
+            topics: vec![Topic {
+                name: "/x".into(),
+                plots: vec![(String::new(), vec![curve])],
+            }],
+            ..Take::default()
+        };
+        let sent = view::send_part(&mut sink, "id", &take, progress).unwrap();
+        progress = Some(sent.progress);
+    }
+    let times: Vec<i64> = sink
+        .scalars("/topics/x/f0")
+        .iter()
+        .map(|(t, _)| *t)
+        .collect();
+    assert_eq!(times, [2000, 2001, 2002, 2003, 2004, 2005]);
 }
