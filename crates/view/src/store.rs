@@ -83,6 +83,8 @@ pub struct Progress {
     /// First time of the recording when it was begun, ns: rows are placed relative to it. It stays when earlier messages follow, or when those are no
     /// longer taken for its beginning.
     start_ns: i64,
+    /// What the scene in space is drawn about, x and y in the world, m; once it is known.
+    origin_m: Option<[f64; 2]>,
     next: u64,
     /// Latest time that was sent of each entity, ns.
     last_ns: HashMap<String, i64>,
@@ -165,6 +167,13 @@ impl<'s> Store<'s> {
     /// How far this has been sent.
     pub fn into_progress(self) -> Progress {
         self.progress
+    }
+
+    /// What the scene in space is drawn about, x and y in the world, m: what was `found` first, however the recording grows.
+    pub fn about_m(&mut self, found: Option<[f64; 2]>) -> [f64; 2] {
+        let known = &mut self.progress.origin_m;
+        *known = known.or(found);
+        known.unwrap_or_default()
     }
 
     /// The place of a part of a topic: the one that is wanted, or one beside it where another has that. Who has been placed stays there.

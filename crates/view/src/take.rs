@@ -65,7 +65,35 @@ pub struct Pose {
     pub orientation: Vec<[f64; 4]>,
 }
 
+/// What begins no farther from the world's origin is drawn about that, m: the viewer's numbers have seven digits.
+const NEAR_M: f64 = 1000.0;
+
+/// A place about another one, m.
+fn about([x, y, z]: &[f64; 3], origin_m: [f64; 2]) -> [f64; 3] {
+    [x - origin_m[0], y - origin_m[1], *z]
+}
+
 impl Pose {
+    /// Whole metres that the body is drawn about, x and y in the world: where it begins, if that is far away. `None` where its place is never known.
+    pub fn begins_m(&self) -> Option<[f64; 2]> {
+        let known = |p: &&[f64; 3]| p[0].is_finite() && p[1].is_finite();
+        let [x, y, _] = *self.position_m.iter().find(known)?;
+        Some(match x.hypot(y) > NEAR_M {
+            true => [x.round(), y.round()],
+            false => [0.0; 2],
+        })
+    }
+
+    /// The same about a place on the ground, m.
+    pub fn about(&self, origin_m: [f64; 2]) -> Self {
+        let places = self.position_m.iter();
+        Pose {
+            times_ns: self.times_ns.clone(),
+            position_m: places.map(|p| about(p, origin_m)).collect(),
+            orientation: self.orientation.clone(),
+        }
+    }
+
     /// A vector of the body (m) in the world's axes at sample `k`, for a unit quaternion: v + 2w(u × v) + 2u × (u × v).
     pub fn in_world(&self, k: usize, v: &[f64; 3]) -> [f64; 3] {
         let cross = |a: [f64; 3], b: [f64; 3]| {
@@ -104,6 +132,17 @@ pub struct Carriers {
     pub times_ns: Vec<i64>,
     /// One path per carrier, m.
     pub points_m: Vec<Vec<[f64; 3]>>,
+}
+
+impl Carriers {
+    /// The same about a place on the ground, m.
+    pub fn about(&self, origin_m: [f64; 2]) -> Self {
+        let moved = |points: &Vec<[f64; 3]>| points.iter().map(|p| about(p, origin_m)).collect();
+        Carriers {
+            times_ns: self.times_ns.clone(),
+            points_m: self.points_m.iter().map(moved).collect(),
+        }
+    }
 }
 
 /// Where the body is held, and what it looks like.

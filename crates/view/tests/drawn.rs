@@ -10,7 +10,7 @@ use recording::topics::MessageKind;
 use recording::write::{RecordingWriter, WriterOptions};
 use view::blueprint::{self, Play};
 use view::load::{Detail, load, options};
-use view::take::{Curve, Take, Topic};
+use view::take::{Curve, Pose, Take, Topic};
 
 #[test]
 fn a_run_of_two_shows_everything() {
@@ -467,4 +467,42 @@ fn the_time_axis_stays_while_a_recording_grows() {
         .map(|(t, _)| *t)
         .collect();
     assert_eq!(times, [2000, 2001, 2002, 2003, 2004, 2005]);
+}
+
+/// Coordinates of a map, in which the viewer's numbers step by half a metre.
+#[test]
+fn what_is_far_away_is_drawn_about_where_it_began() {
+    let mut sink = Taken::default();
+    let mut progress = None;
+    let place = |k: i64| {
+        [
+            500_000.25 + 0.02 * k as f64,
+            5_400_000.6 + 0.01 * k as f64,
+            1.0,
+        ]
+    };
+    // In the second reading its first place is another.
+    for (from, until) in [(0, 50), (40, 100)] {
+        let take = Take {
+            end_ns: 100,
+            growing: true,
+            pose: Some(Pose {
+                times_ns: (from..until).collect(),
+                position_m: (from..until).map(place).collect(),
+                orientation: vec![[0.0, 0.0, 0.0, 1.0]; (until - from) as usize],
+            }),
+            ..Take::default()
+        };
+        let sent = view::send_part(&mut sink, "id", &take, progress).unwrap();
+        progress = Some(sent.progress);
+    }
+    let drawn = sink.translations("/world/rath");
+    assert_eq!(drawn.len(), 100);
+    for (k, at) in drawn.iter().enumerate() {
+        let [x, y] = [0.25 + 0.02 * k as f32, -0.4 + 0.01 * k as f32];
+        assert!(
+            (at[0] - x).abs() < 1e-5 && (at[1] - y).abs() < 1e-5,
+            "{k}: {at:?}"
+        );
+    }
 }

@@ -14,7 +14,7 @@ use super::people::{self, APART_M, about_z, f32s};
 use crate::blueprint::View;
 use crate::palette;
 use crate::store::Store;
-use crate::take::{Pose, Stay, Take, every};
+use crate::take::{Carriers, Pose, Stay, Take, every};
 
 /// How long the trail of the centre of mass is, s.
 const TRAIL_S: f64 = 5.0;
@@ -34,6 +34,21 @@ pub fn draw(store: &mut Store<'_>, take: &Take) -> anyhow::Result<Option<View>> 
     let Some(pose) = take.pose.as_ref().filter(|pose| !pose.times_ns.is_empty()) else {
         return Ok(None);
     };
+    let origin_m = store.about_m(pose.begins_m());
+    if origin_m == [0.0; 2] {
+        return scene(store, take, pose, take.carriers.as_ref());
+    }
+    let carriers = take.carriers.as_ref().map(|c| c.about(origin_m));
+    scene(store, take, &pose.about(origin_m), carriers.as_ref())
+}
+
+/// Draws the scene of body and carriers.
+fn scene(
+    store: &mut Store<'_>,
+    take: &Take,
+    pose: &Pose,
+    carriers: Option<&Carriers>,
+) -> anyhow::Result<Option<View>> {
     for entity in ["/world", "/world/follow"] {
         store.fixed(entity, &ViewCoordinates::FLU())?;
     }
@@ -42,7 +57,7 @@ pub fn draw(store: &mut Store<'_>, take: &Take) -> anyhow::Result<Option<View>> 
     body(store, take, pose, bent.as_deref())?;
     trail(store, pose)?;
     let headings = course::headings(pose);
-    if let Some(carriers) = &take.carriers {
+    if let Some(carriers) = carriers {
         people::draw(store, take, pose, &course::ways(pose, &headings), carriers)?;
     }
     let look_m = follow(store, pose, &headings)?;
@@ -466,7 +481,6 @@ fn forces(
 mod tests {
     use super::*;
     use crate::draw::sent;
-    use crate::take::Carriers;
 
     #[test]
     fn an_arrow_ends_within_the_picture_and_the_title_says_so() {

@@ -12,12 +12,13 @@ use crate::take::Take;
 
 /// Sends the page.
 pub fn draw(store: &mut Store<'_>, take: &Take) -> anyhow::Result<View> {
-    let page = page(take);
+    let page = page(take, store.about_m(None));
     store.fixed("/summary", &TextDocument::from_markdown(page))?;
     Ok(View::text("Summary", "/summary"))
 }
 
-fn page(take: &Take) -> String {
+/// The page; the scene is drawn about `origin_m`, x and y in the world.
+fn page(take: &Take, origin_m: [f64; 2]) -> String {
     let mut text = format!("## {}\n\n{:.3} s", take.name, take.duration_s());
     let rows: Vec<(&Metric, &Value)> = METRICS
         .iter()
@@ -47,6 +48,13 @@ fn page(take: &Take) -> String {
     }
     for line in words(take) {
         let _ = write!(text, "\n\n{line}");
+    }
+    if origin_m != [0.0; 2] {
+        let [x_m, y_m] = origin_m;
+        let _ = write!(
+            text,
+            "\n\nThe scene is far from its origin: x is drawn less {x_m} m, y less {y_m} m."
+        );
     }
     text
 }
@@ -99,6 +107,12 @@ mod tests {
         ] {
             assert_eq!(number(x, unit), shown);
         }
+    }
+
+    #[test]
+    fn where_a_scene_far_away_is_drawn_is_said() {
+        let said = |origin_m| page(&Take::default(), origin_m).contains("y less 5400000 m");
+        assert!(said([500_000.0, 5_400_000.0]) && !said([0.0; 2]));
     }
 
     #[test]
