@@ -164,6 +164,8 @@ fn remark(topic: &str, text: &str) -> String {
 
 /// Which topics are read how.
 struct Plan<'a> {
+    /// All topics, longer names first.
+    topics: Vec<&'a str>,
     /// Topics of our own schemas, which have drawings of their own.
     ours: Vec<&'a str>,
     imus: Vec<&'a str>,
@@ -204,13 +206,12 @@ impl<'a> Plan<'a> {
                 "foxglove.FrameTransforms",
             ]));
         }
-        ours.extend(
-            info.channels
-                .iter()
-                .map(|c| c.topic.as_str())
-                .filter(|t| *t == topics::MOTION),
-        );
+        let joints = of(&["sensor_msgs/JointState"]).into_iter();
+        ours.extend(joints.filter(|topic| *topic == topics::MOTION));
+        let mut topics: Vec<&str> = info.channels.iter().map(|c| c.topic.as_str()).collect();
+        topics.sort_by_key(|topic| std::cmp::Reverse(topic.len()));
         Plan {
+            topics,
             ours: if whole { ours } else { Vec::new() },
             imus: of(&["sensor_msgs/Imu"]),
             place: None,
@@ -219,6 +220,12 @@ impl<'a> Plan<'a> {
 
     fn is_ours(&self, topic: &str) -> bool {
         self.ours.contains(&topic)
+    }
+
+    /// The field that a path names. Topics may have dots of their own, and a path is of the longest that fits.
+    fn field<'p>(&self, path: &'p str) -> &'p str {
+        let of = |topic: &&str| path.strip_prefix(*topic)?.strip_prefix(['.', ':']);
+        self.topics.iter().find_map(of).unwrap_or_default()
     }
 
     /// Collected whole: the pose, the carriers' frames, the handles' sideways forces and compressions, and the ledger.
@@ -239,7 +246,7 @@ impl<'a> Plan<'a> {
 
     /// Streamed and thinned: sensors and everything that is not ours.
     fn is_streamed(&self, path: &str) -> bool {
-        !self.ours.iter().any(|topic| within(path, topic, "")) && is_measurement(path)
+        !self.ours.iter().any(|topic| within(path, topic, "")) && is_measurement(self.field(path))
     }
 }
 
@@ -249,7 +256,7 @@ fn within(path: &str, topic: &str, field: &str) -> bool {
 }
 
 /// Stamps, covariances and status fields are no curves that anybody wants to see.
-fn is_measurement(path: &str) -> bool {
+fn is_measurement(field: &str) -> bool {
     let words = [
         "stamp",
         "header",
@@ -259,7 +266,7 @@ fn is_measurement(path: &str) -> bool {
         "nsec",
         "nanosec",
     ];
-    !path.contains("covariance") && !path.split('.').any(|part| words.contains(&part))
+    !field.contains("covariance") && !field.split('.').any(|part| words.contains(&part))
 }
 
 /// The scene's name and seed, where the recording says them.
@@ -282,20 +289,45 @@ mod tests {
 
     #[test]
     fn stamps_are_no_measurements_and_fields_that_sound_like_them_are() {
+        let channel = |topic: &str, schema: &str| recording::read::ChannelInfo {
+            topic: topic.into(),
+            schema: schema.into(),
+            messages: 1,
+            ..Default::default()
+        };
+        let mut info = Info {
+            channels: vec![
+                channel("/imu", "sensor_msgs/msg/Imu"),
+                channel("/imu.header", ""),
+                channel("/gps.sec", ""),
+                channel("/track/covariance_test", ""),
+                channel(topics::MOTION, "geometry_msgs/msg/Twist"),
+            ],
+            ..Info::default()
+        };
+        let plan = Plan::new(&info, true);
         for path in [
-            "/imu.header.stamp.sec",
-            "/drum.timestamp.nanos",
-            "/x.seq",
+            "/imu.stamp.sec",
+            "/imu.seq",
             "/imu.orientation_covariance[3]",
+            "/imu.header.timestamp.nanos",
         ] {
-            assert!(!is_measurement(path), "{path}");
+            assert!(!plan.is_streamed(path), "{path}");
         }
         for path in [
-            "/truss.section_force_n",
-            "/machine.sequence",
+            "/imu.section_force_n",
+            "/imu.sequence",
             "/imu.angular_velocity.x",
+            // The names of topics are nothing but names.
+            "/imu.header.x",
+            "/imu.header:x",
+            "/gps.sec.north",
+            "/track/covariance_test.x",
+            "/rath/motion.linear.x",
         ] {
-            assert!(is_measurement(path), "{path}");
+            assert!(plan.is_streamed(path), "{path}");
         }
+        info.channels[4].schema = "sensor_msgs/msg/JointState".into();
+        assert!(!Plan::new(&info, true).is_streamed("/rath/motion.position[0]"));
     }
 }
