@@ -506,3 +506,37 @@ fn what_is_far_away_is_drawn_about_where_it_began() {
         );
     }
 }
+
+/// The first chunk holds three samples 100 ms apart, of a sensor that has 100 Hz.
+#[test]
+fn an_attitude_does_not_depend_on_how_a_file_is_cut() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("imu.mcap");
+    let mut writer = RecordingWriter::create(&path, &WriterOptions::default()).unwrap();
+    let channel = writer.channel("/imu/carrier_1", MessageKind::Imu).unwrap();
+    let turn = std::f64::consts::TAU * 0.7;
+    let roll_rad = |t_s: f64| 0.3 * (turn * t_s).sin();
+    for k in 0..4000 {
+        let t_ns = 10_000_000 * (10 * k.min(2) + (k - 2).max(0));
+        let t_s = t_ns as f64 / 1e9;
+        let (sin, cos) = roll_rad(t_s).sin_cos();
+        let rate = [0.3 * turn * (turn * t_s).cos(), 0.0, 0.0];
+        let imu = Imu::raw(t_ns, "imu", rate, [0.0, 9.81 * sin, 9.81 * cos]);
+        writer.message(channel, t_ns, &imu).unwrap();
+        if k == 2 {
+            // A chunk ends before what is attached.
+            writer
+                .attachment("notes.txt", "text/plain", b"cut")
+                .unwrap();
+        }
+    }
+    writer.finish().unwrap();
+    let (sent, _) = taken(&path);
+    let roll = sent.scalars("/topics/imu/carrier_1/attitude/roll");
+    let settled = roll.iter().filter(|(t_ns, _)| *t_ns > 10_000_000_000);
+    assert!(settled.clone().count() > 2500);
+    for (t_ns, deg) in settled {
+        let off = deg - roll_rad(*t_ns as f64 / 1e9).to_degrees();
+        assert!(off.abs() < 2.0, "{t_ns}: {deg}, off by {off}");
+    }
+}

@@ -3,6 +3,7 @@
 use std::collections::BTreeMap;
 
 use analyze::arrivals::{Arrivals, is_time};
+use analyze::summary::Times;
 use recording::Finding;
 use recording::read::{Batch, ReadError, Recording};
 use recording::signal::{Signal, field_of};
@@ -13,6 +14,9 @@ use super::{Plan, at_ns, remark};
 #[derive(Debug, Default)]
 pub struct Dates {
     topics: BTreeMap<String, Dated>,
+    /// Rates of the inertial sensors between gaps, Hz: of all their messages, however a reading cuts them into batches. One whose messages are of
+    /// one moment has none.
+    pub rates_hz: BTreeMap<String, f64>,
     /// What was done to which topic, in sentences.
     pub notes: Vec<String>,
 }
@@ -39,6 +43,8 @@ impl Dates {
 #[derive(Default)]
 struct Gathered {
     arrivals: Arrivals,
+    /// The times of the log.
+    times: Times,
     /// What tells the content of a message from that of others.
     marks: Vec<u64>,
     /// Columns that are collected: message and value.
@@ -49,6 +55,9 @@ impl Gathered {
     fn take(&mut self, batch: &Batch<'_>, plan: &Plan<'_>) {
         let first = self.marks.len();
         self.arrivals.take(batch);
+        if plan.is_sensor(batch.topic) {
+            self.times.push(batch.times_ns);
+        }
         self.marks.resize(self.arrivals.len(), 0);
         for column in batch.columns {
             let row = |k: usize| first + column.rows.map_or(k, |rows| rows[k] as usize);
@@ -107,14 +116,47 @@ pub fn collect(
                 values,
             });
         }
-        let Some((_, text)) = (axis.remarks.iter()).find(|(kind, _)| is_redated(kind)) else {
-            continue;
-        };
-        dates.notes.push(remark(&name, text));
-        let times_ns = by_message(marks.len(), &axis.rows, &times_ns);
-        dates.topics.insert(name, Dated { times_ns, asked: 0 });
+        let mut times = topic.times;
+        if let Some((_, text)) = (axis.remarks.iter()).find(|(kind, _)| is_redated(kind)) {
+            dates.notes.push(remark(&name, text));
+            let times_ns = by_message(marks.len(), &axis.rows, &times_ns);
+            if plan.is_sensor(&name) {
+                times = Times::default();
+                times.push(&times_ns);
+            }
+            let dated = Dated { times_ns, asked: 0 };
+            dates.topics.insert(name.clone(), dated);
+        }
+        let rate_hz = times.hz_between_gaps();
+        dates.rates_hz.extend(rate_hz.map(|hz| (name, hz)));
     }
     Ok((signals, dates, findings))
+}
+
+/// The rates alone, by the log, of a recording that is too long for more.
+pub fn rates(recording: &Recording, plan: &Plan<'_>) -> Result<Dates, ReadError> {
+    let mut topics: BTreeMap<String, Times> = BTreeMap::new();
+    let wanted = |path: &str| {
+        let field = |topic: &&str| field_of(path, topic);
+        let field = plan.imus.iter().find_map(field);
+        ["angular_velocity.x", "linear_acceleration.x"]
+            .map(Some)
+            .contains(&field)
+    };
+    // What is odd is said by the reading that draws.
+    recording.stream(&wanted, &mut |batch| {
+        if plan.is_sensor(batch.topic) {
+            let times = topics.entry(batch.topic.to_owned()).or_default();
+            times.push(batch.times_ns);
+        }
+    })?;
+    let rates = topics.into_iter();
+    Ok(Dates {
+        rates_hz: rates
+            .filter_map(|(topic, times)| Some((topic, times.hz_between_gaps()?)))
+            .collect(),
+        ..Dates::default()
+    })
 }
 
 /// Whether a remark says that the times are not those of the log.

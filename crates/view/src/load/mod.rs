@@ -61,15 +61,16 @@ pub fn load(
     let whole = info.messages <= MAX_EXAMINED;
     let mut plan = Plan::new(info, whole);
     let mut findings = Vec::new();
+    let mut dates = dates::Dates::default();
     if whole {
         plan.place = examined(&mut take, recording, asked)?;
     } else {
+        dates = dates::rates(recording, &plan)?;
         take.notes.push(format!(
             "{} messages: curves and spectra only, at the times of the log; `analyze` computes the metrics.",
             info.messages
         ));
     }
-    let mut dates = dates::Dates::default();
     if whole {
         let (signals, dated, found) = dates::collect(recording, &plan)?;
         (dates, findings) = (dated, found);
@@ -220,6 +221,10 @@ impl<'a> Plan<'a> {
 
     fn is_ours(&self, topic: &str) -> bool {
         self.ours.contains(&topic)
+    }
+
+    fn is_sensor(&self, topic: &str) -> bool {
+        self.imus.contains(&topic)
     }
 
     /// The field that a path names. Topics may have dots of their own, and a path is of the longest that fits.

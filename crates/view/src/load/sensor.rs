@@ -22,11 +22,14 @@ pub struct Stream {
     turned: u64,
     options: orientation::Options,
     attitude: [Thin; 2],
+    /// Mean step between samples, s.
     period_s: f64,
+    /// Time of the last sample, ns.
+    last_ns: Option<i64>,
 }
 
 impl Stream {
-    /// For a sensor of about this rate and so many messages; `thin` begins a curve of this name.
+    /// For a sensor of this rate between gaps and so many messages; `thin` begins a curve of this name.
     pub fn new(rate_hz: f64, messages: u64, mut thin: impl FnMut(&str) -> Thin) -> Self {
         let wanted = (rate_hz * DEFAULT_SEGMENT_S).clamp(16.0, 1e6) as u64;
         let spectrum = || summary::Stream::new(rate_hz, wanted.min(messages.max(2)) as usize);
@@ -42,6 +45,7 @@ impl Stream {
             options: orientation::Options::default(),
             attitude: ["roll", "pitch"].map(&mut thin),
             period_s: 1.0 / rate_hz,
+            last_ns: None,
         }
     }
 
@@ -94,17 +98,20 @@ impl Stream {
         let mut gaps = times.gaps().iter().map(|gap| gap.before).peekable();
         let unsettled = (self.options.tau_s / self.period_s) as u64;
         let mut angles = [(); 2].map(|()| Vec::with_capacity(times_ns.len()));
-        for k in 0..times_ns.len() {
+        let steps_s = self.steps_s(times_ns);
+        for (k, step_s) in steps_s.into_iter().enumerate() {
             if gaps.next_if_eq(&k).is_some() {
                 (self.filter, self.turned) = (None, 0);
             }
             let (w, a) = (gyro.map(|g| g[k]), accel.map(|a| a[k]));
             let mut shown = [f64::NAN; 2];
             if w.iter().chain(&a).all(|x| x.is_finite()) {
+                // What came before the first one is not known.
+                let step_s = self.filter.as_ref().map_or(self.period_s, |_| step_s);
                 let filter = self
                     .filter
                     .get_or_insert_with(|| orientation::Causal::new(self.period_s, self.options));
-                let (roll, pitch, _) = filter.update(self.period_s, w, a).euler_angles();
+                let (roll, pitch, _) = filter.update(step_s, w, a).euler_angles();
                 self.turned += 1;
                 if self.turned > unsettled {
                     shown = [roll.to_degrees(), pitch.to_degrees()];
@@ -117,6 +124,20 @@ impl Stream {
         for (thin, angles) in self.attitude.iter_mut().zip(&angles) {
             thin.push(times_ns, angles);
         }
+    }
+
+    /// Time from the sample before to each, s: the rate of a sensor need not stay. Those that share a time share the step to it.
+    fn steps_s(&mut self, times_ns: &[i64]) -> Vec<f64> {
+        let mut steps_s = Vec::with_capacity(times_ns.len());
+        for together in times_ns.chunk_by(|a, b| a == b) {
+            let since_ns = self
+                .last_ns
+                .map_or(0, |last| together[0].saturating_sub(last));
+            let step_s = since_ns.max(0) as f64 / 1e9 / together.len() as f64;
+            steps_s.extend(together.iter().map(|_| step_s));
+            self.last_ns = together.last().copied();
+        }
+        steps_s
     }
 
     /// What is drawn of it.
@@ -180,8 +201,11 @@ mod tests {
         let paths = ["angular_velocity", "linear_acceleration"]
             .map(|field| ["x", "y", "z"].map(|axis| format!("/imu.{field}.{axis}")));
         let values = [[&rate, &still, &still], [&still, &still, &up]];
+        let mut all = Times::default();
+        all.push(&times_ns);
+        let thin = |name: &str| Thin::new(name, 0, 60_000_000_000, 0, 1);
+        let mut sensor = Stream::new(all.hz_between_gaps().unwrap(), 6000, thin);
         let mut times = Times::default();
-        let mut sensor: Option<Stream> = None;
         for from in (0..t_s.len()).step_by(700) {
             let part = from..(from + 700).min(t_s.len());
             let columns: Vec<Column<'_>> = (0..6)
@@ -202,14 +226,9 @@ mod tests {
                 columns: &columns,
             };
             times.push(batch.times_ns);
-            let hz = times.hz_between_gaps().unwrap();
-            sensor
-                .get_or_insert_with(|| {
-                    Stream::new(hz, 6000, |name| Thin::new(name, 0, 60_000_000_000, 0, 1))
-                })
-                .push(&batch, &times);
+            sensor.push(&batch, &times);
         }
-        sensor.unwrap().finish("/imu", &times)
+        sensor.finish("/imu", &times)
     }
 
     #[test]

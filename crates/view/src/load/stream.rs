@@ -52,7 +52,6 @@ pub fn others(
         Detail::Whole => u64::MAX,
     };
     let (start_ns, end_ns) = (info.start_ns, info.end_ns);
-    let span_s = take.duration_s();
     let mut coarsest_ns = 0;
     let mut thin = |name: &str, topic: &str| {
         let thin = Thin::new(
@@ -78,6 +77,7 @@ pub fn others(
         let Some(times) = times.get_mut(batch.topic) else {
             return;
         };
+        let rate_hz = dates.rates_hz.get(batch.topic).copied();
         let batch = &match dates.next(batch.topic, batch.times_ns.len()) {
             Some(times_ns) => Batch { times_ns, ..*batch },
             None => *batch,
@@ -85,9 +85,8 @@ pub fn others(
         times.push(batch.times_ns);
         if let Some(topic) = plan.imus.iter().find(|topic| **topic == batch.topic) {
             let count = messages.get(topic).copied().unwrap_or(0);
-            // A topic need not last as long as the file; one without a rate is no sensor, but may have curves.
-            let rough_hz = (count > 1 && span_s > 0.0).then(|| (count - 1) as f64 / span_s);
-            if let Some(rate_hz) = times.hz_between_gaps().or(rough_hz) {
+            // One without a rate is no sensor, but may have curves.
+            if let Some(rate_hz) = rate_hz {
                 let new = || sensor::Stream::new(rate_hz, count, |name| thin(name, topic));
                 sensors.entry(topic).or_insert_with(new).push(batch, times);
                 return;
