@@ -4,7 +4,7 @@ mod common;
 
 use analyze::request::Request;
 use common::{ROWS, Taken, imus, imus_logged, json_channel, run, run_logged, taken};
-use recording::cdr::Imu;
+use recording::cdr::{Header, Imu, TfMessage, Transform, TransformStamped};
 use recording::read::Recording;
 use recording::topics::MessageKind;
 use recording::write::{RecordingWriter, WriterOptions};
@@ -538,5 +538,59 @@ fn an_attitude_does_not_depend_on_how_a_file_is_cut() {
     for (t_ns, deg) in settled {
         let off = deg - roll_rad(*t_ns as f64 / 1e9).to_degrees();
         assert!(off.abs() < 2.0, "{t_ns}: {deg}, off by {off}");
+    }
+}
+
+/// A robot's frames are not.
+#[test]
+fn only_our_own_frames_are_people() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("robot.mcap");
+    let mut writer = RecordingWriter::create(&path, &WriterOptions::default()).unwrap();
+    let tf = writer.channel("/tf", MessageKind::Tf).unwrap();
+    for k in 0..100 {
+        let t_ns = k * 10_000_000;
+        let frame = |parent: &str, child: &str| TransformStamped {
+            header: Header {
+                frame_id: parent.into(),
+                ..Header::default()
+            },
+            child_frame_id: child.into(),
+            transform: Transform {
+                translation: [0.01 * k as f64, 0.0, 0.9].into(),
+                ..Transform::default()
+            },
+        };
+        let message = TfMessage {
+            transforms: vec![
+                frame("odom", "base_link"),
+                frame("base_link", "lidar"),
+                frame("base_link", "camera"),
+            ],
+        };
+        writer.message(tf, t_ns, &message).unwrap();
+    }
+    writer.finish().unwrap();
+    let read = |by_name: bool| {
+        let options = recording::read::ReadOptions {
+            by_name,
+            ..options(&Request::default())
+        };
+        let recording = Recording::open(&path, &options).unwrap();
+        load("tf", &recording, Detail::Thinned, &Request::default())
+            .unwrap()
+            .0
+    };
+    for by_name in [false, true] {
+        let take = read(by_name);
+        assert!(take.carriers.is_none());
+        assert_eq!(take.topics[0].name, "/tf");
+    }
+    // Ours are people however their lists are read.
+    run(&path, 3);
+    for by_name in [false, true] {
+        let carriers = read(by_name).carriers.unwrap();
+        assert_eq!(carriers.points_m.len(), 3);
+        assert_eq!(carriers.points_m[0][0], [-1.0, 0.4, 1.05]);
     }
 }

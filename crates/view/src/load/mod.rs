@@ -78,7 +78,9 @@ pub fn load(
             signals.iter().map(|s| (s.path.as_str(), s)).collect();
         let place = plan.place.as_deref();
         take.pose = scene::pose(&signals).or_else(|| scene::found(&signals, &take, place));
-        take.carriers = scene::carriers(&signals);
+        if plan.is_own {
+            take.carriers = scene::carriers(&signals);
+        }
         take.energy = scene::energy(&signals);
         take.tangential_n = scene::tangentials(&signals, &take);
         take.compression_m = scene::compressions(&signals, &take);
@@ -167,6 +169,8 @@ fn remark(topic: &str, text: &str) -> String {
 struct Plan<'a> {
     /// All topics, longer names first.
     topics: Vec<&'a str>,
+    /// Recorded by `sim` or imported as that: there are messages of the state, and the frames of `/tf` are the body's and the carriers'.
+    is_own: bool,
     /// Topics of our own schemas, which have drawings of their own.
     ours: Vec<&'a str>,
     imus: Vec<&'a str>,
@@ -200,7 +204,8 @@ impl<'a> Plan<'a> {
         ];
         let mut ours = of(&schemas);
         // The state says the same; without one transforms are curves like any other numbers.
-        if !of(&["rath.State"]).is_empty() {
+        let is_own = !of(&["rath.State"]).is_empty();
+        if is_own {
             ours.extend(of(&[
                 "tf2_msgs/TFMessage",
                 "foxglove.FrameTransform",
@@ -213,6 +218,7 @@ impl<'a> Plan<'a> {
         topics.sort_by_key(|topic| std::cmp::Reverse(topic.len()));
         Plan {
             topics,
+            is_own,
             ours: if whole { ours } else { Vec::new() },
             imus: of(&["sensor_msgs/Imu"]),
             place: None,
@@ -246,7 +252,9 @@ impl<'a> Plan<'a> {
             || within(path, topics::ENERGY, "")
             || within(path, topics::FORCES, "compression_m")
             || (within(path, topics::FORCES, "tangential_n") && !path.ends_with(".z"))
-            || (within(path, topics::TF, "") && path.contains(".transform.translation."))
+            || (self.is_own
+                && within(path, topics::TF, "")
+                && path.contains(".transform.translation."))
     }
 
     /// Streamed and thinned: sensors and everything that is not ours.

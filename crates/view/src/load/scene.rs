@@ -13,14 +13,13 @@ const HANDLE_HEIGHT_M: f64 = 0.1;
 /// The box that stands for the body, m, as in the recording's own URDF.
 const BOX_M: [f64; 3] = [0.7, 0.5, 0.6];
 
-/// Signals in a row, `NAME[0]`, `NAME[1]`, … as far as they have the times of the first.
-fn numbered<'s>(signals: &BTreeMap<&str, &'s Signal>, pattern: &str) -> Vec<&'s Signal> {
+/// Signals in a row, those of the paths for 0, 1, … as far as they have the times of the first.
+fn numbered<'s>(
+    signals: &BTreeMap<&str, &'s Signal>,
+    path: impl Fn(usize) -> String,
+) -> Vec<&'s Signal> {
     let mut out: Vec<&Signal> = Vec::new();
-    while let Some(signal) = signals.get(
-        pattern
-            .replacen("[*]", &format!("[{}]", out.len()), 1)
-            .as_str(),
-    ) {
+    while let Some(signal) = signals.get(path(out.len()).as_str()) {
         if out
             .first()
             .is_some_and(|first| first.times_ns != signal.times_ns)
@@ -119,21 +118,31 @@ fn quaternion([roll_rad, pitch_rad, yaw_rad]: [f64; 3]) -> [f64; 4] {
     turn.into_inner().coords.into()
 }
 
-/// The carriers' frames in `/tf`: the first transform is the body's, the others are theirs.
+/// The carriers' frames in `/tf` of a recording of our own: `carrier_1` and so on where items are read by their names; by their places, the
+/// first is the body's and the others are theirs. Nobody else's frames are people.
 pub fn carriers(signals: &BTreeMap<&str, &Signal>) -> Option<Carriers> {
-    let axis = |name: &str| {
-        numbered(
-            signals,
-            &format!("{}.transforms[*].transform.translation.{name}", topics::TF),
+    let path = |item: String, axis: &str| {
+        format!(
+            "{}.transforms[{item}].transform.translation.{axis}",
+            topics::TF
         )
     };
-    let axes = ["x", "y", "z"].map(axis);
+    let frame = |i: usize| format!("carrier_{}", i + 1);
+    let by_name = signals.contains_key(path(frame(0), "x").as_str());
+    let item = |i: usize| {
+        if by_name {
+            frame(i)
+        } else {
+            (i + 1).to_string()
+        }
+    };
+    let axes = ["x", "y", "z"].map(|axis| numbered(signals, |i| path(item(i), axis)));
     let count = axes.iter().map(Vec::len).min()?;
-    if count < 2 {
+    if count == 0 {
         return None;
     }
     let times_ns = axes[0][0].times_ns.to_vec();
-    let points_m = (1..count)
+    let points_m = (0..count)
         .map(|i| {
             (0..times_ns.len())
                 .map(|k| [0, 1, 2].map(|a| axes[a][i].values[k]))
@@ -145,7 +154,9 @@ pub fn carriers(signals: &BTreeMap<&str, &Signal>) -> Option<Carriers> {
 
 /// How far the handles are pressed into the shoulders, at the times of the forces.
 pub fn compressions(signals: &BTreeMap<&str, &Signal>, take: &Take) -> Vec<Vec<f64>> {
-    let found = numbered(signals, &format!("{}.compression_m[*]", topics::FORCES));
+    let found = numbered(signals, |i| {
+        format!("{}.compression_m[{i}]", topics::FORCES)
+    });
     if found
         .iter()
         .any(|signal| signal.times_ns[..] != take.force_ns[..])
@@ -158,8 +169,9 @@ pub fn compressions(signals: &BTreeMap<&str, &Signal>, take: &Take) -> Vec<Vec<f
 /// Sideways forces of the handles, at the times of the forces.
 pub fn tangentials(signals: &BTreeMap<&str, &Signal>, take: &Take) -> Vec<Vec<[f64; 2]>> {
     let axis = |name: &str| {
-        let pattern = format!("{}.tangential_n[*].{name}", topics::FORCES);
-        numbered(signals, &pattern)
+        numbered(signals, |i| {
+            format!("{}.tangential_n[{i}].{name}", topics::FORCES)
+        })
     };
     let [x, y] = ["x", "y"].map(axis);
     let on_time = |s: &&Signal| s.times_ns[..] == take.force_ns[..];
