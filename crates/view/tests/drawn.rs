@@ -594,3 +594,30 @@ fn only_our_own_frames_are_people() {
         assert_eq!(carriers.points_m[0][0], [-1.0, 0.4, 1.05]);
     }
 }
+
+#[test]
+fn a_place_in_millimetres_is_drawn_in_metres() {
+    let folder = tempfile::tempdir().unwrap();
+    let [mcap, toml] = ["mm.mcap", "roles.toml"].map(|name| folder.path().join(name));
+    let mut writer = RecordingWriter::create(&mcap, &WriterOptions::default()).unwrap();
+    let channel = json_channel(&mut writer, "/m", "");
+    for k in 0..300 {
+        let lean = 0.1 * (0.1 * k as f64).sin();
+        let text = format!(
+            "{{\"position_mm\":{{\"x\":1500,\"y\":-2000,\"z\":1250}},\"roll_rad\":{lean},\"pitch_rad\":0.05}}"
+        );
+        writer
+            .message(channel, k * 10_000_000, text.as_bytes())
+            .unwrap();
+    }
+    writer.finish().unwrap();
+    let roles = "height = \"/m.position_mm.z\"\nroll = \"/m.roll_rad\"\n";
+    std::fs::write(&toml, roles).unwrap();
+    let asked = Request {
+        roles: Some(analyze::roles::RolesFile::read(&toml).unwrap()),
+        ..Request::default()
+    };
+    let recording = Recording::open(&mcap, &options(&asked)).unwrap();
+    let (take, _) = load("mm", &recording, Detail::Thinned, &asked).unwrap();
+    assert_eq!(take.pose.unwrap().position_m[7], [1.5, -2.0, 1.25]);
+}

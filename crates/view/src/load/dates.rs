@@ -6,7 +6,7 @@ use analyze::arrivals::{Arrivals, is_time};
 use analyze::summary::Times;
 use recording::Finding;
 use recording::read::{Batch, ReadError, Recording};
-use recording::signal::{Signal, field_of};
+use recording::signal::{Signal, field_of, unit_of};
 
 use super::{Plan, at_ns, remark};
 
@@ -47,8 +47,8 @@ struct Gathered {
     times: Times,
     /// What tells the content of a message from that of others.
     marks: Vec<u64>,
-    /// Columns that are collected: message and value.
-    columns: BTreeMap<String, Vec<(usize, f64)>>,
+    /// Columns that are collected: their unit, then message and value.
+    columns: BTreeMap<String, (&'static str, Vec<(usize, f64)>)>,
 }
 
 impl Gathered {
@@ -69,9 +69,14 @@ impl Gathered {
             if plan.is_whole(column.path) {
                 let kept = match self.columns.get_mut(column.path) {
                     Some(kept) => kept,
-                    None => self.columns.entry(column.path.to_owned()).or_default(),
+                    None => {
+                        let field = plan.field(column.path);
+                        let new = (unit_of(batch.schema, field), Vec::new());
+                        self.columns.entry(column.path.to_owned()).or_insert(new)
+                    }
                 };
-                kept.extend(column.values.iter().enumerate().map(|(k, x)| (row(k), *x)));
+                kept.1
+                    .extend(column.values.iter().enumerate().map(|(k, x)| (row(k), *x)));
             }
         }
     }
@@ -101,7 +106,7 @@ pub fn collect(
         let marks = &topic.marks;
         let axis = topic.arrivals.dated(start_ns, |a, b| marks[a] == marks[b]);
         let times_ns = at_ns(start_ns, &axis.t_s);
-        for (path, kept) in topic.columns {
+        for (path, (unit, kept)) in topic.columns {
             let mut values = vec![None; marks.len()];
             kept.into_iter().for_each(|(row, x)| values[row] = Some(x));
             let each = times_ns.iter().zip(&axis.rows);
@@ -111,7 +116,7 @@ pub fn collect(
             signals.push(Signal {
                 topic: name.clone(),
                 path,
-                unit: String::new(),
+                unit: unit.to_owned(),
                 times_ns: times_ns.into(),
                 values,
             });

@@ -63,7 +63,7 @@ const USUAL_HEIGHT_M: f64 = 0.9;
 const MOST_MOMENTS: usize = 100_000;
 
 /// Where the body is by what `analyze` found of its motion, be it by a pose or by an inertial sensor: on the spot where `place`, whose `.x`
-/// and `.y` it is, is not known. `None` where nothing tells how it is turned.
+/// and `.y` it is, is not known. `None` where nothing tells how it is turned. A place that is no number is a hole.
 pub fn found(signals: &BTreeMap<&str, &Signal>, take: &Take, place: Option<&str>) -> Option<Pose> {
     let inputs = &take.inputs;
     let [roll, pitch, yaw] = [&inputs.roll_rad, &inputs.pitch_rad, &inputs.yaw_rad];
@@ -80,36 +80,51 @@ pub fn found(signals: &BTreeMap<&str, &Signal>, take: &Take, place: Option<&str>
     let at = s(&times_ns);
     let along = |axis: &str| {
         let signal = signals.get(format!("{}.{axis}", place?).as_str())?;
-        let of = analyze::inputs::interpolate(&s(&signal.times_ns), &signal.values, &at);
-        Some(of)
+        // As `analyze` takes the height.
+        let unit_m = match signal.unit.as_str() {
+            "mm" => 1e-3,
+            "cm" => 1e-2,
+            _ => 1.0,
+        };
+        let mut of_m = analyze::inputs::interpolate(&s(&signal.times_ns), &signal.values, &at);
+        of_m.iter_mut().for_each(|x| *x *= unit_m);
+        of_m.iter().any(|x| is_drawn(*x)).then_some(of_m)
     };
-    let [x, y] = ["x", "y"].map(along);
+    let [x_m, y_m] = ["x", "y"].map(along);
     let (height_s, height_m) = inputs.height();
-    let (height_m, level_m) = match height_m.iter().any(|z| z.is_finite()) {
-        true => {
-            let told = analyze::inputs::interpolate(height_s, height_m, &at);
-            let is_motion = inputs.sources.height == "imu";
-            (told, if is_motion { USUAL_HEIGHT_M } else { 0.0 })
-        }
-        false => (Vec::new(), USUAL_HEIGHT_M),
-    };
+    let is_told = height_m.iter().any(|z| is_drawn(*z));
+    let height_m = is_told.then(|| analyze::inputs::interpolate(height_s, height_m, &at));
+    let is_motion = inputs.sources.height == "imu";
     let or_nought = |column: &[f64], n: usize| known(column.get(n)).unwrap_or(0.0);
-    let place = |n: usize| {
-        let on_ground = [&x, &y].map(|axis| axis.as_ref().map_or(0.0, |axis| or_nought(axis, n)));
-        [
-            on_ground[0],
-            on_ground[1],
-            level_m + or_nought(&height_m, n),
-        ]
+    // What nobody tells is at the origin, what is told and no number is nowhere.
+    let told = |axis_m: &Option<Vec<f64>>, n: usize| {
+        let x_m = axis_m.as_ref().map_or(0.0, |axis_m| axis_m[n]);
+        is_drawn(x_m).then_some(x_m)
     };
-    Some(Pose {
-        position_m: (0..rows.len()).map(place).collect(),
-        orientation: rows
-            .iter()
-            .map(|&k| quaternion([roll, pitch, yaw].map(|column| or_nought(column, k))))
-            .collect(),
-        times_ns,
-    })
+    let place = |n: usize| {
+        let z_m = match &height_m {
+            None => USUAL_HEIGHT_M,
+            Some(motion_m) if is_motion => USUAL_HEIGHT_M + or_nought(motion_m, n),
+            _ => told(&height_m, n)?,
+        };
+        Some([told(&x_m, n)?, told(&y_m, n)?, z_m])
+    };
+    let mut pose = Pose::default();
+    for (n, k) in rows.into_iter().enumerate() {
+        let Some(position_m) = place(n) else {
+            continue;
+        };
+        let turned = [roll, pitch, yaw].map(|column| or_nought(column, k));
+        pose.times_ns.push(times_ns[n]);
+        pose.position_m.push(position_m);
+        pose.orientation.push(quaternion(turned));
+    }
+    (pose.times_ns.len() > 1).then_some(pose)
+}
+
+/// Whether it is a number, and to the viewer too.
+fn is_drawn(x: f64) -> bool {
+    (x as f32).is_finite()
 }
 
 /// The quaternion x, y, z, w of R = R_z(yaw) R_y(pitch) R_x(roll), as `analyze` takes its angles.
@@ -308,10 +323,31 @@ mod tests {
             topic: "/odom".into(),
             unit: "m".into(),
         };
-        let place = [signal("x", 3.0), signal("y", -2.0)];
+        let mut place = [signal("x", 3.0), signal("y", -2000.0)];
+        place[1].unit = "mm".into();
+        // It is nowhere where any part of its place is no number, and on the spot by an axis that never is one.
+        for (lost, times) in [
+            (0.0, vec![0, 1, 2, 4]),
+            (f64::NAN, vec![0, 2, 4]),
+            (1e300, vec![0, 2, 4]),
+        ] {
+            place[0].values[1] += lost;
+            let signals = place.iter().map(|s| (s.path.as_str(), s)).collect();
+            let pose = found(&signals, &take, Some("/odom.p")).unwrap();
+            assert_eq!(
+                pose.times_ns,
+                times.iter().map(|k| 10_000_000 * k).collect::<Vec<i64>>()
+            );
+            assert!(pose.position_m.contains(&[3.0, -2.0, 0.02]));
+            assert!(pose.position_m.iter().all(|p| p[..2] == [3.0, -2.0]));
+            place[0].values[1] = 3.0;
+        }
+        take.inputs.height_m[1] = f64::INFINITY;
+        place[0].values = vec![f64::NAN; 5];
         let signals = place.iter().map(|s| (s.path.as_str(), s)).collect();
         let pose = found(&signals, &take, Some("/odom.p")).unwrap();
-        assert_eq!(pose.position_m[2], [3.0, -2.0, 0.02]);
+        assert_eq!(pose.times_ns, [0, 20_000_000, 40_000_000]);
+        assert_eq!(pose.position_m[1], [0.0, -2.0, 0.02]);
         // Yaw goes first in the world, roll first in the body.
         let q = quaternion([0.3, -0.4, 2.0]);
         let pose = Pose {
