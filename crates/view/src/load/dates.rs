@@ -182,3 +182,37 @@ fn by_message(count: usize, rows: &[usize], times_ns: &[i64]) -> Vec<i64> {
     });
     each.collect()
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use recording::cdr::Imu;
+    use recording::read::ReadOptions;
+    use recording::topics::MessageKind;
+    use recording::write::{RecordingWriter, WriterOptions};
+
+    #[test]
+    fn a_rate_is_that_of_all_messages() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("imu.mcap");
+        let mut writer = RecordingWriter::create(&path, &WriterOptions::default()).unwrap();
+        let channel = writer.channel("/imu/s0", MessageKind::Imu).unwrap();
+        // 100 Hz, but for the first three.
+        for k in 0..3000 {
+            let t_ns = 10_000_000 * (10 * k.min(2) + (k - 2).max(0));
+            let imu = Imu::raw(t_ns, "imu", [0.01 * k as f64; 3], [0.0, 0.0, 9.81]);
+            writer.message(channel, t_ns, &imu).unwrap();
+        }
+        writer.finish().unwrap();
+        let recording = Recording::open(&path, &ReadOptions::default()).unwrap();
+        for whole in [true, false] {
+            let plan = Plan::new(recording.info(), whole);
+            let dates = match whole {
+                true => collect(&recording, &plan).unwrap().1,
+                false => rates(&recording, &plan).unwrap(),
+            };
+            let hz = dates.rates_hz["/imu/s0"];
+            assert!((hz - 100.0).abs() < 1.0, "{whole}: {hz}");
+        }
+    }
+}
