@@ -44,7 +44,7 @@ impl Verdict {
 /// ```
 /// θ roll (rad), N_tot summed normal force (N), or that on one kilogram of the load [m/s²], a [1/(kg·m)], or [1/m], b [1/s], N̄ the handles' mean force, c_i [1/(kg·m²)·m]. R² is that of the
 /// part without brackets; `delta_n_gain` is by how much the bracket raises it: the strength of a drive by force differences (ΔN).
-/// θ̇ and θ̈ are those of the natural cubic interpolant with not-a-knot ends, four samples left out at each end: on the
+/// θ̇ and θ̈ are those of the cubic interpolant with not-a-knot ends, four samples left out at each end: on the
 /// archive's music logs that gives a = 0.0479, b = 0.391, R² = 0.992. A line at ω is seen too large by (ωΔt)²/12 in θ̈ (0.4 % there).
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct RollFit {

@@ -124,11 +124,6 @@ pub const AUDIO_DRUM: &str = "/audio/drum";
 /// One message on every beat.
 pub const BEAT: &str = "/beat";
 
-/// The carrier's IMU topic; carriers count from 1.
-pub fn imu_carrier(number: usize) -> String {
-    format!("/imu/carrier_{number}")
-}
-
 /// All topics.
 pub const TOPICS: &[Topic] = &[
     Topic {

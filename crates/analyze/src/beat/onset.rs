@@ -4,7 +4,7 @@
 //! O(t) = Σ_b max(0, L_b(t) − L_b(t−2)),   L_b = ln(1 + E_b/E̅_b)      in every band b
 //! A(t) = Σ_b max(0, S_b(t) − S_b(t−2)),   S_b = √E_b                  in the bands below 1 kHz
 //! ```
-//! E_b energy of band b in a Hann window, E̅_b its median over time, t in frames of 10 ms. The logarithm lets quiet onsets
+//! E_b energy of band b in a Hann window, E̅_b its median over time, at least 10⁻⁴ of its largest, t in frames of 10 ms. The logarithm lets quiet onsets
 //! through; the root keeps how hard was struck, which tells a beat from a hi-hat between beats.
 //! Source: D. Ellis, "Beat tracking by dynamic programming", J. New Music Res. 36 (2007); spectral flux as in S. Dixon,
 //! "Onset detection revisited", DAFx (2006).
@@ -24,15 +24,13 @@ const BANDS_PER_OCTAVE: f64 = 3.0;
 const HIGHEST_HZ: f64 = 10_000.0;
 /// Only what is below this counts for the accent, Hz.
 const ACCENT_HZ: f64 = 1_000.0;
-/// Where in its rise a frame's flux stands, after the frame's own centre, s. Calibrated on clicks (a test holds it).
-const LAG_S: f64 = 0.0;
 
 /// Onset strengths at [`FRAME_HZ`].
 #[derive(Clone, Debug, PartialEq)]
 pub struct Onsets {
     /// Time of the first frame, s.
     pub start_s: f64,
-    /// Onset strength, standard deviation 1.
+    /// Onset strength, root mean square 1.
     pub strength: Vec<f64>,
     /// Accent: how much low sound begins; 0 and up, mean of its peaks about 1.
     pub accent: Vec<f64>,
@@ -91,7 +89,7 @@ impl Onsets {
             accent.iter_mut().for_each(|a| *a /= top);
         }
         Self {
-            start_s: 0.5 * window as f64 / rate_hz + LAG_S,
+            start_s: 0.5 * window as f64 / rate_hz,
             strength,
             accent,
             known: (0..frames)
@@ -167,7 +165,7 @@ fn flux(energy: &[f64], bands: usize, count: usize, logarithmic: bool) -> Vec<f6
                 continue;
             };
             let peak = level.iter().copied().fold(0.0, f64::max);
-            // Silence between strokes: take a thousandth of the peak as the floor.
+            // Silence between strokes has a median of nothing.
             let floor = median.max(1e-4 * peak);
             if floor <= 0.0 {
                 continue;
@@ -184,7 +182,7 @@ fn flux(energy: &[f64], bands: usize, count: usize, logarithmic: bool) -> Vec<f6
     out
 }
 
-/// Takes off the local mean (1 s), keeps what is above, and scales to standard deviation 1.
+/// Takes off the local mean (1 s), keeps what is above, and scales to a root mean square of 1.
 fn normalise(x: &mut [f64]) {
     let half = (0.5 * FRAME_HZ) as usize;
     let mut sums = vec![0.0];

@@ -1,7 +1,7 @@
 //! Tempogram, and the beat's period over time.
 //!
 //! ```text
-//! R(t, τ) = Σ_s w(s−t) O(s) O(s+τ)            local autocorrelation of the onset strength, 8 s Hann window w
+//! R(t, τ) = Σ_s w(s−t) O(s) O(s+τ)            local autocorrelation of the onset strength about its mean, w = 1/(number of its terms) within 8 s, else 0
 //! ```
 //! A path of periods is drawn through R by dynamic programming: it follows the ridge and may bend, not jump.
 //! Source: P. Grosche, M. Müller, "Extracting predominant local pulse information", IEEE TASLP 19 (2011).

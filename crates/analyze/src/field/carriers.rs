@@ -10,7 +10,7 @@ use crate::imu::track::{BRIDGED_S, period_s};
 use crate::imu::vertical::height;
 use crate::inputs::{Clocks, Window, interpolate, mean_step_s, stretches};
 use crate::median::median;
-use crate::metrics::{Datum, Metrics};
+use crate::metrics::{Datum, Metrics, Need, find};
 use crate::phase::{hilbert, order_parameter};
 use crate::quality::Quality;
 use crate::spectrum::Complex64;
@@ -65,21 +65,10 @@ pub struct Carriers {
     pub clocks: Clocks,
 }
 
-/// Whether a metric rests on the carriers' phases.
+/// Whether a metric rests on the carriers' phases or the beat, and on nothing of the load.
 pub fn gives(name: &str) -> bool {
-    [
-        "synchrony",
-        "synchrony_chance",
-        "plv",
-        "beat_synchrony",
-        "beat_hz",
-        "beat_lead_deg",
-        "detuning_rad_per_s",
-        "pull_rad_per_s",
-        "coupling_rad_per_s",
-        "captured",
-    ]
-    .contains(&name)
+    let of = |need: &Need| matches!(need, Need::Phases | Need::Beat);
+    find(name).is_some_and(|m| m.needs.iter().any(of) && !m.needs.contains(&Need::Roll))
 }
 
 /// Whether a metric is one of all carriers together: some of them do not tell it.

@@ -312,8 +312,8 @@ pub fn listen(recording: &Recording) -> Result<Option<Heard>, ReadError> {
     }
     if pace.slope != 0.0 {
         remarks.push(format!(
-            "its samples are counted {:+.0} ppm slower than its messages are dated, which is put right",
-            1e6 * pace.slope
+            "the clock that counts its samples runs {:+.0} ppm fast beside its messages' dates, which is put right",
+            -1e6 * pace.slope
         ));
     }
     if plan.cut {
@@ -477,7 +477,11 @@ mod tests {
             let there = a * (1.0 + 1e-4) - 0.1;
             assert!((b - there).abs() < 2e-5, "{b} {there}");
         }
-        assert!(found.remarks[0].contains("+100 ppm"), "{:?}", found.remarks);
+        assert!(
+            found.remarks[0].contains("-100 ppm fast"),
+            "{:?}",
+            found.remarks
+        );
         assert!(plain.remarks.is_empty());
     }
 

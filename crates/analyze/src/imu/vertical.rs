@@ -8,7 +8,7 @@
 //! smallest bias grow with t²; the second term holds what is slower than f₀ at zero. It is the zero-phase second-order
 //! Butterworth high-pass, but its ends are free: nothing is reflected or padded there, and no transient rings.
 //!
-//! Valid band: 0.3 Hz (1.2 % low with f₀ = 0.1 Hz) to a tenth of the sampling rate (Numerov's weights: error (ωΔt)⁴/240).
+//! Valid band: 0.3 Hz (1.2 % low with f₀ = 0.1 Hz) to a tenth of the sampling rate and 10 Hz at most (Numerov's weights: error (ωΔt)⁴/240).
 //! The height's mean and its slow changes are not in it. Source: Numerov (1924) for the weights; Whittaker (1923) for
 //! smoothing by least squares.
 

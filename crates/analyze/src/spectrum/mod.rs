@@ -185,21 +185,6 @@ impl Spectrum {
         )
     }
 
-    /// Power between two frequencies, ends included: the sum of the bins times their width (unit²) (for densities).
-    pub fn band_power(&self, low_hz: f64, high_hz: f64) -> f64 {
-        let width = if self.hz.len() > 1 {
-            self.hz[1] - self.hz[0]
-        } else {
-            0.0
-        };
-        let in_band = self
-            .hz
-            .iter()
-            .zip(&self.power)
-            .filter(|(f, _)| **f >= low_hz && **f <= high_hz);
-        in_band.map(|(_, p)| p).sum::<f64>() * width
-    }
-
     /// The strongest bin above 0 Hz, refined by a parabola through the logarithms of its neighbours (Hz). `None` when all is zero.
     pub fn peak_hz(&self) -> Option<f64> {
         let (k, p) = self

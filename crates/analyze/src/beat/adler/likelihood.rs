@@ -292,7 +292,7 @@ impl Walk {
     }
 
     /// Middle and SD of the normal priors: τ 5 s within a factor 20, σ 0.05 rad/√s and ε 0.03 rad within 50, K_c
-    /// within 10 rad/s of none, a carrier's own frequency within 1.6 Hz of the beat; Δ anything. None on K.
+    /// within 6 rad/s of none, a carrier's own frequency within 1.6 Hz of the beat; Δ anything. None on K.
     fn add_priors(&self, x: &DVector<f64>, out: &mut Score) {
         for k in BUILD_UP..x.len() {
             let (middle, sd) = match k {

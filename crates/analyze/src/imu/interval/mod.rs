@@ -17,7 +17,7 @@ use super::rath::Motion;
 use super::track::period_s;
 use crate::inputs::{Inputs, Window};
 use crate::mechanism::Verdict;
-use crate::metrics::{Datum, Metrics, Value, metrics_of};
+use crate::metrics::{Datum, Metrics, Need, Value, find, metrics_of};
 use angle::{
     MEAN_SQUARES, constant_tilt_rad, mixed, mounting_error_rad, tilted, uncalibrated, without_noise,
 };
@@ -39,29 +39,16 @@ const BEYOND: &[(&str, &str)] = &[
     ),
     ("rms_yaw_deg", "heading without a magnetometer drifts"),
 ];
-/// Metrics that rest on the motion columns: those that get an interval.
-const FROM_MOTION: &[&str] = &[
-    "rms_roll_deg",
-    "rms_pitch_deg",
-    "onset_time_s",
-    "unstable",
-    "roll_excess_s",
-    "dz_pp_m",
-    "rms_z_m",
-    "z_mean_m",
-    "rms_yaw_deg",
-    "t_float",
-    "peak_hz",
-    "h2_ratio",
-    "roll_peak_hz",
-    "subharmonic_ratio",
-    "growth_ratio",
-    "mechanism",
-];
-
-/// Whether a metric is one of those that [`metrics`] gives.
+/// Whether a metric rests on the motion columns alone, so that [`metrics`] gives it.
 pub fn gives(name: &str) -> bool {
-    FROM_MOTION.contains(&name)
+    let others = [
+        Need::Forces,
+        Need::Phases,
+        Need::Beat,
+        Need::PhasesInBeat,
+        Need::Steps,
+    ];
+    find(name).is_some_and(|metric| !metric.needs.iter().any(|need| others.contains(need)))
 }
 
 /// Whether a metric rests on the height, whose slow course an inertial sensor loses.

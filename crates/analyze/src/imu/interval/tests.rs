@@ -4,7 +4,6 @@ use crate::imu::orientation::Options;
 use crate::imu::rath::{Mounting, Settings, motion};
 use crate::imu::track::Instrument;
 use crate::imu::track::Track;
-use crate::metrics::Need;
 use crate::random::Random;
 use nalgebra::{UnitQuaternion, Vector3};
 use std::f64::consts::{PI, TAU};
@@ -713,20 +712,24 @@ fn noise_is_taken_out_of_a_mean_square() {
 }
 
 #[test]
-fn every_metric_of_the_motion_is_among_those_with_an_interval() {
-    for metric in crate::metrics::METRICS {
-        let unseen = [
-            Need::Forces,
-            Need::Support,
-            Need::Phases,
-            Need::Beat,
-            Need::Steps,
-        ];
-        let of_motion = !metric.needs.iter().any(|need| unseen.contains(need));
-        assert!(
-            !of_motion || gives(metric.name),
-            "{}: FROM_MOTION lacks it",
-            metric.name
-        );
+fn a_metric_of_the_motion_alone_is_the_sensors() {
+    for name in [
+        "rms_roll_deg",
+        "rms_z_m",
+        "t_float",
+        "subharmonic_ratio",
+        "mechanism",
+    ] {
+        assert!(gives(name), "{name}");
+    }
+    for name in [
+        "contact_loss",
+        "force_mean_n",
+        "synchrony",
+        "roll_lock",
+        "step_rate_hz",
+        "none",
+    ] {
+        assert!(!gives(name), "{name}");
     }
 }
