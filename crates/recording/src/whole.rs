@@ -57,6 +57,19 @@ pub enum Sink {
     Stream(BufWriter<Box<dyn Write + Send>>),
 }
 
+/// Where links lead, whether or not something is there: they keep pointing at the file that is written.
+fn end_of_links(path: &Path) -> io::Result<PathBuf> {
+    let mut path = path.to_owned();
+    // As many as Linux follows.
+    for _ in 0..40 {
+        match fs::read_link(&path) {
+            Ok(next) => path = path.parent().unwrap_or(Path::new("")).join(next),
+            Err(_) => return Ok(path),
+        }
+    }
+    Err(io::Error::other("its links lead in a circle"))
+}
+
 impl Sink {
     /// A file that gets its name at the end, or straight to what is no regular file.
     pub fn beside(path: &Path) -> io::Result<Self> {
@@ -82,8 +95,7 @@ impl Sink {
             }
             _ => {}
         }
-        // A link keeps pointing at the file that is replaced.
-        let path = fs::canonicalize(path).unwrap_or_else(|_| path.to_owned());
+        let path = end_of_links(path)?;
         let folder = match path.parent() {
             Some(parent) if !parent.as_os_str().is_empty() => parent,
             _ => Path::new("."),
@@ -223,8 +235,9 @@ fn apart<'a>(
     outputs: impl IntoIterator<Item = &'a Path>,
     inputs: impl IntoIterator<Item = &'a Path>,
 ) -> Result<(), Usage> {
-    // What is not there yet may lie in a folder that is.
+    // What is not there yet may lie in a folder that is, and a link may lead to it.
     let whereabouts = |path: &Path| {
+        let path = end_of_links(path).ok()?;
         let folder = path.parent().filter(|p| !p.as_os_str().is_empty());
         let folder = folder.unwrap_or(Path::new(".")).canonicalize();
         path.canonicalize()
@@ -352,6 +365,19 @@ mod tests {
         write_whole::<Error>(&link, |f| f.write_all(b"new")).unwrap();
         assert!(link.is_symlink());
         assert_eq!(fs::read(&there).unwrap(), b"new");
+        // One that points at nothing yet, by a name in its own folder.
+        fs::remove_file(&there).unwrap();
+        fs::remove_file(&link).unwrap();
+        std::os::unix::fs::symlink("there", &link).unwrap();
+        assert!(apart([&*link, &*there], []).is_err());
+        write_whole::<Error>(&link, |f| f.write_all(b"first")).unwrap();
+        assert!(link.is_symlink());
+        assert_eq!(fs::read(&there).unwrap(), b"first");
+        fs::remove_file(&there).unwrap();
+        std::os::unix::fs::symlink(&link, &there).unwrap();
+        let circle = write_whole::<Error>(&link, |f| f.write_all(b"x")).unwrap_err();
+        assert_eq!(circle.to_string(), "its links lead in a circle");
+        assert!(link.is_symlink() && there.is_symlink());
         let null = Path::new("/dev/null");
         write_whole::<Error>(null, |f| f.write_all(b"new")).unwrap();
         assert!(!null.is_file());
