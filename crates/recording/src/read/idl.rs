@@ -15,6 +15,8 @@ enum Written {
     Name(String),
     Sequence(Box<Written>),
     Array(Box<Written>, usize),
+    /// A type that has no layout here, in words: only messages that hold it are refused.
+    Unsupported(String),
 }
 
 #[derive(Clone, Debug)]
@@ -33,7 +35,7 @@ enum Definition {
 #[derive(Default)]
 struct Definitions {
     by_name: HashMap<String, Definition>,
-    /// The constants; none where the value is no whole number that is understood.
+    /// The constants and enumerators; none where the value is no whole number that is understood.
     constants: HashMap<String, Option<i64>>,
 }
 
@@ -83,6 +85,7 @@ fn resolve(
         Written::Prim(prim) => Type::Prim(*prim),
         Written::Text => Type::Text,
         Written::WideText => Type::WideText,
+        Written::Unsupported(what) => return Err(format!("the type {what:?} has no decoder")),
         Written::Sequence(inner) => Type::Sequence(Box::new(resolve(
             inner,
             scope,
@@ -164,9 +167,11 @@ fn resolve(
     })
 }
 
-/// The full name of `name` as seen from `scope`: the innermost that exists.
+/// The full name of `name` as seen from `scope`: the innermost that exists; after a leading `::`, the outermost alone.
 fn find(name: &str, scope: &str, exists: impl Fn(&str) -> bool) -> Option<String> {
-    let name = name.trim_start_matches("::");
+    if let Some(name) = name.strip_prefix("::") {
+        return exists(name).then(|| name.to_owned());
+    }
     let mut scope = scope;
     loop {
         let candidate = if scope.is_empty() {
@@ -208,7 +213,8 @@ fn tokens(text: &str) -> Result<Vec<&str>, String> {
         } else if rest.starts_with("//") {
             at = line_end();
         } else if rest.starts_with("/*") {
-            at += rest.find("*/").ok_or("a comment has no end")? + 2;
+            // The star of its beginning is not that of its end.
+            at += rest[2..].find("*/").ok_or("a comment has no end")? + 4;
         } else if byte == b'"' || byte == b'\'' {
             let mut end = at + 1;
             while end < bytes.len() && bytes[end] != byte {
@@ -334,8 +340,14 @@ impl<'a> Parser<'a> {
             return Err("modules are nested more than 64 deep".to_owned());
         }
         let annotations = self.annotations();
+        if matches!(annotations.last(), Some(("annotation", []))) {
+            // One is defined here.
+            self.skip_braces();
+            return Ok(());
+        }
         match self.next() {
-            "" | ";" => {}
+            // The latter stand before `interface` and `valuetype`.
+            "" | ";" | "abstract" | "local" => {}
             "module" => {
                 let name = self.next().to_owned();
                 self.scope.push(name);
@@ -388,19 +400,54 @@ impl<'a> Parser<'a> {
                     _ => Definition::Enum,
                 };
                 self.found.by_name.insert(self.full(name), definition);
-                self.skip_braces();
+                self.enumerators();
             }
-            word @ ("union" | "bitmask" | "bitset") => {
+            word @ ("union" | "bitmask" | "bitset" | "native" | "exception" | "interface"
+            | "valuetype") => {
                 let name = self.next();
+                let article = if word.starts_with(['e', 'i']) {
+                    "an"
+                } else {
+                    "a"
+                };
                 self.found.by_name.insert(
                     self.full(name),
-                    Definition::Unsupported(format!("a {word}")),
+                    Definition::Unsupported(format!("{article} {word}")),
                 );
                 self.skip_braces();
             }
             other => return Err(format!("expected a definition, found {other:?}")),
         }
         Ok(())
+    }
+
+    /// The enumerators of an enum, constants in the scope around it: counted from 0, or from where `@value` says.
+    fn enumerators(&mut self) {
+        if self.peek() != "{" {
+            return self.skip_braces();
+        }
+        self.at += 1;
+        let mut value = Some(0);
+        while self.at < self.tokens.len() && self.peek() != "}" {
+            for (name, said) in self.annotations() {
+                if name.eq_ignore_ascii_case("value") {
+                    let said = said.concat();
+                    value = whole_number(said.trim_matches(['(', ')']));
+                }
+            }
+            let name = self.next();
+            self.found.constants.insert(self.full(name), value);
+            value = value.and_then(|value| value.checked_add(1));
+            while self.at < self.tokens.len() && !matches!(self.peek(), "," | "}") {
+                // What else stands there is not known, nor what it means for the values.
+                value = None;
+                self.at += 1;
+            }
+            if self.peek() == "," {
+                self.at += 1;
+            }
+        }
+        self.at += 1;
     }
 
     /// Steps over everything up to the end of the next block in braces.
@@ -566,10 +613,21 @@ impl<'a> Parser<'a> {
         }
     }
 
-    /// Steps over `<bound>`.
+    /// Steps over `<bound>`, which may hold further ones.
     fn bound(&mut self) {
-        if self.peek() == "<" {
-            while self.at < self.tokens.len() && self.next() != ">" {}
+        if self.peek() != "<" {
+            return;
+        }
+        let mut depth = 0;
+        while self.at < self.tokens.len() {
+            match self.next() {
+                "<" => depth += 1,
+                ">" => depth -= 1,
+                _ => {}
+            }
+            if depth == 0 {
+                return;
+            }
         }
     }
 
@@ -603,7 +661,7 @@ impl<'a> Parser<'a> {
                     (false, ["unsigned", "short"]) => Prim::U16,
                     (false, ["unsigned", "long"]) => Prim::U32,
                     (false, ["unsigned", "long", "long"]) => Prim::U64,
-                    _ => return Err(format!("the type {:?} has no decoder", words.join(" "))),
+                    _ => return Ok(Written::Unsupported(words.join(" "))),
                 }
             }
             "string" => {
@@ -627,7 +685,8 @@ impl<'a> Parser<'a> {
                 return Ok(Written::Sequence(Box::new(inner)));
             }
             "wchar" | "map" | "fixed" | "any" => {
-                return Err(format!("the type {token:?} has no decoder"));
+                self.bound();
+                return Ok(Written::Unsupported(token.to_owned()));
             }
             name if name.starts_with(|c: char| c.is_ascii_alphabetic() || c == '_' || c == ':') => {
                 return Ok(Written::Name(name.to_owned()));
@@ -697,12 +756,23 @@ mod tests {
                 "union U switch (long) { case 1: long a; }; struct M { U u; };",
                 "p::U is a union, which has no decoder",
             ),
+            (
+                "interface I { void f(in long a); }; struct M { sequence<I> x; };",
+                "p::I is an interface, which has no decoder",
+            ),
+            (
+                "struct M { map<string, sequence<long, 2>> x; };",
+                "the type \"map\" has no decoder",
+            ),
         ] {
             assert_eq!(problem(text).as_deref(), Some(expected));
         }
         // Not of this message, or without effect on where numbers lie.
         for text in [
             "@mutable struct Other { @optional long a; }; struct M { long a; };",
+            "native N; exception X { long c; }; abstract interface I; local interface I { struct S { long a; }; }; struct M { long a; };",
+            "@annotation foo { string v default \"x\"; }; @foo(v=\"y\") struct M { long a; };",
+            "struct Other { map<string, sequence<long, 2>> m; wchar w; fixed<5, 2> f; long double d; any a; }; struct M { long a; };",
             "@final @bit_bound(32) enum E { A }; @nested struct M { @optional(FALSE) E e; @key @id(3) long b; };",
         ] {
             assert_eq!(problem(text), None, "{text}");
@@ -712,6 +782,37 @@ mod tests {
         assert_eq!(appendable(inner).as_deref(), Some("p::In"));
         let outer = "module p { @extensibility(APPENDABLE) struct M { long a; }; };";
         assert_eq!(appendable(outer), None);
+    }
+
+    #[test]
+    fn a_leading_colon_is_the_root() {
+        let text = "module b { struct X { long v; long u; }; const long N = 2; };
+            module a { module b { struct X { double v; }; const long N = 7; };
+            struct Y { b::X x; ::b::X z; long n[b::N]; long m[::b::N]; }; };";
+        let types = parse("a/Y", text).expect("parses");
+        let names: Vec<&str> = types.structs.iter().map(|s| s.name.as_str()).collect();
+        assert_eq!(names, ["a/Y", "a/b/X", "b/X"]);
+        let long = Box::new(Type::Prim(Prim::I32));
+        let [_, z, n, m] = &types.structs[0].fields[..] else {
+            panic!("four fields");
+        };
+        assert_eq!(z.1, Type::Struct(2));
+        assert_eq!(n.1, Type::Array(long.clone(), 7));
+        assert_eq!(m.1, Type::Array(long, 2));
+        let missing = parse(
+            "a/Y",
+            "module a { struct X { long v; }; struct Y { ::X x; }; };",
+        );
+        assert_eq!(
+            missing.err().as_deref(),
+            Some("the type ::X is not defined")
+        );
+    }
+
+    #[test]
+    fn a_comment_does_not_end_where_it_begins() {
+        let text = "struct M { long a; /*/ long x; /*/ long b; /**/ long c; };";
+        assert_eq!(parse("M", text).expect("parses").structs[0].fields.len(), 3);
     }
 
     #[test]
@@ -728,6 +829,9 @@ mod tests {
         assert_eq!(size(n, "M_"), Ok(6));
         assert_eq!(size(n, "K"), Ok(9));
         assert_eq!(size(n, "N + 2 * ::N - 1"), Ok(17));
+        let e = "enum E { A, @value(0x10) B, COUNT, @default_literal LAST };";
+        assert_eq!(size(e, "COUNT"), Ok(17));
+        assert_eq!(size(e, "A + LAST"), Ok(18));
         let f = "const float F = 1.5; const long S = 1 << 3; const string T = \"a;b\";";
         assert_eq!(size(f, "3"), Ok(3));
         for (constants, given, expected) in [
