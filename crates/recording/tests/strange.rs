@@ -343,42 +343,6 @@ fn readings_that_are_given_up_leave_no_counts() {
     );
 }
 
-/// A struct that says of itself how long it is, in a representation that writes this down.
-#[test]
-fn appendable_structs_are_read_where_nothing_is_put_before_them() {
-    let found = recording(&WriterOptions::default(), |writer| {
-        let channel = RawChannel {
-            topic: "/a",
-            message_encoding: "cdr",
-            schema_name: "p/M",
-            schema_encoding: "ros2idl",
-            schema_data:
-                b"module p { @appendable struct In { long x; }; @final struct M { In in; }; };",
-            metadata: &BTreeMap::new(),
-        };
-        let channel = writer.raw_channel(&channel).expect("opens");
-        for (t_ns, message) in [
-            [0, 1, 0, 0, 5, 0, 0, 0].as_slice(),
-            &[0, 7, 0, 0, 4, 0, 0, 0, 5, 0, 0, 0],
-        ]
-        .iter()
-        .enumerate()
-        {
-            writer
-                .message(channel, t_ns as i64, *message)
-                .expect("writes");
-        }
-    });
-    let (signals, _) = found.signals(&|_| true).expect("reads");
-    assert_eq!(signals[0].values, [5.0]);
-    assert_eq!(
-        lines(&found),
-        [
-            "undecodable /a: 1 message could not be decoded; the first, at 0.000 s: the message holds the @appendable struct p::In, delimited in XCDR2, which has no decoder"
-        ]
-    );
-}
-
 /// Both ways to number the representations of XCDR2: what is plain is read, what is not is named.
 #[test]
 fn second_representations_have_two_numbers_each() {
@@ -437,13 +401,11 @@ fn of_idl(name: &str, text: &str, message: &[u8]) -> Recording {
     })
 }
 
-/// What a message in XCDR2 of such words becomes, and what is said.
-fn of_second(fields: &str, words: &[u32]) -> (String, String) {
-    let schema = format!(
-        "module p {{ enum Color {{ RED, GREEN, BLUE }}; struct In {{ long i; }}; struct M {{ {fields} }}; }};"
-    );
+/// What a message of such words, in XCDR2 or XCDR1, becomes, and what is said.
+fn of_words(representation: u8, schema: &str, words: &[u32]) -> (String, String) {
     let body: Vec<u8> = words.iter().flat_map(|word| word.to_le_bytes()).collect();
-    let found = of_idl("p/M", &schema, &[&[0, 7, 0, 0], &body[..]].concat());
+    let message = [&[0, representation, 0, 0], &body[..]].concat();
+    let found = of_idl("p/M", &format!("module p {{ {schema} }};"), &message);
     let (signals, _) = found.signals(&|_| true).expect("reads");
     let mut values: Vec<(String, f64)> = (signals.iter())
         .map(|signal| (signal.path[3..].to_owned(), signal.values[0]))
@@ -454,6 +416,76 @@ fn of_second(fields: &str, words: &[u32]) -> (String, String) {
         values.collect::<Vec<_>>().join(", "),
         lines(&found).concat(),
     )
+}
+
+/// The same with these fields, in XCDR2.
+fn of_second(fields: &str, words: &[u32]) -> (String, String) {
+    let schema = format!(
+        "enum Color {{ RED, GREEN, BLUE }}; struct In {{ long i; }}; struct M {{ {fields} }};"
+    );
+    of_words(7, &schema, words)
+}
+
+/// XCDR2 puts a size before structs that may get further fields, as those may that nothing is said of. The first message is Cyclone's.
+#[test]
+fn structs_within_others_have_a_size_before_them_or_none() {
+    let (low, high) = (0, 1.5f64.to_bits().wrapping_shr(32) as u32);
+    let sized = [4, 100, low, high];
+    let [unsaid, fixed, appendable] = ["", "@final", "@appendable"].map(|annotation| {
+        format!("{annotation} struct In {{ long v; }}; @final struct M {{ In a; double x; }};")
+    });
+    let expected = ("a.v 100, x 1.5".to_owned(), String::new());
+    for (schema, words) in [
+        (&unsaid, &sized[..]),
+        (&unsaid, &sized[1..]),
+        (&appendable, &sized),
+        (&fixed, &sized[1..]),
+    ] {
+        assert_eq!(of_words(7, schema, words), expected, "{schema} {words:?}");
+    }
+    // No size in XCDR1, where a double lies at a multiple of eight.
+    assert_eq!(of_words(1, &appendable, &[100, 0, low, high]), expected);
+    for (schema, words, problem) in [
+        (
+            &appendable,
+            &sized[1..],
+            "message stopped at byte 8 in \"a\": its size in bytes is another",
+        ),
+        (
+            &unsaid,
+            &[5, 100, low, high],
+            "20 bytes holds 4 after its last field",
+        ),
+    ] {
+        let (values, said) = of_words(7, schema, words);
+        assert_eq!(values, "");
+        assert!(
+            said.starts_with("undecodable") && said.ends_with(problem),
+            "{said}"
+        );
+    }
+    // Items have sizes of their own, and what is in them too: 2 items, of 16 bytes and of 20.
+    let nested = "struct Deep { long d; }; struct In { string name; Deep deep; sequence<long> l; };
+        @final struct M { sequence<In> s; Deep e[2]; long z; };";
+    let words = [
+        &[56, 2][..],
+        &[20, 2, u32::from(b'a'), 4, 7, 0],
+        &[24, 2, u32::from(b'b'), 4, 8, 1, 5],
+        &[16, 4, 1, 4, 2, 9],
+    ];
+    let expected = "e[0].d 1, e[1].d 2, s[0].deep.d 7, s[1].deep.d 8, s[1].l[0] 5, z 9";
+    assert_eq!(
+        of_words(7, nested, &words.concat()),
+        (expected.to_owned(), String::new())
+    );
+    // Where both readings use it up, the schema says which is meant.
+    let either = "struct In { long v; }; struct M { In a; sequence<long> s; };";
+    for (schema, expected) in [
+        (either.to_owned(), "a.v 4, s[0] 0"),
+        (either.replace("struct M", "@final struct M"), "a.v 1"),
+    ] {
+        assert_eq!(of_words(7, &schema, &[4, 1, 0]).0, expected);
+    }
 }
 
 /// Collections of enums in XCDR2, and how writers differ in what stands before them. The first message is that of pycdr2 1.0.0

@@ -1,17 +1,18 @@
 //! ROS 2 messages (`cdr`): XCDR1 and plain XCDR2, both byte orders, laid out by `ros2msg` or IDL text.
 //!
-//! Two points of the representation differ between implementations: whether plain XCDR2 puts a size before collections of structs
-//! and strings, and before those of enums, and how many bytes a wide character takes. A message tells by being used up exactly; the reading that
+//! Three points of the representation differ between implementations: whether plain XCDR2 puts a size before collections of structs
+//! and strings, and before those of enums, whether it puts one before structs that are neither `@final` nor `@appendable`, and how many
+//! bytes a wide character takes. A message tells by being used up exactly; the reading that
 //! does so is tried first on the channel's next message. Only where none does, padding may be left.
 
 use super::{
     decode::{Decoder, Place, SchemaRef},
     idl,
-    layout::{Fail, Headers, Program, Shape},
+    layout::{Fail, Headers, Program, Shape, Sizes},
     ros1::describe,
     ros2msg::{self, Dialect},
     rows::{MAX_PLACES, Rows},
-    types::{Type, Types},
+    types::{Extensible, Struct, Type, Types},
 };
 
 /// Bytes that say how a message is represented.
@@ -23,11 +24,12 @@ const PADDING: usize = 3;
 struct Cdr {
     types: Types,
     /// Whether the message has wide text, collections of structs and text, collections of enums, or arrays of several dimensions of
-    /// any of these: where readings differ.
+    /// any of these, or structs that may be extended or not: where readings differ.
     wide: bool,
     collections: bool,
     enums: bool,
     grids: bool,
+    unsaid: bool,
     programs: Vec<(Shape, Program)>,
     /// The readings to try, by representation; the one that fitted last comes first.
     readings: Vec<(u8, Vec<Shape>)>,
@@ -68,7 +70,9 @@ fn begin(types: Types) -> Result<Box<dyn Decoder>, String> {
         }
         wide |= *kind == Type::WideText;
     }
+    let unsaid = |message: &Struct| message.extensible == Extensible::Unsaid;
     Ok(Box::new(Cdr {
+        unsaid: types.structs.iter().skip(1).any(unsaid),
         types,
         wide,
         collections,
@@ -100,16 +104,12 @@ impl Cdr {
                 ));
             }
         };
-        if second && let Some(name) = &self.types.appendable {
-            return Err(format!(
-                "the message holds the @appendable struct {name}, delimited in XCDR2, which has no decoder"
-            ));
-        }
         let shape = Shape {
             big_endian,
             max_align: if second { 4 } else { 8 },
             headers: Headers::None,
             each_row: false,
+            sizes: Sizes::None,
             wide: 2,
             empty_takes_byte: true,
         };
@@ -123,18 +123,24 @@ impl Cdr {
             true => &[false, true][..],
             false => &[false],
         };
-        let mut readings: Vec<Shape> = (headers.iter())
-            .flat_map(|&headers| {
-                rows(headers)
-                    .iter()
-                    .map(move |&each_row| (headers, each_row))
-            })
-            .map(|(headers, each_row)| Shape {
-                headers,
-                each_row,
-                ..shape
-            })
-            .collect();
+        // Of a message without a size, nothing said means no size; where the message alone is said to be @final, it means one.
+        let sizes = match (second, self.unsaid, self.types.structs[0].extensible) {
+            (false, ..) => &[Sizes::None][..],
+            (true, false, _) => &[Sizes::Appendable],
+            (true, true, Extensible::No) => &[Sizes::NotFinal, Sizes::Appendable],
+            (true, true, _) => &[Sizes::Appendable, Sizes::NotFinal],
+        };
+        let mut readings = Vec::new();
+        for &sizes in sizes {
+            for &headers in headers {
+                readings.extend(rows(headers).iter().map(|&each_row| Shape {
+                    headers,
+                    each_row,
+                    sizes,
+                    ..shape
+                }));
+            }
+        }
         if self.wide {
             let four: Vec<Shape> = readings
                 .iter()

@@ -4,7 +4,7 @@
 
 use std::collections::HashMap;
 
-use super::types::{MAX_FIELDS, Prim, Struct, Type, Types};
+use super::types::{Extensible, MAX_FIELDS, Prim, Struct, Type, Types};
 
 /// A type as written, its names not yet resolved.
 #[derive(Clone, Debug)]
@@ -24,7 +24,7 @@ enum Definition {
     Struct {
         base: Option<String>,
         fields: Vec<(String, Written)>,
-        appendable: bool,
+        extensible: Extensible,
     },
     Alias(Written),
     Enum,
@@ -122,14 +122,12 @@ fn resolve(
                 Definition::Struct {
                     base,
                     fields,
-                    appendable,
+                    extensible,
                 } => {
                     let index = types.structs.len();
-                    if *appendable && index > 0 {
-                        types.appendable = Some(full.clone());
-                    }
                     types.structs.push(Struct {
                         name: full.replace("::", "/"),
+                        extensible: *extensible,
                         fields: Vec::new(),
                     });
                     known.insert(full.clone(), index);
@@ -519,7 +517,11 @@ impl<'a> Parser<'a> {
             None => Definition::Struct {
                 base,
                 fields,
-                appendable: are_of(annotations, "appendable"),
+                extensible: match () {
+                    () if are_of(annotations, "final") => Extensible::No,
+                    () if are_of(annotations, "appendable") => Extensible::Yes,
+                    () => Extensible::Unsaid,
+                },
             },
         };
         self.found.by_name.insert(self.full(name), definition);
@@ -777,11 +779,16 @@ mod tests {
         ] {
             assert_eq!(problem(text), None, "{text}");
         }
-        let appendable = |text: &str| parse("p/M", text).expect("parses").appendable;
-        let inner = "module p { @appendable struct In { long a; }; @final struct M { In x; }; };";
-        assert_eq!(appendable(inner).as_deref(), Some("p::In"));
-        let outer = "module p { @extensibility(APPENDABLE) struct M { long a; }; };";
-        assert_eq!(appendable(outer), None);
+        let extensible = |text: &str| parse("p/M", text).expect("parses").structs[0].extensible;
+        for (annotation, expected) in [
+            ("", Extensible::Unsaid),
+            ("@final", Extensible::No),
+            ("@appendable", Extensible::Yes),
+            ("@extensibility(APPENDABLE)", Extensible::Yes),
+        ] {
+            let text = format!("module p {{ {annotation} struct M {{ long a; }}; }};");
+            assert_eq!(extensible(&text), expected, "{text}");
+        }
     }
 
     #[test]

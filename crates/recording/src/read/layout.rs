@@ -14,7 +14,7 @@ use super::{
     decode::Place,
     names,
     rows::{Rows, UNWANTED, places_of},
-    types::{MAX_FIELDS, Prim, Type, Types},
+    types::{Extensible, MAX_FIELDS, Prim, Type, Types},
 };
 
 /// How the bytes are laid out.
@@ -26,6 +26,7 @@ pub(super) struct Shape {
     pub headers: Headers,
     /// Whether each row of an array of several dimensions begins with its size too, not the whole alone.
     pub each_row: bool,
+    pub sizes: Sizes,
     /// Bytes per character of a wide string.
     pub wide: usize,
     /// A struct without fields takes one byte (ROS 2).
@@ -42,7 +43,26 @@ pub(super) enum Headers {
     All,
 }
 
+/// Which structs within others begin with their size in bytes.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Sizes {
+    None,
+    /// Those that are said to be `@appendable`.
+    Appendable,
+    /// Those too of which nothing is said: XTypes 1.3, 7.3.3.1, gives them the same meaning.
+    NotFinal,
+}
+
 impl Shape {
+    /// Whether a struct within another begins with its size.
+    fn has_size(self, extensible: Extensible) -> bool {
+        match extensible {
+            Extensible::No => false,
+            Extensible::Unsaid => self.sizes == Sizes::NotFinal,
+            Extensible::Yes => self.sizes != Sizes::None,
+        }
+    }
+
     /// Whether an array or sequence begins with its size.
     fn has_header(self, collection: &Type) -> bool {
         match collection.item() {
@@ -131,6 +151,10 @@ enum Op {
     Run(Run),
     Text(String),
     WideText(String),
+    /// The size of a struct, before it.
+    Size(String),
+    /// Where a struct with a size ends.
+    End,
     Sequence(Box<Items>),
     /// An array whose items vary in length.
     Array(Box<Items>, usize),
@@ -162,6 +186,9 @@ struct Flat {
     /// Whether every column gets one value: then messages can be taken column by column.
     simple: bool,
 }
+
+/// Another reading may use up a message too.
+const OTHER_SIZE: &str = "its size in bytes is another";
 
 const TOO_MANY: &str = "its items have too many fields";
 
@@ -367,6 +394,8 @@ impl Program {
         mut at: usize,
         rows: &mut Rows,
     ) -> Result<usize, Fail> {
+        // Where the structs in hand end that have a size, and their names.
+        let mut ends = Vec::new();
         for op in &mut self.ops {
             at = match op {
                 Op::Run(run) if context.shape.big_endian => run.read::<true>(context, at, rows)?,
@@ -379,6 +408,15 @@ impl Program {
                         .ok_or_else(|| short(at, field))?;
                     end_of(context.data, at, bytes, field)?
                 }
+                Op::Size(field) => {
+                    let (size, at) = context.length(at, field)?;
+                    ends.push((at.saturating_add(size), field));
+                    at
+                }
+                Op::End => match ends.pop() {
+                    Some((end, field)) if end != at => return Err(other(at, field, OTHER_SIZE)),
+                    _ => at,
+                },
                 Op::Sequence(items) => {
                     let (end, start) = items.header(context, at)?;
                     let (count, at) = context.length(start, &items.field)?;
@@ -461,7 +499,8 @@ fn compile(
     let mut program = compiler.program;
     let fields = |op: &Op| match op {
         Op::Run(run) => run.fields.iter().map(|f| places_of(f.name.len())).sum(),
-        Op::Text(name) | Op::WideText(name) => places_of(name.len()),
+        Op::Text(name) | Op::WideText(name) | Op::Size(name) => places_of(name.len()),
+        Op::End => 1,
         Op::Sequence(items) | Op::Array(items, _) => places_of(items.field.len()),
     };
     program.places = program.ops.iter().map(fields).sum::<usize>().max(1);
@@ -513,6 +552,11 @@ impl Compiler<'_, '_> {
                 let types = self.types;
                 let fields = &types.structs[*index].fields;
                 let name = &types.structs[*index].name;
+                // The message itself stands in no other.
+                let sized = *index > 0 && self.shape.has_size(types.structs[*index].extensible);
+                if sized {
+                    self.push(Op::Size(field.to_owned()));
+                }
                 if fields.is_empty() && self.shape.empty_takes_byte {
                     self.run.fields.push(RunField {
                         prim: Prim::U8,
@@ -547,6 +591,9 @@ impl Compiler<'_, '_> {
                     };
                     self.add(kind, &path, role)?;
                     self.names = Names::None;
+                }
+                if sized {
+                    self.push(Op::End);
                 }
             }
             Type::Array(inner, count) => {

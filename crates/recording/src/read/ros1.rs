@@ -2,7 +2,7 @@
 
 use super::{
     decode::{Decoder, Place, SchemaRef},
-    layout::{Fail, Headers, Problem, Program, Shape},
+    layout::{Fail, Headers, Problem, Program, Shape, Sizes},
     ros2msg::{self, Dialect},
     rows::{MAX_PLACES, Rows},
     types::Types,
@@ -13,6 +13,7 @@ const SHAPE: Shape = Shape {
     max_align: 1,
     headers: Headers::None,
     each_row: false,
+    sizes: Sizes::None,
     wide: 2,
     empty_takes_byte: false,
 };

@@ -58,7 +58,7 @@ pub(super) fn parse(name: &str, text: &str, dialect: Dialect) -> Result<Types, S
     let mut types = Types::default();
     types.structs.extend(raw.iter().map(|(name, _)| Struct {
         name: name.clone(),
-        fields: Vec::new(),
+        ..Struct::default()
     }));
     for (position, (owner, fields)) in raw.iter().enumerate() {
         for field in fields {
@@ -206,6 +206,7 @@ fn resolve(
             ("sec".to_owned(), Type::Prim(seconds)),
             (fraction.to_owned(), Type::Prim(second)),
         ],
+        ..Struct::default()
     });
     Ok(Type::Struct(types.structs.len() - 1))
 }

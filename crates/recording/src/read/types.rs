@@ -63,10 +63,21 @@ impl Type {
     }
 }
 
+/// Whether a struct may get further fields, for which XCDR2 puts its size before it.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub(super) enum Extensible {
+    No,
+    /// By the standard it may; writers differ.
+    #[default]
+    Unsaid,
+    Yes,
+}
+
 /// A message type.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Struct {
     pub name: String,
+    pub extensible: Extensible,
     pub fields: Vec<(String, Type)>,
 }
 
@@ -74,8 +85,6 @@ pub(super) struct Struct {
 #[derive(Clone, Debug, Default)]
 pub(super) struct Types {
     pub structs: Vec<Struct>,
-    /// A struct within the message that XCDR2 puts a size before, if there is one.
-    pub appendable: Option<String>,
     /// Fields that structs have from those that they inherit from, copies of copies included.
     pub inherited: usize,
 }

@@ -7,7 +7,9 @@ use super::super::{
     rows::{Long, Rows},
     types::{Prim, Type, Types},
 };
-use super::{Context, Fail, Op, Program, TOO_MANY, align, compile, end_of, other, short};
+use super::{
+    Context, Fail, OTHER_SIZE, Op, Program, TOO_MANY, align, compile, end_of, other, short,
+};
 
 /// The items of a sequence or array.
 #[derive(Clone, Debug)]
@@ -120,10 +122,10 @@ impl Items {
         Ok((Some(at.saturating_add(size)), at))
     }
 
-    /// Whether the items ended at `at`, where their size said: another reading may use up a message too.
+    /// Whether the items ended at `at`, where their size said.
     pub fn check(&self, end: Option<usize>, at: usize) -> Result<usize, Fail> {
         match end {
-            Some(end) if end != at => Err(other(at, &self.field, "its size in bytes is another")),
+            Some(end) if end != at => Err(other(at, &self.field, OTHER_SIZE)),
             _ => Ok(at),
         }
     }
