@@ -703,6 +703,82 @@ fn json_with_bare_words_is_counted_once() {
     );
 }
 
+/// Keys may spell what others lead to: in a message that has both, one number hides the other, which is said once for a topic.
+#[test]
+fn json_keys_that_spell_the_paths_of_others() {
+    let found = |texts: &[&str]| {
+        let found = recording(&WriterOptions::default(), |writer| {
+            let channel = writer.raw_channel(&JSON).expect("opens");
+            for (t_ns, text) in texts.iter().enumerate() {
+                let message = text.as_bytes();
+                (writer.message(channel, t_ns as i64, message)).expect("writes");
+            }
+        });
+        let (signals, _) = found.signals(&|_| true).expect("reads");
+        let signals = signals.iter().map(|s| (s.path.clone(), s.values.to_vec()));
+        (signals.collect::<Vec<_>>(), lines(&found))
+    };
+    let said = |field: &str| {
+        vec![format!(
+            "odd_schema /j: two of its fields are called {field}; where a message has both, the last one counts"
+        )]
+    };
+    let dotted = r#"{"a.b":1,"a":{"b":2}}"#;
+    let indexed = r#"{"a[0]":1,"a":[2]}"#;
+    assert_eq!(
+        found(&[dotted, indexed, dotted]),
+        (
+            vec![
+                ("/j.a.b".to_owned(), vec![2.0, 2.0]),
+                ("/j.a[0]".to_owned(), vec![2.0])
+            ],
+            said("a.b")
+        )
+    );
+    assert_eq!(found(&[indexed]).1, said("a[0]"));
+    // Nothing is lost where a message has but one of them.
+    let (signals, said) = found(&[r#"{"a.b":1}"#, r#"{"a":{"b":2}}"#]);
+    assert_eq!(signals, [("/j.a.b".to_owned(), vec![1.0, 2.0])]);
+    assert!(said.is_empty(), "{said:?}");
+    let messages = (0..600).map(|m| [dotted, indexed, "{}"][m / 7 % 3].into());
+    same_for_all_threads(&JSON, &messages.collect::<Vec<_>>());
+}
+
+/// A byte order mark before the document, and halves of surrogate pairs as Python writes those of file names that are not UTF-8, cost no number.
+#[test]
+fn json_with_a_byte_order_mark_and_half_characters() {
+    let texts = [
+        "\u{feff}{\"x\":0}",
+        r#"{"s":"\\ud800","x":1}"#,
+        r#"{"s":"\ud800","x":2}"#,
+        r#"{"s":"\udcff\\","name":"\uDBFF\ud83d\ude00","x":3}"#,
+        r#"{"s":"\ud800\u0041\ud8","x":4}"#,
+        r#"{"\ud800":1,"\ud83d\ude00":2}"#,
+    ];
+    let found = recording(&WriterOptions::default(), |writer| {
+        let channel = writer.raw_channel(&JSON).expect("opens");
+        for (t_ns, text) in texts.iter().enumerate() {
+            let message = text.as_bytes();
+            (writer.message(channel, t_ns as i64, message)).expect("writes");
+        }
+    });
+    let (signals, findings) = found.signals(&|_| true).expect("reads");
+    let told: Vec<_> = (signals.iter())
+        .map(|signal| (signal.path.as_str(), signal.values.as_slice()))
+        .collect();
+    assert_eq!(
+        told,
+        [
+            ("/j.x", &[0.0, 1.0, 2.0, 3.0][..]),
+            ("/j.\u{1f600}", &[2.0]),
+            ("/j.\u{fffd}", &[1.0]),
+        ]
+    );
+    // The fifth ends an escape too soon.
+    assert_eq!(findings.len(), 1, "{findings:?}");
+    assert_eq!(findings[0].count, 1);
+}
+
 /// Topic and field together may spell what those of another topic do: they are two signals, and that is said.
 #[test]
 fn fields_of_two_topics_with_one_name_are_kept_apart() {
@@ -1334,12 +1410,24 @@ fn protobuf_schemas_of_no_known_kind() {
         }],
         ..DescriptorProto::default()
     };
-    assert_eq!(
-        lines(&one_message("editions", plain, &[])),
-        [
-            "bad_schema /p: skipped 1 message: the schema \"a.M\" cannot be used: the FileDescriptorSet's file \"a.proto\" is written in \"editions\"; expected proto2 or proto3"
-        ]
-    );
+    for (syntax, said) in [
+        // A language of its own, no damage.
+        (
+            "editions",
+            "no_decoder /p: skipped 1 message: the schema \"a.M\" is not read",
+        ),
+        (
+            "proto9",
+            "bad_schema /p: skipped 1 message: the schema \"a.M\" cannot be used",
+        ),
+    ] {
+        assert_eq!(
+            lines(&one_message(syntax, plain.clone(), &[])),
+            [format!(
+                "{said}: the FileDescriptorSet's file \"a.proto\" is written in \"{syntax}\"; expected proto2 or proto3"
+            )]
+        );
+    }
     let keyless = DescriptorProto {
         name: Some("M".into()),
         field: vec![

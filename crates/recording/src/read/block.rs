@@ -28,6 +28,8 @@ pub(super) struct ChannelBatch {
     pub names: Vec<Sight>,
     pub trailing: u64,
     pub remark: Option<String>,
+    /// A field that has two places in one message.
+    pub twice: Option<String>,
 }
 
 /// One column of a batch.
@@ -166,6 +168,10 @@ impl State {
                     info.schema_encoding,
                     decoders::listed()
                 ),
+            ),
+            Err(NoDecoder::Unread(problem)) => State::Closed(
+                Kind::NoDecoder,
+                format!("the schema {:?} is not read: {problem}", info.schema),
             ),
             Err(NoDecoder::BadSchema(problem)) => State::Closed(
                 Kind::BadSchema,
@@ -634,6 +640,7 @@ impl<'a> ChannelState<'a> {
                 names: self.rows.names.take_new(),
                 trailing: self.rows.trailing,
                 remark: self.rows.remark.take(),
+                twice: self.rows.twice.take(),
             });
         }
         self.rows.clear();

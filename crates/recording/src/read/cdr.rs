@@ -7,6 +7,7 @@
 
 use super::{
     decode::{Decoder, Place, SchemaRef},
+    decoders::Opened,
     idl,
     layout::{Fail, Headers, Program, Shape, Sizes},
     ros1::describe,
@@ -35,25 +36,19 @@ struct Cdr {
     readings: Vec<(u8, Vec<Shape>)>,
 }
 
-pub(super) fn open_ros2msg(
-    schema: &SchemaRef<'_>,
-    _rows: &mut Rows,
-) -> Result<Box<dyn Decoder>, String> {
+pub(super) fn open_ros2msg(schema: &SchemaRef<'_>, _rows: &mut Rows) -> Opened {
     let text =
         str::from_utf8(schema.data).map_err(|_| "the definition is not UTF-8 text".to_owned())?;
     begin(ros2msg::parse(schema.name, text, Dialect::Ros2)?)
 }
 
-pub(super) fn open_idl(
-    schema: &SchemaRef<'_>,
-    _rows: &mut Rows,
-) -> Result<Box<dyn Decoder>, String> {
+pub(super) fn open_idl(schema: &SchemaRef<'_>, _rows: &mut Rows) -> Opened {
     let text =
         str::from_utf8(schema.data).map_err(|_| "the definition is not UTF-8 text".to_owned())?;
     begin(idl::parse(schema.name, text)?)
 }
 
-fn begin(types: Types) -> Result<Box<dyn Decoder>, String> {
+fn begin(types: Types) -> Opened {
     let (mut wide, mut collections, mut enums, mut grids) = (false, false, false, false);
     for kind in types
         .structs

@@ -8,15 +8,26 @@ use super::{
 };
 
 /// What [`open`] can say instead of a decoder.
-#[derive(Debug)]
+#[derive(Clone, Debug)]
 pub(super) enum NoDecoder {
     /// No line of the table fits.
     Unknown,
+    /// The schema is written in a language that is not read: which.
+    Unread(String),
     /// The schema cannot be understood: why.
     BadSchema(String),
 }
 
-type Open = fn(&SchemaRef<'_>, &mut Rows) -> Result<Box<dyn Decoder>, String>;
+impl From<String> for NoDecoder {
+    fn from(problem: String) -> Self {
+        NoDecoder::BadSchema(problem)
+    }
+}
+
+/// What a line of the table gives.
+pub(super) type Opened = Result<Box<dyn Decoder>, NoDecoder>;
+
+type Open = fn(&SchemaRef<'_>, &mut Rows) -> Opened;
 
 /// Message encoding, schema encoding (`*`: any, or none) and how to begin.
 const DECODERS: &[(&str, &str, Open)] = &[
@@ -45,11 +56,7 @@ pub(super) fn listed() -> String {
 }
 
 /// Finds the decoder of a channel and lets it read the schema.
-pub(super) fn open(
-    message_encoding: &str,
-    schema: &SchemaRef<'_>,
-    rows: &mut Rows,
-) -> Result<Box<dyn Decoder>, NoDecoder> {
+pub(super) fn open(message_encoding: &str, schema: &SchemaRef<'_>, rows: &mut Rows) -> Opened {
     let open = DECODERS
         .iter()
         .find(|(message, encoding, _)| {
@@ -57,5 +64,5 @@ pub(super) fn open(
         })
         .map(|(_, _, open)| open)
         .ok_or(NoDecoder::Unknown)?;
-    open(schema, rows).map_err(NoDecoder::BadSchema)
+    open(schema, rows)
 }

@@ -6,13 +6,15 @@ use std::sync::{Arc, Mutex, PoisonError};
 use prost::Message as _;
 use prost_reflect::DescriptorPool;
 
+use super::decoders::NoDecoder;
+
 /// Those that were parsed, by where they lie: hundreds of channels may share one that is large.
 #[derive(Default)]
-pub(super) struct Pools(Mutex<HashMap<usize, Result<DescriptorPool, String>>>);
+pub(super) struct Pools(Mutex<HashMap<usize, Result<DescriptorPool, NoDecoder>>>);
 
 impl Pools {
     /// The descriptors of a schema.
-    pub fn of(&self, schema: &Arc<[u8]>) -> Result<DescriptorPool, String> {
+    pub fn of(&self, schema: &Arc<[u8]>) -> Result<DescriptorPool, NoDecoder> {
         let mut pools = self.0.lock().unwrap_or_else(PoisonError::into_inner);
         let known = pools.entry(schema.as_ptr().addr());
         known.or_insert_with(|| pool(schema)).clone()
@@ -20,7 +22,7 @@ impl Pools {
 }
 
 /// The descriptors of the set in the file.
-fn pool(schema: &[u8]) -> Result<DescriptorPool, String> {
+fn pool(schema: &[u8]) -> Result<DescriptorPool, NoDecoder> {
     let mut set = prost_types::FileDescriptorSet::decode(schema)
         .map_err(|problem| format!("the schema is no FileDescriptorSet: {problem}"))?;
     // Writers repeat files, and some leave out what Google defines.
@@ -45,16 +47,20 @@ fn pool(schema: &[u8]) -> Result<DescriptorPool, String> {
     }
     let known = |syntax: &str| ["proto2", "proto3", ""].contains(&syntax);
     if let Some(file) = set.file.iter().find(|file| !known(file.syntax())) {
-        return Err(format!(
+        let problem = format!(
             "the FileDescriptorSet's file {:?} is written in {:?}; expected proto2 or proto3",
             file.name(),
             file.syntax()
-        ));
+        );
+        return Err(match file.syntax() {
+            "editions" => NoDecoder::Unread(problem),
+            _ => NoDecoder::BadSchema(problem),
+        });
     }
     // The library indexes past its files while it words some of its errors: a schema that makes it panic is one that does not parse.
     let parsed = std::panic::catch_unwind(|| DescriptorPool::from_file_descriptor_set(set))
         .map_err(|_| "the FileDescriptorSet is not consistent".to_owned())?;
-    parsed.map_err(|problem| {
+    let pool = parsed.map_err(|problem| {
         if missing.is_empty() {
             format!("the FileDescriptorSet is not consistent: {problem}")
         } else {
@@ -63,5 +69,6 @@ fn pool(schema: &[u8]) -> Result<DescriptorPool, String> {
                 missing.join(", ")
             )
         }
-    })
+    })?;
+    Ok(pool)
 }

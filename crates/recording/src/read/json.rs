@@ -7,20 +7,54 @@ use serde_json::Value;
 
 use super::{
     decode::{Decoder, SchemaRef},
+    decoders::Opened,
     names,
     rows::{Long, MAX_PLACES, Rows, UNWANTED, places_of},
 };
 
 struct Json {
     root: Node,
-    pending: Vec<(u32, f64)>,
+    pending: Pending,
+}
+
+/// The numbers of the message in hand: a text that turns out to be no JSON gives none.
+#[derive(Default)]
+struct Pending {
+    values: Vec<(u32, f64)>,
+    /// The last message that gave each column a number, and the node there.
+    givers: Vec<(u64, u32)>,
+    message: u64,
+    /// How many nodes have a column.
+    nodes: u32,
+    /// The first field that two nodes of the message give a number.
+    twice: Option<String>,
+}
+
+impl Pending {
+    fn begin(&mut self) {
+        self.values.clear();
+        self.twice = None;
+        self.message += 1;
+    }
+
+    /// Puts a number, and says whether another node of this message gave the column one.
+    fn put(&mut self, (column, node): (u32, u32), value: f64) -> bool {
+        self.values.push((column, value));
+        let column = column as usize;
+        if self.givers.len() <= column {
+            self.givers.resize(column + 1, (0, 0));
+        }
+        let (message, giver) = std::mem::replace(&mut self.givers[column], (self.message, node));
+        message == self.message && giver != node
+    }
 }
 
 /// One place in the document: what has been seen there.
 #[derive(Default)]
 struct Node {
     field: String,
-    column: Option<u32>,
+    /// Its column, and its number among the nodes that have one.
+    column: Option<(u32, u32)>,
     children: Vec<(String, Node)>,
     /// Places among the children.
     by_key: HashMap<String, usize>,
@@ -40,7 +74,7 @@ impl Node {
     }
 }
 
-pub(super) fn open(schema: &SchemaRef<'_>, rows: &mut Rows) -> Result<Box<dyn Decoder>, String> {
+pub(super) fn open(schema: &SchemaRef<'_>, rows: &mut Rows) -> Opened {
     if schema.encoding == "jsonschema"
         && let Err(problem) = serde_json::from_slice::<IgnoredAny>(schema.data)
     {
@@ -50,7 +84,7 @@ pub(super) fn open(schema: &SchemaRef<'_>, rows: &mut Rows) -> Result<Box<dyn De
     }
     Ok(Box::new(Json {
         root: Node::default(),
-        pending: Vec::new(),
+        pending: Pending::default(),
     }))
 }
 
@@ -60,21 +94,23 @@ impl Decoder for Json {
             rows.places = 0;
             self.root = Node::default();
         }
-        let stamp = self.read(message, rows).or_else(|problem| {
-            // Python's and other writers put bare words that JSON does not have.
-            match quote_words(message) {
-                Some(quoted) => {
+        let text = message.strip_prefix(BYTE_ORDER_MARK).unwrap_or(message);
+        let stamp = self.read(text, rows).or_else(|problem| {
+            // Python's and other writers put what JSON does not have.
+            match mend(text) {
+                Some(mended) => {
                     rows.take_back_counts();
-                    self.read(&quoted, rows)
+                    self.read(&mended, rows)
                 }
                 None => Err(problem),
             }
         });
         let stamp = stamp
             .map_err(|problem| format!("JSON message of {} bytes: {problem}", message.len()))?;
-        for &(column, value) in &self.pending {
+        for &(column, value) in &self.pending.values {
             rows.push(column, value);
         }
+        rows.twice = rows.twice.take().or(self.pending.twice.take());
         rows.stamp_ns = stamp.ns();
         Ok(())
     }
@@ -82,7 +118,7 @@ impl Decoder for Json {
 
 impl Json {
     fn read(&mut self, message: &[u8], rows: &mut Rows) -> Result<Stamp, serde_json::Error> {
-        self.pending.clear();
+        self.pending.begin();
         let mut stamp = Stamp::default();
         let mut deserializer = serde_json::Deserializer::from_slice(message);
         let place = Place {
@@ -109,34 +145,60 @@ const WORDS: [(&str, f64); 3] = [
 /// Marks a text that was such a word; no writer begins a text so.
 const MARK: char = '\u{1}';
 
-/// The document with its bare words as marked texts; `None` where it has none.
-fn quote_words(message: &[u8]) -> Option<Vec<u8>> {
-    let mut quoted = Vec::new();
+/// Some writers put it before the document.
+const BYTE_ORDER_MARK: &[u8] = "\u{feff}".as_bytes();
+
+/// The document with its bare words as marked texts, and U+FFFD for each half of a surrogate pair that stands alone; `None` where it has
+/// neither.
+fn mend(message: &[u8]) -> Option<Vec<u8>> {
+    let mut mended = Vec::new();
     let (mut rest, mut inside, mut found) = (message, false, false);
     while let Some((&byte, after)) = rest.split_first() {
         if !inside
             && let Some((word, _)) = WORDS.iter().find(|(w, _)| rest.starts_with(w.as_bytes()))
         {
-            quoted.extend(format!("\"\\u0001{word}\"").bytes());
+            mended.extend(format!("\"\\u0001{word}\"").bytes());
             rest = &rest[word.len()..];
             found = true;
             continue;
         }
-        quoted.push(byte);
+        if inside && let Some(half @ 0xd800..0xe000) = escaped(rest) {
+            let (first, behind) = rest.split_at(ESCAPE);
+            rest = behind;
+            if half < 0xdc00 && matches!(escaped(behind), Some(0xdc00..0xe000)) {
+                mended.extend_from_slice(first);
+                mended.extend_from_slice(&behind[..ESCAPE]);
+                rest = &behind[ESCAPE..];
+            } else {
+                mended.extend_from_slice(b"\\ufffd");
+                found = true;
+            }
+            continue;
+        }
+        mended.push(byte);
         rest = after;
         match byte {
             b'"' => inside = !inside,
             b'\\' if inside => {
                 // The character behind does not end the text.
-                if let Some((&escaped, after)) = rest.split_first() {
-                    quoted.push(escaped);
+                if let Some((&next, after)) = rest.split_first() {
+                    mended.push(next);
                     rest = after;
                 }
             }
             _ => {}
         }
     }
-    found.then_some(quoted)
+    found.then_some(mended)
+}
+
+/// Bytes of an escape as `\ud800`.
+const ESCAPE: usize = 6;
+
+/// The value of such an escape, if one begins here.
+fn escaped(text: &[u8]) -> Option<u16> {
+    let digits = text.get(..ESCAPE)?.strip_prefix(b"\\u")?;
+    u16::from_str_radix(str::from_utf8(digits).ok()?, 16).ok()
 }
 
 /// Seconds and nanoseconds of the header's stamp, or of a `timestamp`.
@@ -174,7 +236,7 @@ impl Stamp {
 struct Place<'a, 'r> {
     node: &'a mut Node,
     rows: &'a mut Rows<'r>,
-    pending: &'a mut Vec<(u32, f64)>,
+    pending: &'a mut Pending,
     stamp: &'a mut Stamp,
     /// What a list of names before this value calls its items, if it is a list.
     names: &'a [String],
@@ -184,12 +246,13 @@ struct Place<'a, 'r> {
 
 impl Place<'_, '_> {
     fn number(self, value: f64) {
-        let column = *self
-            .node
-            .column
-            .get_or_insert_with(|| self.rows.column(&self.node.field));
-        if column != UNWANTED {
-            self.pending.push((column, value));
+        let column = *self.node.column.get_or_insert_with(|| {
+            self.pending.nodes = self.pending.nodes.wrapping_add(1);
+            (self.rows.column(&self.node.field), self.pending.nodes)
+        });
+        if column.0 != UNWANTED && self.pending.put(column, value) {
+            let field = || self.node.field.clone();
+            self.pending.twice.get_or_insert_with(field);
         }
         self.stamp.see(&self.node.field, value);
     }
@@ -343,7 +406,7 @@ impl<'de> Visitor<'de> for Place<'_, '_> {
             ..
         } = self;
         let list = *(node.list).get_or_insert_with(|| rows.names.list(&node.field));
-        let before = pending.len();
+        let before = pending.values.len();
         let takes = places_of(node.field.len());
         let mut item = 0;
         loop {
@@ -353,7 +416,7 @@ impl<'de> Visitor<'de> for Place<'_, '_> {
                 }
                 if item == rows.max_items {
                     rows.note_long(Long::Items(node.field.clone()));
-                    pending.truncate(before);
+                    pending.values.truncate(before);
                 }
             } else if !rows.has_room(takes) {
                 if seq.next_element::<IgnoredAny>()?.is_none() {

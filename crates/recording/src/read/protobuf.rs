@@ -9,6 +9,7 @@ use prost_reflect::{FieldDescriptor, Kind as FieldKind, MessageDescriptor};
 
 use super::{
     decode::{Decoder, SchemaRef},
+    decoders::{NoDecoder, Opened},
     names,
     rows::{Long, MAX_PLACES, Rows, UNWANTED, places_of},
 };
@@ -21,20 +22,20 @@ struct Protobuf {
     root: Node,
 }
 
-pub(super) fn open(schema: &SchemaRef<'_>, rows: &mut Rows) -> Result<Box<dyn Decoder>, String> {
+pub(super) fn open(schema: &SchemaRef<'_>, rows: &mut Rows) -> Opened {
     let descriptor = descriptor(schema)?;
     let root = Node::new(&descriptor, "", rows);
     Ok(Box::new(Protobuf { descriptor, root }))
 }
 
 /// The message's descriptor out of the set in the file.
-fn descriptor(schema: &SchemaRef<'_>) -> Result<MessageDescriptor, String> {
+fn descriptor(schema: &SchemaRef<'_>) -> Result<MessageDescriptor, NoDecoder> {
     let pool = schema.pools.of(schema.data)?;
     pool.get_message_by_name(schema.name).ok_or_else(|| {
-        format!(
+        NoDecoder::BadSchema(format!(
             "the FileDescriptorSet does not define the message {}",
             schema.name
-        )
+        ))
     })
 }
 

@@ -2,6 +2,7 @@
 
 use super::{
     decode::{Decoder, Place, SchemaRef},
+    decoders::Opened,
     layout::{Fail, Headers, Problem, Program, Shape, Sizes},
     ros2msg::{self, Dialect},
     rows::{MAX_PLACES, Rows},
@@ -23,7 +24,7 @@ struct Ros1 {
     program: Program,
 }
 
-pub(super) fn open(schema: &SchemaRef<'_>, rows: &mut Rows) -> Result<Box<dyn Decoder>, String> {
+pub(super) fn open(schema: &SchemaRef<'_>, rows: &mut Rows) -> Opened {
     let text =
         str::from_utf8(schema.data).map_err(|_| "the definition is not UTF-8 text".to_owned())?;
     let types = ros2msg::parse(schema.name, text, Dialect::Ros1)?;

@@ -133,6 +133,8 @@ pub(super) struct Rows<'a> {
     pub long_types: Counts<Long>,
     /// What the decoder has to say about the schema.
     pub remark: Option<String>,
+    /// The first field that has two places in one message, as `a.b` and `b` of `a` in JSON.
+    pub twice: Option<String>,
     /// What the message in hand added to these counts, to be taken back with it.
     noted: Vec<Noted>,
     /// The columns that the message in hand gave a number.
@@ -179,6 +181,7 @@ impl<'a> Rows<'a> {
             long: Counts::default(),
             long_types: Counts::default(),
             remark: None,
+            twice: None,
             noted: Vec::new(),
             given: Vec::new(),
             held: 0,
@@ -404,6 +407,7 @@ impl<'a> Rows<'a> {
         self.long.clear();
         self.noted.clear();
         self.trailing = 0;
+        self.twice = None;
         for column in &mut self.columns {
             column.values.clear();
             column.rows.clear();

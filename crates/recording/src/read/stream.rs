@@ -249,6 +249,8 @@ struct Watch {
     /// What the places of its lists were called.
     names: BTreeMap<(String, usize), Called>,
     trailing: u64,
+    /// That two places of one message are called the same was said.
+    twice: bool,
     odd: Vec<(Arc<str>, u64, i64)>,
     /// Path, name and number of the columns in the order of the last batch, which mostly is that of the next; no number where there are too many.
     columns: Vec<(Arc<str>, Arc<str>, Option<usize>)>,
@@ -438,6 +440,9 @@ impl<'a> Taker<'a> {
         }
         watch.trailing += batch.trailing;
         let mut remark = batch.remark.take();
+        let twice = (batch.twice.take())
+            .filter(|_| !std::mem::replace(&mut watch.twice, true))
+            .map(|field| format!("two of its fields are called {field}; where a message has both, the last one counts"));
         let (info, topic) = (
             &self.recording.info.channels[batch.channel],
             self.topics[batch.channel],
@@ -506,8 +511,8 @@ impl<'a> Taker<'a> {
                 finite: column.odd.is_none(),
             });
         }
-        let remarks = remark.map(|text| (text, 1)).into_iter().chain(shared);
-        for (text, count) in remarks {
+        let remarks = remark.into_iter().chain(twice).map(|text| (text, 1));
+        for (text, count) in remarks.chain(shared) {
             let key = (Some(batch.channel), Kind::OddSchema, text.clone());
             if !self.known.contains_key(&key) {
                 self.known.insert(key, self.findings.len());
