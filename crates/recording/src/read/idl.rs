@@ -210,9 +210,9 @@ fn tokens(text: &str) -> Result<Vec<&str>, String> {
             at += 1;
         } else if rest.starts_with("//") {
             at = line_end();
-        } else if rest.starts_with("/*") {
+        } else if let Some(comment) = rest.strip_prefix("/*") {
             // The star of its beginning is not that of its end.
-            at += rest[2..].find("*/").ok_or("a comment has no end")? + 4;
+            at += comment.find("*/").ok_or("a comment has no end")? + 4;
         } else if byte == b'"' || byte == b'\'' {
             let mut end = at + 1;
             while end < bytes.len() && bytes[end] != byte {
