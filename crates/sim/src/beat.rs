@@ -42,6 +42,13 @@ pub(crate) struct Piece {
     pub bend: f64,
 }
 
+impl Piece {
+    /// Whether ψ stands still.
+    fn stands(&self) -> bool {
+        self.rate == 0.0 && self.bend == 0.0
+    }
+}
+
 /// The beat of the music: when it sounds, and ψ(t).
 #[derive(Clone, Debug, PartialEq)]
 pub struct Beat {
@@ -146,11 +153,15 @@ impl Beat {
             }
             let s = end_s - p.begin_s;
             let last = p.phase + s * (p.rate + 0.5 * p.bend * s);
-            // A stroke on a seam belongs to the piece that it begins.
-            let mut turn = (p.phase / TAU - 1e-9).ceil();
+            // A stroke on a seam belongs to the piece that it begins, also to one that stands still; whoever goes on from there is past it.
+            let stood = k > 0 && self.pieces[k - 1].stands();
+            let mut turn = match stood {
+                true => (p.phase / TAU + 1e-9).floor() + 1.0,
+                false => (p.phase / TAU - 1e-9).ceil(),
+            };
             let next = self.pieces.get(k + 1);
-            let is_last_piece = next.is_none_or(|next| next.begin_s > until_s);
-            while turn * TAU <= last + 1e-9 && (is_last_piece || turn * TAU < last - TAU * 1e-9) {
+            let has_end = p.stands() || next.is_none_or(|next| next.begin_s > until_s);
+            while turn * TAU <= last + 1e-9 && (has_end || turn * TAU < last - TAU * 1e-9) {
                 let rest = (turn * TAU - p.phase).max(0.0);
                 // rate·s + ½ bend·s² = rest, by the form that stays exact for bend → 0.
                 let root = (p.rate * p.rate + 2.0 * p.bend * rest).max(0.0).sqrt();
@@ -170,7 +181,7 @@ impl Beat {
                     });
                 }
                 turn += 1.0;
-                if p.rate == 0.0 && p.bend == 0.0 {
+                if p.stands() {
                     break;
                 }
             }
@@ -231,6 +242,32 @@ mod tests {
         let beat = Beat::new(0.0, 0.0, 2.0, &[change], &[]);
         let at: Vec<f64> = beat.strokes(2.0).iter().map(|s| s.t_s).collect();
         assert_eq!(at, [0.0, 0.5, 1.0, 1.5, 2.0]);
+    }
+
+    #[test]
+    fn a_drum_that_stops_on_a_stroke_strikes_it_once() {
+        let change = |at_s, over_s, beat_hz| TempoChange {
+            at_s,
+            over_s,
+            beat_hz,
+        };
+        let at = |beat_hz: f64, changes: &[TempoChange]| -> Vec<f64> {
+            let strokes = Beat::new(0.0, 0.0, beat_hz, changes, &[]).strokes(3.5);
+            strokes.iter().map(|s| s.t_s).collect()
+        };
+        // A jump and a ramp to 0 Hz that end on a whole turn, standing still twice over, and from the start.
+        let on = change(3.0, 0.0, 2.0);
+        let (jump, ramp) = (change(1.0, 0.0, 0.0), change(0.5, 1.0, 0.0));
+        assert_eq!(at(1.0, &[jump, on]), [0.0, 1.0, 3.5]);
+        assert_eq!(at(1.0, &[jump, change(2.0, 0.0, 0.0), on]), [0.0, 1.0, 3.5]);
+        assert_eq!(at(1.0, &[ramp, on]), [0.0, 1.5, 3.5]);
+        assert_eq!(at(1.0, &[jump]), [0.0, 1.0]);
+        assert_eq!(at(0.0, &[on]), [0.0, 3.5]);
+        // Between two strokes none is made up.
+        assert_eq!(at(1.0, &[change(1.25, 0.0, 0.0), on]), [0.0, 1.0, 3.375]);
+        // A tempo that passes 0 Hz without standing there.
+        let turn = [ramp, change(1.5, 2.0, 2.0)];
+        assert_eq!(at(1.0, &turn)[..2], [0.0, 1.5]);
     }
 
     #[test]
