@@ -240,6 +240,26 @@ fn ranges_clip_and_digits_round() {
     }
 }
 
+/// A range of whole digits is reached, though its quotient is rounded below a whole number.
+#[test]
+fn a_range_of_whole_digits_is_reached() {
+    let (shown, _) = readings(&scene(
+        r#"
+        name = "heavy"
+        duration_s = 0.1
+        [body]
+        gravity_m_per_s2 = [0.0, 0.0, -20.0]
+        [effects.contact]
+        [effects.imu]
+        accel_range_m_per_s2 = 9.6
+        accel_resolution_m_per_s2 = 0.4
+        sensors = [{ on = "rath" }]
+        "#,
+    ));
+    assert!(!shown.is_empty());
+    assert!(shown.iter().all(|r| (r.force[2] - 9.6).abs() < 1e-12));
+}
+
 /// Overlapping Allan variance at averaging times of `m` samples. IEEE Std 952-1997, annex C.
 fn allan_variance(x: &[f64], rate_hz: f64, m: usize) -> f64 {
     let mut sums = vec![0.0];

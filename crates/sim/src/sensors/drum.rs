@@ -39,7 +39,7 @@ pub struct Track {
 
 /// Samples of one message: a tenth of a second.
 const BLOCKS_PER_S: u32 = 10;
-/// A stroke is over after so many decays: e^{−10} is below one digit of sixteen bits.
+/// A stroke is over after so many decays: e^{−10} of full scale is a digit and a half of sixteen bits, of the default level less than one.
 const DECAYS: f64 = 10.0;
 const GLIDE: f64 = 0.6;
 const CLICK: f64 = 0.3;
