@@ -38,6 +38,29 @@ fn the_only_freedom_is_not_held() {
     assert!(said.contains("held instead"), "{said}");
 }
 
+/// Who turns by three quarters goes on turning behind half a turn: 270 deg in 1 s, then 1 s there, deviate by more than half a turn would let them.
+#[test]
+fn a_turn_beyond_half_a_turn_is_one() {
+    let turn = "effects.path={turn_deg=270.0,turn_start_s=0.0,turn_time_s=1.0}";
+    let said = explain(&[
+        "music",
+        "--set",
+        "duration_s=2.0",
+        "--set",
+        "effects.hold={stiffness_n_per_m=3000.0,damping_n_s_per_m=300.0}",
+        "--set",
+        turn,
+        "--format",
+        "json",
+    ]);
+    let said: serde_json::Value = serde_json::from_str(&said).unwrap();
+    let freedoms = said["freedoms"].as_array().unwrap();
+    let yaw = freedoms.iter().find(|f| f["name"] == "yaw").unwrap();
+    let deviation = yaw["standard_deviation"].as_f64().unwrap();
+    // At most half of 270 deg; a smooth turn and as long a rest make some 100. Folded at half a turn they would make 78.
+    assert!((1.6..2.36).contains(&deviation), "{deviation}");
+}
+
 /// However seldom a scene is logged, its motion is seen.
 #[test]
 fn a_motion_between_the_samples_of_the_log_is_seen() {

@@ -70,8 +70,8 @@ struct Findings {
 
 struct Trial {
     name: String,
-    /// RMS about the mean: m or rad.
-    excursion: f64,
+    /// Standard deviation, m or rad, whole turns counted.
+    deviation: f64,
     /// Worst differences in roll and height when it is held, or why there are none.
     held: Result<(f64, f64), String>,
 }
@@ -230,11 +230,21 @@ fn ms_per_s<const N: usize>(scenes: [&Scene; N], most: u64) -> [Result<f64, Stri
     least
 }
 
-/// The six coordinates in every sample.
+/// `x` rad, by whole turns as near as can be to `near`.
+fn nearest(x: f64, near: f64) -> f64 {
+    let turn = std::f64::consts::TAU;
+    x - turn * ((x - near) / turn).round()
+}
+
+/// The six coordinates in every sample; roll and yaw go on beyond half a turn.
 fn motion(scene: &Scene, most: u64) -> Result<Vec<[f64; 6]>, String> {
-    let mut all = Vec::new();
+    let mut all: Vec<[f64; 6]> = Vec::new();
     attempt(scene, most, &mut |s: &Sample| {
-        let ([x, y, z], [roll, tilt, yaw]) = (s.pose.position_m, s.pose.roll_pitch_yaw_rad());
+        let ([x, y, z], [mut roll, tilt, mut yaw]) =
+            (s.pose.position_m, s.pose.roll_pitch_yaw_rad());
+        if let Some(last) = all.last() {
+            (roll, yaw) = (nearest(roll, last[3]), nearest(yaw, last[5]));
+        }
         all.push([
             x - scene.carriers.walk_m_per_s[0] * s.t_s,
             y - scene.carriers.walk_m_per_s[1] * s.t_s,
@@ -282,16 +292,12 @@ fn try_freedoms(scene: &Scene, most: u64) -> Vec<Trial> {
                             .fold(0.0, f64::max)
                     };
                     // Angles a turn apart are the same.
-                    let turn = std::f64::consts::TAU;
-                    let roll = |a: &[f64; 6], b: &[f64; 6]| {
-                        let apart = a[3] - b[3];
-                        apart - turn * (apart / turn).round()
-                    };
+                    let roll = |a: &[f64; 6], b: &[f64; 6]| nearest(a[3] - b[3], 0.0);
                     (worst(&roll), worst(&|a, b| a[2] - b[2]))
                 });
             Trial {
                 name: format!("{f:?}").to_lowercase(),
-                excursion: (square / count).sqrt(),
+                deviation: (square / count).sqrt(),
                 held,
             }
         })
@@ -317,7 +323,7 @@ fn as_json(found: &Findings) -> Value {
         "trial_s": number(found.trial_s),
         "freedoms": found.freedoms.iter().map(|t| json!({
             "name": t.name,
-            "rms": number(t.excursion),
+            "standard_deviation": number(t.deviation),
             "held_error_roll_rad": t.held.as_ref().map_or(Value::Null, |h| number(h.0)),
             "held_error_z_m": t.held.as_ref().map_or(Value::Null, |h| number(h.1)),
             "reason": t.held.as_ref().err(),
@@ -405,21 +411,21 @@ fn write_freedoms(out: &mut String, found: &Findings) -> std::fmt::Result {
         out,
         "\n{:<8} {:>12}  held instead: worst error within {} s",
         "freedom",
-        "RMS",
+        "std dev",
         (found.trial_s * 1e3).round() / 1e3
     )?;
     for t in &found.freedoms {
         let linear = ["x", "y", "height"].contains(&t.name.as_str());
-        let excursion = if linear {
-            format!("{:.4} m", t.excursion)
+        let deviation = if linear {
+            format!("{:.4} m", t.deviation)
         } else {
-            format!("{:.3} deg", t.excursion.to_degrees())
+            format!("{:.3} deg", t.deviation.to_degrees())
         };
         let held = match &t.held {
             Ok((roll, z)) => format!("roll {:.3} deg, height {:.5} m", roll.to_degrees(), z),
             Err(reason) => reason.clone(),
         };
-        writeln!(out, "{:<8} {excursion:>12}  {held}", t.name)?;
+        writeln!(out, "{:<8} {deviation:>12}  {held}", t.name)?;
     }
     let idle: Vec<&str> = found
         .freedoms
