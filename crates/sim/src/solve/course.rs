@@ -113,6 +113,8 @@ pub struct Course<'m> {
     locate: bool,
     recent: Vec<Recent>,
     most_evaluations: u64,
+    /// A sample whose contacts stand otherwise than the ledger was last told.
+    rebooked: Vec<f64>,
     /// Whether the workspace holds the forces at the present moment, under the present contacts.
     fresh: bool,
 }
@@ -177,6 +179,7 @@ impl<'m> Course<'m> {
                 n
             ],
             most_evaluations: settings.most_evaluations,
+            rebooked: Vec::with_capacity(if locate { 0 } else { model.layout().size() }),
             fresh: false,
         };
         course.begin_segment();
@@ -248,11 +251,32 @@ impl<'m> Course<'m> {
                 p.normal = p.normal.fast_max(f64x2::ZERO);
             }
         }
+        let rebooked = forces && !self.locate && self.rebook(y);
+        let y = if rebooked { &self.rebooked } else { y };
         if observer.sample(t_s, y, &self.w) {
             Ok(forces)
         } else {
             Err(Stopped::ByObserver { t_s })
         }
+    }
+
+    /// Where nothing is located, a contact changes when a step has ended, and so do the books; a sample of that step sees springs as they
+    /// stand by then, which hold more or less by ½kδ². Its page is put right for it alone. Returns whether it had to be.
+    fn rebook(&mut self, y: &[f64]) -> bool {
+        let touches = |i: usize| self.w.of(i, |p| p.normal) > 0.0;
+        let changed = |i: &usize| touches(*i) != self.touching[*i];
+        let mut all = (0..self.touching.len()).filter(changed).peekable();
+        if all.peek().is_none() {
+            return false;
+        }
+        self.rebooked.clear();
+        self.rebooked.extend_from_slice(y);
+        for i in all {
+            let gap_m = self.w.of(i, |p| p.gap[2]);
+            self.model
+                .book_contact(i, self.touching[i], gap_m, &mut self.rebooked);
+        }
+        true
     }
 
     /// Hands over the samples at the start.
