@@ -126,6 +126,8 @@ pub struct Model {
     straps: [f64; 2],
     watches_contact: bool,
     has_friction: bool,
+    /// N·s/m per newton of load that friction damps by where nothing slides, s/m.
+    friction_damping_s_per_m: f64,
     jumps_at_contact: bool,
     turns_softly: Option<f64>,
     /// Whether there are so many carriers that they are treated block by block.
@@ -189,6 +191,7 @@ impl Model {
             extra: Vec::new(),
             watches_contact: false,
             has_friction: false,
+            friction_damping_s_per_m: 0.0,
             jumps_at_contact: false,
             turns_softly: None,
             in_blocks: false,
@@ -327,6 +330,38 @@ impl Model {
         }
     }
 
+    /// The same with what friction adds where each handle bears `loads_n`, one pair after the other: as much as it can, for the more it slides the
+    /// less it damps. Not for units: an error is forgotten as the slowest law forgets it.
+    pub(crate) fn damping_with_friction_per_s(
+        &self,
+        y: &[f64],
+        w: &Workspace,
+        loads_n: &[f64x2],
+        rates: &mut [f64],
+    ) {
+        let per_load = self.friction_damping_s_per_m;
+        let sideways: Vec<f64x2> = self
+            .side_damping
+            .iter()
+            .zip(loads_n)
+            .map(|(held, load)| *held + *load * per_load)
+            .collect();
+        // Hunt and Crossley's dampers go with the compression, and are left out.
+        let none = vec![f64x2::ZERO; loads_n.len()];
+        let vertical = match self.contact_damping.is_empty() {
+            true => &none,
+            false => &self.contact_damping,
+        };
+        rates[..self.freedoms.positions()].fill(0.0);
+        self.freedoms
+            .damping_per_s(y, &w.pair, [&sideways, vertical], rates);
+    }
+
+    /// N·s/m per newton of load that friction damps a handle by where nothing slides, s/m; 0 without friction.
+    pub(crate) fn friction_damping_s_per_m(&self) -> f64 {
+        self.friction_damping_s_per_m
+    }
+
     /// Damping (N·s/m) and stiffness (N/m) of the springs at a carrier's handle along one of the world's axes, and what straps add to both
     /// per newton of its load (s/m, 1/m); zero where there are none.
     pub(crate) fn springs(&self, carrier: usize, axis: usize) -> [f64; 4] {
@@ -380,6 +415,11 @@ impl Model {
     /// Names of the pages of the energy ledger.
     pub fn accounts(&self) -> impl Iterator<Item = &'static str> {
         self.accounts.iter().map(|(name, _)| *name)
+    }
+
+    /// The poles that bend.
+    pub(crate) fn bends(&self) -> &[Bend] {
+        &self.bends
     }
 
     /// Every state by name, in order.

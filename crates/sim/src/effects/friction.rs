@@ -117,10 +117,12 @@ impl Friction {
                         .max(STRAIGHTENING_S),
             };
             model.jump_at_contact();
+            model.set_friction_damping(self.bristle_damping_s_per_m);
             model.add(Stage::Handles, law);
             model.add_account("friction", Sideways);
             return;
         }
+        model.set_friction_damping(self.coefficient / self.regularising_velocity_m_per_s);
         let law = Coulomb {
             mu: self.coefficient,
             per_velocity: 1.0 / self.regularising_velocity_m_per_s,

@@ -86,6 +86,11 @@ impl Model {
         self.has_friction = true;
     }
 
+    /// N·s/m per newton of load that friction damps a handle by where nothing slides.
+    pub(crate) fn set_friction_damping(&mut self, s_per_m: f64) {
+        self.friction_damping_s_per_m = s_per_m;
+    }
+
     /// Says that a rate jumps where a handle opens or closes; forces never do.
     pub(crate) fn jump_at_contact(&mut self) {
         self.jumps_at_contact = true;

@@ -4,16 +4,21 @@
 //! v̇ = −λ v + N        v₁ = e^{−hλ} v₀ + ∫₀ʰ e^{−λ(h−s)} P(s) ds        P: the cubic through N₀ … N₋₃, N = f + λ v
 //!                        = e^{−hλ} v₀ + h Σ γ_k ∇ᵏN₀,  k = 0…3        γ_k = ∫₀¹ e^{−hλ(1−s)} s(s+1)…(s+k−1)/k! ds
 //! ```
-//! λ ≥ 0 is what contacts, holds and straps damp each velocity by ([`Model::damping_per_s`](crate::model::Model::damping_per_s)); 0 for all other
-//! states, where this is Adams–Bashforth. Any λ gives fourth order; the right one takes a damper's limit off the step, which for
+//! λ ≥ 0 is what contacts, holds and straps damp each velocity by ([`Model::damping_per_s`](crate::model::Model::damping_per_s)), and friction at the
+//! shoulders where nothing slides; 0 for all other states, where this is Adams–Bashforth. Any λ gives fourth order; the right one takes a damper's limit off the step, which for
 //! Adams–Bashforth would be hλ < 0.3. It is looked at every 64 steps, and held as long as it is nearly right. A segment begins with two
 //! steps of a Runge–Kutta method of order 3, damping exact as well (ETDRK3), and one of three N. For scenes where a percent is enough and
 //! few moments interrupt: one evaluation a step is the least there can be.
+//!
+//! Friction damps by μN/v_s, or Nσ₁ of bristles, at most: less where a handle slides or bears less. A motion v̇ = −μ v, μ ≤ λ, stays bounded with four
+//! N as long as hλ ≤ 2, with two, of second order, whatever hλ; with μ beyond λ by more than a seventh it does not (the roots of its recurrence). So
+//! with friction λ is that of [`MARGIN`] times the load, and looked at as soon as a handle bears more; beyond hλ = 2 two N count.
 //! Source: Nørsett, Lecture Notes in Mathematics 109 (1969), 214; Cox & Matthews, J. Comput. Phys. 176 (2002), 430.
 
 use super::course::Course;
 use super::fixed::Step;
 use crate::lanes::{LANES, f64x2, pairs};
+use crate::model::Pair;
 
 /// Order, and how many N count.
 const ORDER: usize = 4;
@@ -21,6 +26,11 @@ const ORDER: usize = 4;
 const LOOK: u32 = 64;
 /// λ is nearly right as long as it is off by no more than this over h: two thirds of what Adams–Bashforth can damp.
 const OFF: f64 = 0.2;
+/// Friction is taken for that of so many times the load of a handle.
+const MARGIN: f64 = 1.5;
+/// Beyond this hλ, with friction, but [`FEW`] N count.
+const STABLE: f64 = 2.0;
+const FEW: usize = 2;
 /// Segments are as long as each other but for the rounding of the clock, in parts of a step.
 const ROUNDING: f64 = 1e-10;
 
@@ -74,6 +84,8 @@ pub struct Adams4 {
     /// λ as it stood at the last look, and how many steps ago that was.
     now_per_s: Vec<f64>,
     looked: u32,
+    /// What friction is taken to bear, N, by pairs of handles; empty without friction.
+    loads_n: Vec<f64x2>,
     /// How many steps of this segment are behind.
     steps: u32,
     /// When the segment began, s.
@@ -90,7 +102,15 @@ impl Adams4 {
         let same = self.same(h);
         let (model, now) = (course.model, &mut self.now_per_s);
         now.resize(model.layout().body, 0.0);
-        model.damping_per_s(&course.y, &course.w, now);
+        let rubs = model.friction_damping_s_per_m() > 0.0;
+        if rubs {
+            self.loads_n.clear();
+            let load = |p: &Pair| (p.normal * MARGIN).fast_max(f64x2::ZERO);
+            self.loads_n.extend(course.w.pair.iter().map(load));
+            model.damping_with_friction_per_s(&course.y, &course.w, &self.loads_n, now);
+        } else {
+            model.damping_per_s(&course.y, &course.w, now);
+        }
         let near = |(a, b): (&f64, &f64)| h * (a - b).abs() <= OFF;
         if same && now.iter().zip(&self.damping_per_s).all(near) {
             return false;
@@ -98,7 +118,12 @@ impl Adams4 {
         self.step_s = h;
         self.damping_per_s.clone_from(now);
         let of = |rate_per_s: f64| {
-            let known = [ORDER - 1, ORDER].map(|known| weights(h, rate_per_s, known));
+            let most = if rubs && h * rate_per_s > STABLE {
+                FEW
+            } else {
+                ORDER
+            };
+            let known = [ORDER - 1, ORDER].map(|known| weights(h, rate_per_s, known.min(most)));
             (First::new(h, rate_per_s), known)
         };
         // Most states are not damped, and weigh alike.
@@ -115,6 +140,12 @@ impl Adams4 {
             }
         }
         true
+    }
+
+    /// Whether a handle bears more than friction is taken to.
+    fn bears_more(&self, course: &Course) -> bool {
+        let mut loads = course.w.pair.iter().zip(&self.loads_n);
+        loads.any(|(p, load)| !p.normal.simd_le(*load).all())
     }
 
     fn same(&self, h: f64) -> bool {
@@ -157,6 +188,7 @@ impl Step for Adams4 {
             damping_per_s: Vec::new(),
             now_per_s: Vec::new(),
             looked: 0,
+            loads_n: Vec::new(),
             steps: 0,
             segment_s: f64::NAN,
             stages: std::array::from_fn(|_| vec![0.0; size]),
@@ -168,7 +200,8 @@ impl Step for Adams4 {
             (self.segment_s, self.steps) = (course.w.segment_s, 0);
         }
         // N of another λ count no longer.
-        if (self.looked >= LOOK || !self.same(h)) && self.look(course, h) {
+        let due = self.looked >= LOOK || !self.same(h) || self.bears_more(course);
+        if due && self.look(course, h) {
             self.steps = 0;
         }
         let weights = &self.weights[usize::from(self.steps > FIRST)];

@@ -3,7 +3,7 @@
 //! ```text
 //! v₁ = v₀ + h a(t₀, x₀, v₀)        x₁ = x₀ + h v₁        q₁ = q₀ ∘ exp(h ω₁)
 //! ```
-//! Phases and the ledger advance by plain Euler. Source: Hairer, Lubich, Wanner, Geometric Numerical Integration (2006),
+//! So do deflections of poles, with their new rates; phases, other states and the ledger advance by plain Euler. Source: Hairer, Lubich, Wanner, Geometric Numerical Integration (2006),
 //! I.1; it is the method of the paper's archive, at 1 ms.
 
 use super::course::Course;
@@ -26,5 +26,10 @@ impl Step for SemiImplicitEuler {
             out[d] += h * f0[d];
         }
         freedoms.drift(h, &mut out[..freedoms.size()]);
+        let extra = course.model.layout().extra_range().start;
+        for bend in course.model.bends() {
+            let q = extra + bend.state;
+            out[q] = course.y[q] + h * out[q + 1];
+        }
     }
 }
