@@ -24,6 +24,29 @@ fn expect(text: &str, place: &str, words: &[&str]) {
     }
 }
 
+/// A body that begins at rest is hung on its poles, however soft; beyond what heights can tell the poles are refused, and the key is named.
+#[test]
+fn poles_too_soft_to_rest_on_are_refused() {
+    let with = |frequency_hz: f64, start: &str| {
+        format!(
+            "name = \"soft\"\nduration_s = 0.001\n{start}[effects.contact]\n[effects.flexure]\nfrequency_hz = {frequency_hz:e}\n"
+        )
+    };
+    for frequency_hz in [1e-8, 1e-9, 1e-150] {
+        let said = message(&with(frequency_hz, ""));
+        assert!(
+            said.contains("effects.flexure.frequency_hz") && said.contains("too soft"),
+            "{said}"
+        );
+        assert!(parse("t", &with(frequency_hz, "start.height_m = 0.9\n"), &[]).is_ok());
+    }
+    for frequency_hz in [1e-4, 1e-2] {
+        let scene = parse("t", &with(frequency_hz, ""), &[]).unwrap();
+        let state = Model::new(&scene).initial_state();
+        assert!(state.iter().all(|x| x.is_finite()));
+    }
+}
+
 #[test]
 fn a_list_is_no_table() {
     expect(

@@ -7,7 +7,7 @@
 //! ω = 2πf natural frequency [rad/s]; ζ damping ratio (1); s(x) mode shape, 1 at the farthest handle x_max of the pole and
 //! 0 at its middle, where the body is lashed on (1); F_i handle force (N). Handles with the same y belong to one pole.
 //! Holds for small q: the mode's own weight and its inertial pull on the body are left out. The pull would raise the frequency at which
-//! a free body rings on its pole by 1/√(1 − Γ²/(mM)), Γ = ∫ s dm = 1.59 m for a uniform pole, M the body's mass: 21 % with the defaults
+//! a free body rings on its pole by 1/√(1 − Γ²/(mM)), Γ = ∫ s dm = 1.59·m for a uniform pole, M the body's mass (kg): 21 % with the defaults
 //! under 60 kg. A body that starts at rest starts on bent poles. What is kept comes from the
 //! virtual work of the handle forces, so energy balances exactly. q > 0 where the ends are pressed up. A pole whose handles are
 //! all at x = 0 does not bend. Source: cantilever deflection under an end load, Timoshenko, *Strength of
@@ -16,7 +16,7 @@
 use crate::lanes::{Moments, Number, f64x2, pack};
 use crate::model::{AsWhole, Bend, Book, Model, Pair, Power, Stage, Whole, Workspace};
 use crate::scene::Scene;
-use crate::scene::problem::{Checker, Problem};
+use crate::scene::problem::{Checker, Problem, problem, shown};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
@@ -44,17 +44,48 @@ impl Default for Flexure {
     }
 }
 
+/// No pole bends so far, m.
+const DEEPEST_M: f64 = 1e3;
+/// Poles that are softer than this part of the springs under them bend so far that heights, of 16 digits, no longer tell how far a spring is pressed.
+const SOFTEST: f64 = 1e-9;
+
 impl Flexure {
-    pub(super) fn check(&self, _scene: &Scene) -> Result<(), Problem> {
+    pub(super) fn check(&self, scene: &Scene) -> Result<(), Problem> {
         Checker::positive("effects.flexure.frequency_hz", self.frequency_hz)?;
         Checker::not_negative("effects.flexure.damping_ratio", self.damping_ratio)?;
-        Checker::positive("effects.flexure.modal_mass_kg", self.modal_mass_kg)
+        Checker::positive("effects.flexure.modal_mass_kg", self.modal_mass_kg)?;
+        // Only a body that begins at rest is hung on its poles first.
+        let (None, Some(contact)) = (scene.start.height_m, &scene.effects.contact) else {
+            return Ok(());
+        };
+        let weight_n = -scene.body.mass_kg * scene.body.gravity_m_per_s2[2];
+        let stiffness = scene.carriers.poles().len() as f64 * self.stiffness_n_per_m();
+        let bent_m = weight_n / stiffness;
+        let springs = &contact.stiffness_n_per_m;
+        let springs: f64 = (0..scene.carriers.count()).map(|i| springs.get(i)).sum();
+        if bent_m <= DEEPEST_M || stiffness >= SOFTEST * springs {
+            return Ok(());
+        }
+        let key = "effects.flexure.frequency_hz";
+        Err(problem(
+            key,
+            format!(
+                "poles of {} kg at {} Hz are too soft to rest on: the load would bend them by {bent_m:.0e} m; take stiffer ones, or give start.height_m",
+                shown(self.modal_mass_kg),
+                shown(self.frequency_hz)
+            ),
+        ))
+    }
+
+    /// m ω², N/m.
+    fn stiffness_n_per_m(&self) -> f64 {
+        self.modal_mass_kg * (std::f64::consts::TAU * self.frequency_hz).powi(2)
     }
 
     pub(super) fn build(&self, scene: &Scene, model: &mut Model) {
         let handles = &scene.carriers.handles_m;
         let w = std::f64::consts::TAU * self.frequency_hz;
-        let stiffness = self.modal_mass_kg * w * w;
+        let stiffness = self.stiffness_n_per_m();
         let (mut poles, mut bends) = (Vec::new(), Vec::new());
         for (k, pole) in scene.carriers.poles().into_iter().enumerate() {
             let end = pole

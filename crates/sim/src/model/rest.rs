@@ -3,7 +3,7 @@
 /// A pole that bends.
 #[derive(Debug)]
 pub(crate) struct Bend {
-    /// Where its deflection q is among the effects' own states.
+    /// Where its deflection q is among the effects' own states; its rate follows.
     pub state: usize,
     /// Force over deflection, N/m.
     pub stiffness_n_per_m: f64,
@@ -52,7 +52,8 @@ impl Springs<'_> {
             .copied()
             .fold(f64::NEG_INFINITY, f64::max);
         let mut low = high - 1.0;
-        while self.push_n(low) < self.weight_n {
+        // Poles too soft to bear it are refused before (`effects.flexure`); springs that are give no finite height, which ends the run.
+        while self.push_n(low) < self.weight_n && low.is_finite() {
             low -= high - low;
         }
         let height_m = root(low, high, |z| self.weight_n - self.push_n(z));
