@@ -8,6 +8,7 @@ impl Study {
         match self.judge {
             Judge::Roll => r.error_roll_rad,
             Judge::Height => r.error_z_m,
+            Judge::Other | Judge::Nothing => r.error_other,
         }
     }
 
@@ -16,6 +17,7 @@ impl Study {
         match self.judge {
             Judge::Roll => self.estimated_error_rad,
             Judge::Height => self.estimated_error_m,
+            Judge::Other | Judge::Nothing => self.estimated_error_other,
         }
     }
 
@@ -25,6 +27,9 @@ impl Study {
     }
 
     pub(super) fn pareto(&self) -> Vec<usize> {
+        if self.judge == Judge::Nothing {
+            return Vec::new();
+        }
         let mut by_time: Vec<usize> = (0..self.runs.len())
             .filter(|&i| self.runs[i].failed.is_none())
             .collect();
@@ -44,12 +49,13 @@ impl Study {
         self.runs.iter().find(|r| (r.method, r.setting) == ARCHIVE)
     }
 
-    /// The cheapest rung whose error stays within `error`, if the references know it that well.
+    /// The cheapest rung whose error stays within `error`, and that of x, y, pitch and yaw, if the references know them that well.
     pub fn cheapest(&self, error: f64) -> Option<&Rung> {
-        if self.estimated_error() > error {
+        let known = self.estimated_error().max(self.estimated_error_other);
+        if self.judge == Judge::Nothing || known > error {
             return None;
         }
-        self.cheapest_where(|r| self.error(r) <= error)
+        self.cheapest_where(|r| self.error(r).max(r.error_other) <= error)
     }
 
     /// The cheapest rung that is right and stays right on every finer rung of its method: one that is right by luck is none.
@@ -89,8 +95,8 @@ impl Study {
     /// How well the references agree, in one sentence.
     pub fn agreement(&self) -> String {
         let agree = format!(
-            "they agree to {:.1e} rad in roll and {:.1e} m in height",
-            self.estimated_error_rad, self.estimated_error_m
+            "they agree to {:.1e} rad in roll, {:.1e} m in height and {:.1e} (m, rad) in x, y, pitch and yaw",
+            self.estimated_error_rad, self.estimated_error_m, self.estimated_error_other
         );
         if self.parted {
             format!(
@@ -105,13 +111,26 @@ impl Study {
     /// What is cheapest, in one sentence.
     pub fn sentence(&self) -> String {
         let truth = self.quoted.rms_roll_rad;
+        let others = |r: &Rung| r.other_part <= 0.01;
+        let rolls = |r: &Rung| (r.quoted.rms_roll_rad - truth).abs() <= 0.01 * truth;
         let (what, cheapest) = match self.judge {
             Judge::Roll => (
                 "RMS roll to 1 %",
-                self.cheapest_where(|r| (r.quoted.rms_roll_rad - truth).abs() <= 0.01 * truth),
+                self.cheapest_where(|r| rolls(r) && others(r)),
             ),
             Judge::Height => ("the height to 1 mm", self.cheapest(1e-3)),
+            Judge::Other => ("", self.cheapest_where(others)),
+            Judge::Nothing => return "nothing moves, so no setting can be judged".into(),
         };
+        let beside = match self.judge {
+            Judge::Other => "x, y, pitch and yaw to 1 % of how far they go",
+            Judge::Roll if self.others_move => {
+                ", with x, y, pitch and yaw to 1 % of how far they go,"
+            }
+            Judge::Height if self.others_move => ", with x, y, pitch and yaw to 1e-3 m or rad,",
+            _ => "",
+        };
+        let what = format!("{what}{beside}");
         let digit = self
             .cost_of_a_digit()
             .map(|c| {
@@ -197,6 +216,8 @@ mod tests {
             error_roll_rad: error,
             error_z_m: error,
             error_normal_n: error,
+            error_other: 0.0,
+            other_part: 0.0,
             quoted: Quoted::default(),
             unexplained: None,
             failed: (error == f64::INFINITY).then(|| "no".into()),
@@ -208,6 +229,8 @@ mod tests {
             scene: "shelf".into(),
             estimated_error_rad: 1e-8,
             estimated_error_m: 1e-8,
+            estimated_error_other: 1e-8,
+            others_move: true,
             duration_s: 1.0,
             judged_s: 1.0,
             parted: false,
@@ -243,6 +266,24 @@ mod tests {
             study.cheapest(1e-9).is_none(),
             "finer than the references know"
         );
+    }
+
+    #[test]
+    fn a_wrong_yaw_is_not_recommended_and_where_nothing_moves_nothing_is() {
+        let mut study = shelf();
+        (study.runs[1].error_other, study.runs[1].other_part) = (0.1, 0.4);
+        assert_eq!(study.cheapest(1e-3).map(|r| r.cpu_s), Some(4e-3));
+        // All quote the same roll: the cheapest by far is wrong elsewhere.
+        for r in &mut study.runs[3..] {
+            r.other_part = 0.4;
+        }
+        let said = study.sentence();
+        assert!(said.contains("cheapest is a at tolerance 1e-3"), "{said}");
+        study.judge = Judge::Other;
+        assert!(study.sentence().contains("cheapest is a at tolerance 1e-3"));
+        study.judge = Judge::Nothing;
+        assert!(study.cheapest(1.0).is_none() && study.pareto().is_empty());
+        assert!(study.sentence().contains("nothing moves"));
     }
 
     #[test]

@@ -62,6 +62,10 @@ pub struct Rung {
     pub error_z_m: f64,
     /// Of any N_i, N.
     pub error_normal_n: f64,
+    /// Of x, y (m), pitch and yaw (rad), the last two about the body's axes.
+    pub error_other: f64,
+    /// The largest of these four in parts of how far each goes, 1.
+    pub other_part: f64,
     /// What people would quote.
     pub quoted: Quoted,
     /// Largest unexplained energy over the throughput, 1; `None` where nothing moves energy.
@@ -77,6 +81,10 @@ pub enum Judge {
     Roll,
     /// The height, m, where nothing rolls.
     Height,
+    /// x, y, pitch and yaw, m and rad, where nothing heaves either.
+    Other,
+    /// Nothing moves.
+    Nothing,
 }
 
 impl Judge {
@@ -85,6 +93,8 @@ impl Judge {
         match self {
             Self::Roll => ("roll", "rad"),
             Self::Height => ("height", "m"),
+            Self::Other => ("x, y, pitch and yaw", "m or rad"),
+            Self::Nothing => ("nothing", "m"),
         }
     }
 }
@@ -98,6 +108,10 @@ pub struct Study {
     pub estimated_error_rad: f64,
     /// In height, m.
     pub estimated_error_m: f64,
+    /// In x, y (m), pitch and yaw (rad).
+    pub estimated_error_other: f64,
+    /// Whether x, y, pitch or yaw move.
+    pub others_move: bool,
     /// How long the run is, s.
     pub duration_s: f64,
     /// Up to when the references agree to [`AGREE`], and errors are judged, s.
@@ -177,10 +191,13 @@ pub fn study(
 
     let until = best.agrees_with(&second, AGREE);
     let agreement = best.errors(&second, until);
-    let judge = if best.rolls() {
-        Judge::Roll
-    } else {
-        Judge::Height
+    let excursions = best.excursions(scene.carriers.walk_m_per_s);
+    let others_move = course::part_of(excursions, excursions) > 0.0;
+    let judge = match () {
+        () if best.rolls() => Judge::Roll,
+        () if best.heaves() => Judge::Height,
+        () if others_move => Judge::Other,
+        () => Judge::Nothing,
     };
     let mut runs = Vec::new();
     for (done, (method, setting)) in ladder.into_iter().enumerate() {
@@ -199,6 +216,8 @@ pub fn study(
         scene: scene.name.clone(),
         estimated_error_rad: agreement.roll_rad,
         estimated_error_m: agreement.height_m,
+        estimated_error_other: agreement.other(),
+        others_move,
         duration_s: scene.duration_s,
         judged_s: best.time(until),
         parted: until < best.samples(),
@@ -236,6 +255,7 @@ fn rung(
         None => best.errors(&course, until),
         Some(_) => course::Errors::UNKNOWN,
     };
+    let excursions = best.excursions(model.scene.carriers.walk_m_per_s);
     Rung {
         method: method.name,
         setting,
@@ -246,6 +266,8 @@ fn rung(
         error_roll_rad: errors.roll_rad,
         error_z_m: errors.height_m,
         error_normal_n: errors.normal_n,
+        error_other: errors.other(),
+        other_part: course::part_of(errors.others, excursions),
         quoted: course.quoted(&model.scene),
         unexplained: course.unexplained(),
         failed,

@@ -103,6 +103,7 @@ const COLUMNS: &[Column] = &[
     ("roll rad", 9, |_, r| small(r.error_roll_rad)),
     ("height m", 9, |_, r| small(r.error_z_m)),
     ("N_i N", 9, |_, r| small(r.error_normal_n)),
+    ("others", 9, |_, r| small(r.error_other)),
     ("RMS roll", 9, |s, r| {
         let truth = s.quoted.rms_roll_rad;
         if truth == 0.0 {
@@ -172,8 +173,8 @@ fn table(study: &Study) -> String {
     let _ = writeln!(
         out,
         "\n* no other setting is both faster and closer in {what} ({unit}).\n\
-         cpu, wall: medians of warm runs, on the processor and by the wall; the first ranks. roll, height, N_i: largest error of any\n\
-         sample. RMS roll: relative error; loss, onset, T_float: difference; both over the analysis window (docs/metrics.md). energy: unexplained over throughput.\n\n{}.\n{}.",
+         cpu, wall: medians of warm runs, on the processor and by the wall; the first ranks. roll, height, N_i, others (x, y in m, pitch, yaw in rad): largest\n\
+         error of any sample. RMS roll: relative error; loss, onset, T_float: difference; both over the analysis window (docs/metrics.md). energy: unexplained over throughput.\n\n{}.\n{}.",
         capital(&study.sentence()),
         capital(&study.archive_sentence())
     );
@@ -198,11 +199,12 @@ fn rung(r: &Rung) -> Value {
         "method": r.method, "setting": r.setting, "adaptive": r.adaptive, "wall_s": r.wall_s, "cpu_s": r.cpu_s,
         "evaluations": r.stats.evaluations, "steps": r.stats.steps, "rejected": r.stats.rejected, "events": r.stats.events,
         "error_roll_rad": number(r.error_roll_rad), "error_z_m": number(r.error_z_m), "error_normal_n": number(r.error_normal_n),
+        "error_other": number(r.error_other),
         "quoted": quoted(&r.quoted), "energy_unexplained": r.unexplained.map(number), "failed": r.failed,
     })
 }
 
-/// The wishes that `recommend` answers, rad, or m where nothing rolls.
+/// The wishes that `recommend` answers, rad or m, of what is ranked by and of x, y, pitch and yaw.
 const WISHES: [(&str, f64); 3] = [("1e-3", 1e-3), ("1e-6", 1e-6), ("1e-9", 1e-9)];
 
 fn to_json(study: &Study) -> Value {
@@ -223,9 +225,10 @@ fn to_json(study: &Study) -> Value {
             "method": REFERENCE.0, "tolerance": REFERENCE.1,
             "second": {"method": SECOND.0, "tolerance": SECOND.1},
             "estimated_error": study.estimated_error_rad, "estimated_error_z_m": study.estimated_error_m,
+            "estimated_error_other": study.estimated_error_other,
             "quoted": quoted(&study.quoted),
         },
-        "ranked_by": match study.judge { Judge::Roll => "error_roll_rad", Judge::Height => "error_z_m" },
+        "ranked_by": match study.judge { Judge::Roll => "error_roll_rad", Judge::Height => "error_z_m", Judge::Other => "error_other", Judge::Nothing => "nothing" },
         "runs": study.runs.iter().map(rung).collect::<Vec<_>>(),
         "front": study.front.iter().map(|&i| rung(&study.runs[i])).collect::<Vec<_>>(),
         "recommend": recommend,
@@ -237,7 +240,7 @@ fn to_json(study: &Study) -> Value {
 
 fn csv(study: &Study) -> String {
     let mut out = String::from(
-        "method,setting,wall_s,cpu_s,evaluations,steps,rejected,events,error_roll_rad,error_z_m,error_normal_n,rms_roll_deg,contact_loss_mean,onset_time_s,t_float,energy_unexplained,failed\n",
+        "method,setting,wall_s,cpu_s,evaluations,steps,rejected,events,error_roll_rad,error_z_m,error_normal_n,error_other,rms_roll_deg,contact_loss_mean,onset_time_s,t_float,energy_unexplained,failed\n",
     );
     let or_empty = |x: Option<f64>| {
         x.filter(|x| x.is_finite())
@@ -256,6 +259,7 @@ fn csv(study: &Study) -> String {
             or_empty(Some(r.error_roll_rad)),
             or_empty(Some(r.error_z_m)),
             or_empty(Some(r.error_normal_n)),
+            or_empty(Some(r.error_other)),
             or_empty(Some(r.quoted.rms_roll_rad.to_degrees())),
             or_empty(Some(r.quoted.contact_loss)),
             or_empty(r.quoted.onset_s),
