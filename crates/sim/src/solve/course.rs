@@ -270,7 +270,8 @@ impl<'m> Course<'m> {
             return false;
         }
         self.rebooked.clear();
-        self.rebooked.extend_from_slice(y);
+        // Some methods' states are longer, by padding.
+        self.rebooked.extend_from_slice(&y[..self.y.len()]);
         for i in all {
             let gap_m = self.w.of(i, |p| p.gap[2]);
             self.model
