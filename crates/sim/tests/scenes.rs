@@ -32,7 +32,7 @@ fn poles_too_soft_to_rest_on_are_refused() {
             "name = \"soft\"\nduration_s = 0.001\n{start}[effects.contact]\n[effects.flexure]\nfrequency_hz = {frequency_hz:e}\n"
         )
     };
-    for frequency_hz in [1e-8, 1e-9, 1e-150] {
+    for frequency_hz in [1e-6, 1e-8, 1e-18] {
         let said = message(&with(frequency_hz, ""));
         assert!(
             said.contains("effects.flexure.frequency_hz") && said.contains("too soft"),
@@ -40,7 +40,7 @@ fn poles_too_soft_to_rest_on_are_refused() {
         );
         assert!(parse("t", &with(frequency_hz, "start.height_m = 0.9\n"), &[]).is_ok());
     }
-    for frequency_hz in [1e-4, 1e-2] {
+    for frequency_hz in [1e-4, 1e-1] {
         let scene = parse("t", &with(frequency_hz, ""), &[]).unwrap();
         let state = Model::new(&scene).initial_state();
         assert!(state.iter().all(|x| x.is_finite()));

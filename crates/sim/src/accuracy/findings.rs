@@ -170,11 +170,12 @@ impl Study {
             String::new()
         };
         format!(
-            "{name} takes {:.2} ms and errs by up to {:.2e} rad in roll, {:.2e} m in height and {:.2e} N in a handle's force; \
+            "{name} takes {:.2} ms and errs by up to {:.2e} rad in roll, {:.2e} m in height, {:.2e} (m, rad) in x, y, pitch and yaw and {:.2e} N in a handle's force; \
              it quotes RMS roll {:.4}° for {:.4}°{off}, contact loss {:.4} for {:.4}, onset {} for {}, T_float {:.4} for {:.4}",
             r.cpu_s * 1e3,
             r.error_roll_rad,
             r.error_z_m,
+            r.error_other,
             r.error_normal_n,
             degrees(it.rms_roll_rad),
             degrees(true_.rms_roll_rad),

@@ -47,7 +47,7 @@ impl Default for Flexure {
 /// No pole bends so far, m.
 const DEEPEST_M: f64 = 1e3;
 /// Poles that are softer than this part of the springs under them bend so far that heights, of 16 digits, no longer tell how far a spring is pressed.
-const SOFTEST: f64 = 1e-9;
+const SOFTEST: f64 = 1e-12;
 
 impl Flexure {
     pub(super) fn check(&self, scene: &Scene) -> Result<(), Problem> {
