@@ -271,7 +271,8 @@ impl<'m> Course<'m> {
         }
         self.rebooked.clear();
         // Some methods' states are longer, by padding.
-        self.rebooked.extend_from_slice(&y[..self.y.len()]);
+        self.rebooked
+            .extend_from_slice(&y[..self.model.layout().size()]);
         for i in all {
             let gap_m = self.w.of(i, |p| p.gap[2]);
             self.model
