@@ -165,7 +165,7 @@ impl<'a> Estimate<'a> {
             Datum::Bool(found) if name == "unstable" => {
                 value.reason = self.doubt(found);
             }
-            Datum::Word(ref word) if !self.placed(name) && *word != Verdict::Quiet.word() => {
+            Datum::Word(word) if !self.placed(name) && word != Verdict::Quiet.word() => {
                 if let Some(reason) = &mut value.reason {
                     *reason += &format!("; the fit is {UNPLACED}, for {PLACE_IT}");
                 }
