@@ -540,15 +540,14 @@ fn built_in_scenes_are_complete_and_run() {
         let mut worst: f64 = 0.0;
         let mut moved: f64 = 1.0;
         run(&scene, &mut |s: &Sample| {
-            if let Some(e) = s.energy {
-                worst = worst.max(e.unexplained_j.abs());
-                moved = moved.max(e.work_in_j.abs() + e.kinetic_j.abs() + e.potential_j.abs());
-            }
+            let e = s.energy.expect("every sample has a ledger");
+            worst = worst.max(e.unexplained_j.abs());
+            moved = moved.max(e.work_in_j.abs() + e.kinetic_j.abs() + e.potential_j.abs());
             true
         })
         .unwrap_or_else(|e| panic!("{name}: {e}"));
         assert!(
-            worst < 1e-5 * moved,
+            worst < 1e-8 * moved,
             "{name}: {worst:.1e} J of {moved:.1e} J unexplained"
         );
     }

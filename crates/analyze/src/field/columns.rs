@@ -9,6 +9,7 @@ use recording::signal::{Signal, field_of, seconds_since};
 use super::dates::{Dated, are_two, dated, delay_s, ends_s, mixed};
 use crate::imu::Track;
 use crate::imu::stray::strays;
+use crate::imu::track::period_s;
 
 /// The six columns of an inertial message.
 pub(crate) const GYRO: [&str; 3] = [
@@ -32,8 +33,9 @@ pub(super) const STAMPS: [[&str; 2]; 2] = [
 ];
 /// Fields of a beat: its number and its own time.
 pub(super) const BEAT: [&str; 2] = ["number", "time_s"];
-/// Two sensors' accelerations differ by more than this, m/s², RMS.
+/// Two sensors' accelerations differ by more than this, m/s², RMS. At longer steps, s, the overtones of a gait go back and forth from sample to sample too.
 const TWO_M_PER_S2: f64 = 1.0;
+const LONGEST_STEP_OF_TWO_S: f64 = 0.05;
 /// More samples than this share left out are worth a word.
 const MANY: f64 = 0.01;
 
@@ -205,7 +207,8 @@ impl Columns {
             }
             columns[0] = &once;
         }
-        let two = are_two(&columns[4..], TWO_M_PER_S2);
+        let often = period_s(columns[0]).is_some_and(|s| s <= LONGEST_STEP_OF_TWO_S);
+        let two = often && are_two(&columns[4..], TWO_M_PER_S2);
         let [t_s, x, y, z, accel @ ..] = columns;
         let track = Track::from_columns(t_s, [x, y, z], accel);
         let dropped = track.dropped - if turns { without } else { 0 };

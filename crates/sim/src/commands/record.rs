@@ -105,12 +105,14 @@ fn record(args: &Args) -> Result<()> {
     }
     let scene = load(&args.scene, &settings_given).map_err(|error| match error {
         SceneError::Value { origin, message } if origin == "--set" => {
-            let mut given = flags.iter().filter(|(.., value)| value.is_some());
-            let flag = given.find(|(_, key, _)| message.starts_with(key));
-            SceneError::Value {
-                origin: flag.map_or(origin, |(flag, ..)| (*flag).to_owned()),
-                message,
-            }
+            let given = flags.iter().filter(|(.., value)| value.is_some());
+            // Who gave the flag need not know the key that it stands for.
+            let mut of_flag = given.filter_map(|(flag, key, _)| {
+                let message = message.strip_prefix(key)?.strip_prefix(": ")?;
+                Some(((*flag).to_owned(), message.to_owned()))
+            });
+            let (origin, message) = of_flag.next().unwrap_or((origin, message));
+            SceneError::Value { origin, message }
         }
         other => other,
     })?;

@@ -157,8 +157,8 @@ pub fn check(scene: &Scene) -> Result<(), Problem> {
         return Err(problem(
             "solver.tolerance",
             format!(
-                "found {:e}, expected 1e-13 to 1e-1: double precision ends below, sense above",
-                scene.solver.tolerance
+                "found {}, expected 1e-13 to 1e-1: double precision ends below, sense above",
+                shown(scene.solver.tolerance)
             ),
         ));
     }
