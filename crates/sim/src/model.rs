@@ -331,30 +331,24 @@ impl Model {
     }
 
     /// The same with what friction adds where each handle bears `loads_n`, one pair after the other: as much as it can, for the more it slides the
-    /// less it damps. Not for units: an error is forgotten as the slowest law forgets it.
+    /// less it damps. Not for units: an error is forgotten as the slowest law forgets it. Dampers sideways and vertical are collected in what is lent.
     pub(crate) fn damping_with_friction_per_s(
         &self,
         y: &[f64],
         w: &Workspace,
         loads_n: &[f64x2],
+        [sideways, vertical]: &mut [Vec<f64x2>; 2],
         rates: &mut [f64],
     ) {
-        let per_load = self.friction_damping_s_per_m;
-        let sideways: Vec<f64x2> = self
-            .side_damping
-            .iter()
-            .zip(loads_n)
-            .map(|(held, load)| *held + *load * per_load)
-            .collect();
+        let rubs = |(held, load): (&f64x2, &f64x2)| *held + *load * self.friction_damping_s_per_m;
+        sideways.clear();
+        sideways.extend(self.side_damping.iter().zip(loads_n).map(rubs));
         // Hunt and Crossley's dampers go with the compression, and are left out.
-        let none = vec![f64x2::ZERO; loads_n.len()];
-        let vertical = match self.contact_damping.is_empty() {
-            true => &none,
-            false => &self.contact_damping,
-        };
-        rates[..self.freedoms.positions()].fill(0.0);
-        self.freedoms
-            .damping_per_s(y, &w.pair, [&sideways, vertical], rates);
+        vertical.clear();
+        vertical.extend_from_slice(&self.contact_damping);
+        vertical.resize(loads_n.len(), f64x2::ZERO);
+        let dampers = [&sideways[..], vertical];
+        self.freedoms.damping_per_s(y, &w.pair, dampers, rates);
     }
 
     /// N·s/m per newton of load that friction damps a handle by where nothing slides, s/m; 0 without friction.

@@ -7,6 +7,7 @@ use crate::imu::Track;
 use crate::imu::track::period_s;
 use crate::inputs::Window;
 use crate::quality::Quality;
+use crate::spectrum::chi_square_cdf;
 
 /// Fewer taps than this set no clock: two may be chance.
 const FEWEST: usize = 3;
@@ -67,10 +68,9 @@ impl Clocks {
             return 0.0;
         }
         let tap_s = felt(track);
-        let fit = from_events(&tap_s, &self.tap_s, SEARCH_S, TOLERANCE_S);
+        let fit = paired(&tap_s, &self.tap_s);
         let taps = tap_s.len().min(self.tap_s.len());
-        let found = self.found(topic, fit, taps, [&tap_s, &self.tap_s.clone()]);
-        found.map_or(0.0, |mut clock| {
+        self.found(topic, fit, taps).map_or(0.0, |mut clock| {
             // A tap falls anywhere between two samples, of either sensor; the scatter does not show it where both samplings keep step.
             let spread_s = |t_s: &[f64]| period_s(t_s).unwrap_or_default() / 12f64.sqrt();
             let sampled_s = spread_s(&track.t_s).hypot(spread_s(&self.turning.0));
@@ -129,11 +129,10 @@ impl Clocks {
             return false;
         }
         // The other way round: the taps are few, and sound begins all the time.
-        let fit = from_events(&self.tap_s, onset_s, SEARCH_S, TOLERANCE_S);
+        let fit = paired(&self.tap_s, onset_s);
         // A tap is felt at the largest sample of its ringing, up to a sample behind its beginning, every time alike; between two sensors that cancels.
         let felt_late_s = 0.5 * period_s(&self.turning.0).unwrap_or_default();
-        let events = [&self.tap_s.clone()[..], onset_s];
-        if let Some(clock) = self.found(topic, fit, self.tap_s.len(), events) {
+        if let Some(clock) = self.found(topic, fit, self.tap_s.len()) {
             let clock = Clock {
                 offset_sd_s: clock.offset_sd_s.hypot(HEARD_SD_S).hypot(felt_late_s),
                 ..clock
@@ -171,16 +170,15 @@ impl Clocks {
         beat_s.drain(..beat_s.iter().position(heard).unwrap_or_default());
     }
 
-    /// A clock that rests on enough of `taps` and on more of the events, the device's and the reference's, than chance pairs; otherwise it is said why there is none.
+    /// A clock that rests on enough of `taps` and on more of what was noticed than chance pairs; otherwise it is said why there is none.
     fn found(
         &mut self,
         topic: &str,
-        clock: Result<Clock, ClockError>,
+        (clock, by_chance): (Result<Clock, ClockError>, f64),
         taps: usize,
-        events_s: [&[f64]; 2],
     ) -> Option<Clock> {
         let why = match clock {
-            Ok(clock) if by_chance(&clock, events_s) > MOST_BY_CHANCE => format!(
+            Ok(clock) if by_chance > MOST_BY_CHANCE => format!(
                 "the {} found here stand among so much else that chance finds as many",
                 clock.points
             ),
@@ -244,6 +242,13 @@ impl Clocks {
     }
 }
 
+/// What events of a device and of a reference tell of its clock, and how probable chance makes that.
+fn paired(device_s: &[f64], reference_s: &[f64]) -> (Result<Clock, ClockError>, f64) {
+    let clock = from_events(device_s, reference_s, SEARCH_S, TOLERANCE_S);
+    let by_chance = (clock.as_ref()).map_or(0.0, |c| by_chance(c, [device_s, reference_s]));
+    (clock, by_chance)
+}
+
 /// Probability that so many events pair at any of the offsets that are looked through, if none is shared: others about them, the device's or the reference's, come
 /// as often as chance has it.
 ///
@@ -266,12 +271,8 @@ fn by_chance(clock: &Clock, [device_s, reference_s]: [&[f64]; 2]) -> f64 {
         2.0 * TOLERANCE_S * few.len() as f64 * else_per_s
     };
     let mean = expected(&there, reference_s).max(expected(reference_s, &there));
-    let mut term = (1..=clock.points).fold((-mean).exp(), |p, k| p * mean / k as f64);
-    let mut tail = 0.0;
-    for k in clock.points + 1..clock.points + 100 {
-        tail += term;
-        term *= mean / k as f64;
-    }
+    // P(N ≥ n) of a Poisson distribution of mean λ is P(χ²_2n ≤ 2λ).
+    let tail = chi_square_cdf(2.0 * mean, 2.0 * clock.points as f64);
     let span_s = |t: &[f64]| t.last().unwrap_or(&0.0) - t.first().unwrap_or(&0.0);
     let offsets = (SEARCH_S / TOLERANCE_S).min((device_s.len() * reference_s.len()) as f64);
     let drifts = 1.0 + MOST_DRIFT * span_s(device_s) / TOLERANCE_S;

@@ -326,23 +326,50 @@ fn scatter_s(t_s: &[f64]) -> f64 {
     steps.iter().map(|s| (s - usual).abs()).sum::<f64>() / steps.len().max(1) as f64
 }
 
+/// The lower edge of what comes late: a straight line through the least of two parts.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Edge {
+    /// Where the first is, and by how much it is late, s.
+    pub at_s: f64,
+    pub late_s: f64,
+    /// By how much more the other is, s, and per second.
+    pub grows_s: f64,
+    pub slope: f64,
+}
+
+impl Edge {
+    /// Of times and latenesses, s; `None` where a part is empty.
+    pub fn of(parts: [impl Iterator<Item = (f64, f64)>; 2]) -> Option<Self> {
+        let [a, b] = parts.map(|part| part.min_by(|a, b| a.1.total_cmp(&b.1)));
+        let (a, b) = (a?, b?);
+        let grows_s = b.1 - a.1;
+        let slope = if b.0 > a.0 {
+            grows_s / (b.0 - a.0)
+        } else {
+            0.0
+        };
+        Some(Edge {
+            at_s: a.0,
+            late_s: a.1,
+            grows_s,
+            slope,
+        })
+    }
+
+    /// A time moved by it, s.
+    pub fn moved(&self, s: f64) -> f64 {
+        s + self.late_s + self.slope * (s - self.at_s)
+    }
+}
+
 /// Stamps moved and stretched so that none lies behind its log time, and two lie on it.
 fn on_the_logs_clock(log_s: &[f64], stamp_s: &[f64]) -> Vec<f64> {
-    let least = |range: Range<usize>| {
-        let each = range.map(|k| (stamp_s[k], log_s[k] - stamp_s[k]));
-        each.min_by(|a, b| a.1.total_cmp(&b.1))
-    };
+    let late = |range: Range<usize>| range.map(|k| (stamp_s[k], log_s[k] - stamp_s[k]));
     let (n, third) = (log_s.len(), log_s.len() / 3);
-    let (Some(a), Some(b)) = (least(0..third), least(n - third..n)) else {
-        return log_s.to_vec();
-    };
-    let slope = if b.0 > a.0 {
-        (b.1 - a.1) / (b.0 - a.0)
-    } else {
-        0.0
-    };
-    let moved = |s: &f64| s + a.1 + slope * (s - a.0);
-    stamp_s.iter().map(moved).collect()
+    match Edge::of([late(0..third), late(n - third..n)]) {
+        Some(edge) => stamp_s.iter().map(|s| edge.moved(*s)).collect(),
+        None => log_s.to_vec(),
+    }
 }
 
 /// Even times for samples that came in packets, stretch by stretch the least-squares line of time over number; with their usual and mean step.

@@ -15,6 +15,7 @@ use recording::read::{ReadError, Recording};
 use recording::schema::foxglove::RawAudio;
 use recording::text::counted;
 
+use super::dates::Edge;
 use crate::beat::{BeatError, Beats, beats_among, onsets};
 use crate::median::median;
 use crate::roles::SOUND;
@@ -159,49 +160,18 @@ impl Plan {
     }
 }
 
-/// How a sound's samples stand to its messages' dates.
-#[derive(Clone, Copy, Debug, PartialEq)]
-struct Pace {
-    at_s: f64,
-    off_s: f64,
-    slope: f64,
-}
-
-impl Pace {
-    /// Of the sound before each message and how late that is, s.
-    fn of(late_s: &[(f64, f64)]) -> Self {
-        let n = late_s.len();
-        let least = |part: &[(f64, f64)]| part.iter().copied().min_by(|a, b| a.1.total_cmp(&b.1));
-        let none = Pace {
-            at_s: 0.0,
-            off_s: 0.0,
-            slope: 0.0,
-        };
-        let ends = [&late_s[..n.div_ceil(3)], &late_s[n - n.div_ceil(3)..]].map(least);
-        let [Some(a), Some(b)] = ends else {
-            return none;
-        };
-        let apart_s = b.0 - a.0;
-        let slope = if apart_s > 0.0 {
-            (b.1 - a.1) / apart_s
-        } else {
-            0.0
-        };
-        let believed = (1e6 * slope).abs() <= MOST_PPM;
-        match a.1.abs().max((b.1 - a.1).abs()) > LEAST_OFF_S {
-            true => Pace {
-                at_s: a.0,
-                off_s: a.1,
-                slope: if believed { slope } else { 0.0 },
-            },
-            false => none,
-        }
+/// How a sound's samples stand to its messages' dates, of the sound before each message and how late that is, s.
+fn pace(late_s: &[(f64, f64)]) -> Option<Edge> {
+    let (n, third) = (late_s.len(), late_s.len().div_ceil(3));
+    let parts = [&late_s[..third], &late_s[n - third..]];
+    let mut edge = Edge::of(parts.map(|part| part.iter().copied()))?;
+    if edge.late_s.abs().max(edge.grows_s.abs()) <= LEAST_OFF_S {
+        return None;
     }
-
-    /// When a moment of the sound is, s.
-    fn dated(&self, s: f64) -> f64 {
-        s + self.off_s + self.slope * (s - self.at_s)
+    if (1e6 * edge.slope).abs() > MOST_PPM {
+        edge.slope = 0.0;
     }
+    Some(edge)
 }
 
 /// Dates messages by their timestamps (ns, `None` where one has none), if these are on the log's clock.
@@ -269,7 +239,8 @@ pub fn listen(recording: &Recording) -> Result<Option<Heard>, ReadError> {
     let some = !blocks.is_empty();
     by_stamps(&mut blocks, &stamps_ns, f64::from(rate));
     let plan = Plan::of(blocks, f64::from(rate));
-    let pace = Pace::of(&plan.late_s);
+    let pace = pace(&plan.late_s);
+    let dated = |s: f64| pace.map_or(s, |edge| edge.moved(s));
     let factor = (rate / RATE_HZ).max(1) as usize;
     let rate_hz = f64::from(rate) / factor as f64;
     let mut sound = vec![0f32; plan.frames / factor];
@@ -310,10 +281,10 @@ pub fn listen(recording: &Recording) -> Result<Option<Heard>, ReadError> {
             missing as f64 / f64::from(rate)
         ));
     }
-    if pace.slope != 0.0 {
+    if let Some(edge) = pace.filter(|edge| edge.slope != 0.0) {
         remarks.push(format!(
             "the clock that counts its samples runs {:+.0} ppm fast beside its messages' dates, which is put right",
-            -1e6 * pace.slope
+            -1e6 * edge.slope
         ));
     }
     if plan.cut {
@@ -325,14 +296,10 @@ pub fn listen(recording: &Recording) -> Result<Option<Heard>, ReadError> {
         let begins = onsets(&sound, rate_hz);
         if let Ok(begins) = &begins {
             onset_s = begins.times_s();
-            onset_s
-                .iter_mut()
-                .for_each(|t| *t = start_s + pace.dated(*t));
+            onset_s.iter_mut().for_each(|t| *t = start_s + dated(*t));
         }
         beats = begins.and_then(|begins| beats_among(&begins)).map(|mut b| {
-            b.beat_s
-                .iter_mut()
-                .for_each(|t| *t = start_s + pace.dated(*t));
+            b.beat_s.iter_mut().for_each(|t| *t = start_s + dated(*t));
             b
         });
     }

@@ -314,19 +314,7 @@ impl<'a> Parser<'a> {
             self.at += 1;
             let name = self.next();
             let start = self.at;
-            if self.peek() == "(" {
-                let mut depth = 0;
-                while self.at < self.tokens.len() {
-                    match self.next() {
-                        "(" => depth += 1,
-                        ")" => depth -= 1,
-                        _ => {}
-                    }
-                    if depth == 0 {
-                        break;
-                    }
-                }
-            }
+            self.nested("(", ")");
             let said = self.tokens.get(start..self.at).unwrap_or_default();
             annotations.push((name, said));
         }
@@ -615,18 +603,15 @@ impl<'a> Parser<'a> {
         }
     }
 
-    /// Steps over `<bound>`, which may hold further ones.
-    fn bound(&mut self) {
-        if self.peek() != "<" {
+    /// Steps over what stands between brackets, which may hold further ones, if one opens here.
+    fn nested(&mut self, open: &str, close: &str) {
+        if self.peek() != open {
             return;
         }
         let mut depth = 0;
         while self.at < self.tokens.len() {
-            match self.next() {
-                "<" => depth += 1,
-                ">" => depth -= 1,
-                _ => {}
-            }
+            let token = self.next();
+            depth += i32::from(token == open) - i32::from(token == close);
             if depth == 0 {
                 return;
             }
@@ -667,11 +652,11 @@ impl<'a> Parser<'a> {
                 }
             }
             "string" => {
-                self.bound();
+                self.nested("<", ">");
                 return Ok(Written::Text);
             }
             "wstring" => {
-                self.bound();
+                self.nested("<", ">");
                 return Ok(Written::WideText);
             }
             "sequence" => {
@@ -687,7 +672,7 @@ impl<'a> Parser<'a> {
                 return Ok(Written::Sequence(Box::new(inner)));
             }
             "wchar" | "map" | "fixed" | "any" => {
-                self.bound();
+                self.nested("<", ">");
                 return Ok(Written::Unsupported(token.to_owned()));
             }
             name if name.starts_with(|c: char| c.is_ascii_alphabetic() || c == '_' || c == ':') => {

@@ -86,6 +86,8 @@ pub struct Adams4 {
     looked: u32,
     /// What friction is taken to bear, N, by pairs of handles; empty without friction.
     loads_n: Vec<f64x2>,
+    /// Dampers sideways and vertical with that of friction, by pairs of handles, N·s/m.
+    dampers: [Vec<f64x2>; 2],
     /// How many steps of this segment are behind.
     steps: u32,
     /// When the segment began, s.
@@ -107,7 +109,8 @@ impl Adams4 {
             self.loads_n.clear();
             let load = |p: &Pair| (p.normal * MARGIN).fast_max(f64x2::ZERO);
             self.loads_n.extend(course.w.pair.iter().map(load));
-            model.damping_with_friction_per_s(&course.y, &course.w, &self.loads_n, now);
+            let (loads_n, dampers) = (&self.loads_n, &mut self.dampers);
+            model.damping_with_friction_per_s(&course.y, &course.w, loads_n, dampers, now);
         } else {
             model.damping_per_s(&course.y, &course.w, now);
         }
@@ -189,6 +192,7 @@ impl Step for Adams4 {
             now_per_s: Vec::new(),
             looked: 0,
             loads_n: Vec::new(),
+            dampers: Default::default(),
             steps: 0,
             segment_s: f64::NAN,
             stages: std::array::from_fn(|_| vec![0.0; size]),
