@@ -31,6 +31,12 @@ pub struct Pose {
     pub spin_rad_per_s: [f64; 3],
 }
 
+/// The angle `x`, by whole turns as near as can be to `near`, rad: half a turn away at most.
+pub fn nearest_turn(x: f64, near: f64) -> f64 {
+    let turn = std::f64::consts::TAU;
+    x - turn * ((x - near) / turn).round()
+}
+
 impl Pose {
     /// Roll, pitch, yaw of R = R_z(yaw) R_y(pitch) R_x(roll), rad (REP-103). At pitch = ±90° roll and yaw are not unique:
     /// yaw is then 0 and roll takes the whole turn.
@@ -44,11 +50,7 @@ impl Pose {
         if cos_pitch < 1e-9 {
             // ±90°: q = R_z(yaw) R_y(±90°) R_x(roll) depends on roll ∓ yaw only.
             let turn = 2.0 * x.atan2(w);
-            return [
-                turn - std::f64::consts::TAU * (turn / std::f64::consts::TAU).round(),
-                pitch,
-                0.0,
-            ];
+            return [nearest_turn(turn, 0.0), pitch, 0.0];
         }
         [self.level_roll_rad(), pitch, across.atan2(level)]
     }

@@ -1,9 +1,9 @@
 //! What is kept of a run to compare it: its motion, forces, and the figures that people quote.
 
+use crate::freedoms::nearest_turn;
 use crate::run::Sample;
 use crate::scene::Scene;
 use nalgebra::{Quaternion, UnitQuaternion};
-use std::f64::consts::TAU;
 
 /// T_float counts samples whose summed force is at most this part of the weight.
 const FLOATING: f64 = 0.05;
@@ -69,8 +69,7 @@ pub(super) struct Course {
 
 /// Roll is an angle: a whole turn is no difference.
 fn turned(a: f64, b: f64) -> f64 {
-    let d = a - b;
-    (d - TAU * (d / TAU).round()).abs()
+    nearest_turn(a - b, 0.0).abs()
 }
 
 /// By how much two orientations differ about the body's y and z axes, rad: pitch and yaw, which have no pole so.
@@ -263,7 +262,7 @@ mod tests {
     #[test]
     fn a_whole_turn_is_no_difference_and_courses_part_where_they_part() {
         let (a, mut b) = (course(), course());
-        b.roll_rad[3] += TAU;
+        b.roll_rad[3] += std::f64::consts::TAU;
         assert_eq!(a.agrees_with(&b, 1e-9), 10);
         assert!(a.errors(&b, 10).roll_rad < 1e-15);
         b.height_m[7] += 1e-3;

@@ -125,9 +125,9 @@ impl Study {
         let beside = match self.judge {
             Judge::Other => "x, y, pitch and yaw to 1 % of how far they go",
             Judge::Roll if self.others_move => {
-                ", with x, y, pitch and yaw to 1 % of how far they go,"
+                ", with x, y, pitch and yaw to 1 % of how far they go"
             }
-            Judge::Height if self.others_move => ", with x, y, pitch and yaw to 1e-3 m or rad,",
+            Judge::Height if self.others_move => ", with x, y, pitch and yaw to 1e-3 m or rad",
             _ => "",
         };
         let what = format!("{what}{beside}");
@@ -142,7 +142,8 @@ impl Study {
             .unwrap_or_default();
         match cheapest {
             Some(r) => format!(
-                "for {what} the cheapest is {} at {}: {:.2} ms{digit}",
+                "for {what}{} the cheapest is {} at {}: {:.2} ms{digit}",
+                if what.contains(", with") { "," } else { "" },
                 r.method,
                 r.setting_text(),
                 r.cpu_s * 1e3

@@ -1,7 +1,8 @@
 //! What physics knows without a computer.
 
+use crate::freedoms::nearest_turn;
 use nalgebra::{Complex, UnitQuaternion, Vector3};
-use std::f64::consts::{FRAC_PI_2, PI, TAU};
+use std::f64::consts::{FRAC_PI_2, PI};
 
 /// g of the default body, m/s².
 pub const G: f64 = 9.81;
@@ -325,8 +326,7 @@ impl Tumbling {
 
 /// The difference of two angles, rad, in −π…π.
 pub fn turned(a: f64, b: f64) -> f64 {
-    let d = a - b;
-    d - TAU * (d / TAU).round()
+    nearest_turn(a - b, 0.0)
 }
 
 #[test]
@@ -352,7 +352,7 @@ fn adler_agrees_with_its_equation_on_every_branch() {
     }
     let late = adler(1.0, 1.0, 0.0, 1e6);
     assert!(
-        (late - (0.25 * TAU - 2e-6)).abs() < 1e-9,
+        (late - (FRAC_PI_2 - 2e-6)).abs() < 1e-9,
         "the edge is reached as 2/(K t)"
     );
 }
@@ -366,7 +366,7 @@ fn sinking_and_grazing_agree_with_their_equations() {
         (at(t + h) - 2.0 * at(t) + at(t - h)) / (h * h),
     );
     assert!((m * a + m * G + k * (at(t) - 0.9) + c * v).abs() < 1e-3);
-    let omega = 2.0 * TAU;
+    let omega = 4.0 * PI;
     let amplitude = grazing_amplitude_m(m, k, c, omega);
     let acceleration = omega * omega * amplitude * follows(m, k, c, omega).norm();
     assert!((acceleration - G).abs() < 1e-12);
@@ -380,7 +380,7 @@ fn a_carried_load_obeys_its_equation_and_never_jumps() {
         c: 800.0,
         touch_m: 0.9,
         amplitude_m: 0.075,
-        omega: 2.0 * TAU,
+        omega: 4.0 * PI,
     };
     let pieces = load.course([0.85, 0.3], 10.0);
     assert!(pieces.len() > 20, "{}", pieces.len());

@@ -1,10 +1,9 @@
 //! `sim drum`: the drum of a scene as a WAV file.
 
-use super::setting;
+use super::Asked;
 use anyhow::{Context, Result, anyhow};
 use recording::whole::write_whole;
 use sim::model::Model;
-use sim::scene::load;
 use std::io::Write;
 use std::path::{Path, PathBuf};
 
@@ -14,22 +13,18 @@ use std::path::{Path, PathBuf};
     after_help = "Examples:\n  sim drum music --out drum.wav\n  sim drum tempo-change --set effects.drum.noise=0.05 --out drum.wav"
 )]
 pub struct Args {
-    /// A built-in scene or the path of a TOML file; where it has no `effects.drum`, the usual drum sounds.
-    #[arg(default_value = "music")]
-    scene: String,
+    #[command(flatten)]
+    asked: Asked,
     /// Where to write.
     #[arg(long, short, value_name = "FILE.wav", default_value = "drum.wav")]
     out: PathBuf,
-    /// Change a value of the scene; may be repeated.
-    #[arg(long, value_name = "KEY=VALUE", value_parser = setting)]
-    set: Vec<String>,
 }
 
 /// Writes the sound; the file appears whole or not at all.
 pub fn run(args: &Args) -> Result<()> {
     super::is_file(&args.out)?;
-    super::may_write(&args.out, "wav", &[Path::new(&args.scene)])?;
-    let mut scene = load(&args.scene, &args.set)?;
+    super::may_write(&args.out, "wav", &[Path::new(&args.asked.scene)])?;
+    let mut scene = args.asked.load()?;
     if scene.effects.music.is_none() {
         return Err(anyhow!(
             "the scene `{}` has no effects.music, so there is no drum to hear",

@@ -1,12 +1,13 @@
 //! `sim explain`: what a scene turns on, what state that needs, and what it costs.
 
-use super::{Format, number, setting};
+use super::{Asked, Format, number};
 use anyhow::Result;
 use serde_json::{Value, json};
 use sim::effects::{Entry, TABLE};
+use sim::freedoms::nearest_turn;
 use sim::model::Model;
 use sim::run::{Listener, Sample, method_of, run_model, settings};
-use sim::scene::{Freedom, Scene, load};
+use sim::scene::{Freedom, Scene};
 use sim::solve::Settings;
 use std::borrow::Cow;
 use std::fmt::Write;
@@ -16,12 +17,8 @@ use std::time::Instant;
 #[derive(clap::Args)]
 #[command(after_help = EXAMPLES)]
 pub struct Args {
-    /// A built-in scene or the path of a TOML file.
-    #[arg(default_value = "music")]
-    scene: String,
-    /// Change a value of the scene; may be repeated.
-    #[arg(long, value_name = "KEY=VALUE", value_parser = setting)]
-    set: Vec<String>,
+    #[command(flatten)]
+    asked: Asked,
     /// Table for people, or JSON.
     #[arg(long, default_value = "table")]
     format: Format,
@@ -78,7 +75,7 @@ struct Trial {
 
 /// Explains a scene.
 pub fn run(args: &Args) -> Result<()> {
-    let found = explore(load(&args.scene, &args.set)?);
+    let found = explore(args.asked.load()?);
     super::print(&match args.format {
         Format::Json => format!("{:#}\n", as_json(&found)),
         Format::Table => as_table(&found),
@@ -230,12 +227,6 @@ fn ms_per_s<const N: usize>(scenes: [&Scene; N], most: u64) -> [Result<f64, Stri
     least
 }
 
-/// `x` rad, by whole turns as near as can be to `near`.
-fn nearest(x: f64, near: f64) -> f64 {
-    let turn = std::f64::consts::TAU;
-    x - turn * ((x - near) / turn).round()
-}
-
 /// The six coordinates in every sample; roll and yaw go on beyond half a turn.
 fn motion(scene: &Scene, most: u64) -> Result<Vec<[f64; 6]>, String> {
     let mut all: Vec<[f64; 6]> = Vec::new();
@@ -243,7 +234,7 @@ fn motion(scene: &Scene, most: u64) -> Result<Vec<[f64; 6]>, String> {
         let ([x, y, z], [mut roll, tilt, mut yaw]) =
             (s.pose.position_m, s.pose.roll_pitch_yaw_rad());
         if let Some(last) = all.last() {
-            (roll, yaw) = (nearest(roll, last[3]), nearest(yaw, last[5]));
+            (roll, yaw) = (nearest_turn(roll, last[3]), nearest_turn(yaw, last[5]));
         }
         all.push([
             x - scene.carriers.walk_m_per_s[0] * s.t_s,
@@ -292,7 +283,7 @@ fn try_freedoms(scene: &Scene, most: u64) -> Vec<Trial> {
                             .fold(0.0, f64::max)
                     };
                     // Angles a turn apart are the same.
-                    let roll = |a: &[f64; 6], b: &[f64; 6]| nearest(a[3] - b[3], 0.0);
+                    let roll = |a: &[f64; 6], b: &[f64; 6]| nearest_turn(a[3] - b[3], 0.0);
                     (worst(&roll), worst(&|a, b| a[2] - b[2]))
                 });
             Trial {

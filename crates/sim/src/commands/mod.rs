@@ -11,6 +11,7 @@ use clap::{Subcommand, ValueEnum};
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
 use recording::whole::{Output, Usage};
 use serde_json::{Value, json};
+use sim::scene::{Scene, SceneError, load};
 use std::path::Path;
 use std::process::ExitCode;
 use std::time::Duration;
@@ -22,7 +23,7 @@ pub enum Command {
     Record(record::Args),
     /// Let a recording's carriers and beat drive a scene, and compare the body's motion with the measured one.
     Replay(replay::Args),
-    /// Write the drum of a scene as a WAV file.
+    /// Write the drum of a scene as a WAV file; where it has no `effects.drum`, the usual drum sounds.
     Drum(drum::Args),
     /// Say what a scene turns on, what state that needs, and what it costs.
     Explain(explain::Args),
@@ -37,6 +38,30 @@ pub enum Command {
 enum Format {
     Table,
     Json,
+}
+
+/// The scene that a command is about.
+#[derive(clap::Args)]
+struct Asked {
+    /// A built-in scene (see `sim scenes`) or the path of a TOML file.
+    #[arg(default_value = "music")]
+    scene: String,
+    #[command(flatten)]
+    changes: Changes,
+}
+
+impl Asked {
+    fn load(&self) -> Result<Scene, SceneError> {
+        load(&self.scene, &self.changes.set)
+    }
+}
+
+/// What is changed in a scene.
+#[derive(clap::Args)]
+struct Changes {
+    /// Change a value of the scene; `effects.NAME=false` takes an effect away, `=true` puts it there with its defaults. May be repeated.
+    #[arg(long, value_name = "KEY=VALUE", value_parser = setting)]
+    set: Vec<String>,
 }
 
 /// A bar that a terminal shows from the second second on, however slowly the work goes on.
@@ -65,7 +90,8 @@ fn setting(text: &str) -> Result<String, String> {
 
 /// Takes a number; which ones make sense, the scene's check says.
 fn real(text: &str) -> Result<f64, String> {
-    text.parse().map_err(|_| "expected a number".into())
+    let number = text.parse::<f64>().ok().filter(|x| x.is_finite());
+    number.ok_or_else(|| "expected a number".into())
 }
 
 /// Takes a time within a recording.
@@ -120,7 +146,9 @@ pub fn run(command: Command) -> ExitCode {
         Ok(()) => ExitCode::SUCCESS,
         Err(error) => {
             recording::note!("sim: {error:#}");
-            match error.is::<Usage>() {
+            // What a flag or a `--set` says is usage; what a file says is not.
+            let of_flag = matches!(error.downcast_ref(), Some(SceneError::Value { origin, .. }) if origin.starts_with("--"));
+            match of_flag || error.is::<Usage>() {
                 true => ExitCode::from(2),
                 false => ExitCode::FAILURE,
             }

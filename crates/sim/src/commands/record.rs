@@ -1,7 +1,7 @@
 //! `sim record`: a scene becomes a recording.
 
-use super::{patient_bar, real, setting};
-use anyhow::{Context, Result, anyhow, bail};
+use super::{Asked, patient_bar, real};
+use anyhow::{Context, Result, anyhow};
 use indicatif::ProgressBar;
 use recording::whole::{Usage, remove_unfinished_files};
 use recording::write::{RecordingWriter, WriteError, WriterOptions};
@@ -20,9 +20,8 @@ use std::time::Instant;
 #[derive(clap::Args)]
 #[command(after_help = EXAMPLES)]
 pub struct Args {
-    /// A built-in scene (see `sim scenes`) or the path of a TOML file.
-    #[arg(default_value = "music")]
-    scene: String,
+    #[command(flatten)]
+    asked: Asked,
     /// Seed of everything random.
     #[arg(long, value_name = "N", value_parser = seed, allow_negative_numbers = true)]
     seed: Option<u64>,
@@ -32,9 +31,6 @@ pub struct Args {
     /// Simulated time, s.
     #[arg(long, value_name = "S", value_parser = real, allow_negative_numbers = true)]
     duration: Option<f64>,
-    /// Change a value of the scene; `effects.NAME=false` takes an effect away, `=true` puts it there with its defaults. May be repeated.
-    #[arg(long, value_name = "KEY=VALUE", value_parser = setting)]
-    set: Vec<String>,
     /// Integration method.
     #[arg(long)]
     method: Option<String>,
@@ -71,7 +67,7 @@ pub fn run(args: &Args) -> Result<()> {
 }
 
 fn record(args: &Args) -> Result<()> {
-    let mut settings_given = args.set.clone();
+    let mut settings_given = args.asked.changes.set.clone();
     // The flags are settings like any other, so that they are checked and reported alike.
     let flags = [
         ("--seed", "seed", args.seed.map(|seed| seed.to_string())),
@@ -94,6 +90,8 @@ fn record(args: &Args) -> Result<()> {
     for (flag, key, value) in &flags {
         let Some(value) = value else { continue };
         if args
+            .asked
+            .changes
             .set
             .iter()
             .any(|s| s.split('=').next().is_some_and(|k| k.trim() == *key))
@@ -103,7 +101,7 @@ fn record(args: &Args) -> Result<()> {
         }
         settings_given.push(format!("{key}={value}"));
     }
-    let scene = load(&args.scene, &settings_given).map_err(|error| match error {
+    let scene = load(&args.asked.scene, &settings_given).map_err(|error| match error {
         SceneError::Value { origin, message } if origin == "--set" => {
             let given = flags.iter().filter(|(.., value)| value.is_some());
             // Who gave the flag need not know the key that it stands for.
@@ -117,10 +115,11 @@ fn record(args: &Args) -> Result<()> {
         other => other,
     })?;
     if args.tolerance.is_some() && !method_of(&scene).adaptive {
-        bail!(
+        let said = format!(
             "--tolerance: {} takes steps of one length, which --set solver.step_s sets",
             scene.solver.method
         );
+        return Err(Usage(said).into());
     }
 
     let interrupted = catch_interrupts()?;
@@ -129,7 +128,7 @@ fn record(args: &Args) -> Result<()> {
         .out
         .clone()
         .unwrap_or_else(|| file_of(&scene.name, scene.seed));
-    super::may_write(&path, "mcap", &[Path::new(&args.scene)])?;
+    super::may_write(&path, "mcap", &[Path::new(&args.asked.scene)])?;
     let options = WriterOptions::beside();
     let writer = RecordingWriter::to(&path, &options)?;
 

@@ -1,6 +1,6 @@
 //! `sim replay`: a recording drives a scene.
 
-use super::{Format, patient_bar, print, seconds, setting};
+use super::{Changes, Format, patient_bar, print, seconds};
 use anyhow::{Context, Result, anyhow, bail};
 use indicatif::ProgressBar;
 use recording::read::{ReadOptions, Recording};
@@ -39,9 +39,8 @@ pub struct Args {
     /// Left out of the misfit at the beginning, s. Default: 0 where the body, and poles and bristles with it, start as in the recording, else 3.
     #[arg(long, value_name = "S", value_parser = seconds, allow_hyphen_values = true)]
     settle: Option<f64>,
-    /// Change a value of the scene; `effects.NAME=false` takes an effect away, `=true` puts it there with its defaults. May be repeated.
-    #[arg(long, value_name = "KEY=VALUE", value_parser = setting)]
-    set: Vec<String>,
+    #[command(flatten)]
+    changes: Changes,
     /// Where to write. Default: FILE-replay.mcap here.
     #[arg(long, short, value_name = "FILE.mcap")]
     out: Option<PathBuf>,
@@ -103,7 +102,7 @@ pub fn run(args: &Args) -> Result<Input> {
     }
     // What is given is read first, so that a slip in it does not wait for the recording.
     if let Some(scene) = &args.scene {
-        load(scene, &args.set)?;
+        load(scene, &args.changes.set)?;
     }
     let recording = Recording::open(&args.file, &ReadOptions::default())?;
     let name = args.file.display().to_string();
@@ -117,7 +116,7 @@ pub fn run(args: &Args) -> Result<Input> {
             .with_context(|| format!("{name}: the scene attached to it; give one with --scene")),
         (None, None) => load(USUAL, set).map_err(anyhow::Error::new),
     };
-    let scene = with(&args.set)?;
+    let scene = with(&args.changes.set)?;
     let take = Take::read(&recording)?;
     let drive = match args.drive {
         What::Phases => Drive::Phases,
@@ -134,8 +133,8 @@ pub fn run(args: &Args) -> Result<Input> {
     let replay = take
         .scene(&scene, &options)
         .map_err(|why| anyhow!("{name}: {why}"))?;
-    for (k, set) in args.set.iter().enumerate() {
-        let mut others = args.set.clone();
+    for (k, set) in args.changes.set.iter().enumerate() {
+        let mut others = args.changes.set.clone();
         others.remove(k);
         // A setting may ask for others, and then it does something.
         let Ok(without) = with(&others) else {

@@ -3,12 +3,11 @@
 mod figure;
 mod hard;
 
-use super::{Format, number, patient_bar, print, setting};
+use super::{Asked, Format, number, patient_bar, print};
 use anyhow::{Context, Result, anyhow};
 use recording::whole::write_whole;
 use serde_json::{Value, json};
 use sim::accuracy::{Judge, Quoted, REFERENCE, Rung, SECOND, Study, study};
-use sim::scene::load;
 use std::fmt::Write as _;
 use std::io::Write as _;
 use std::path::PathBuf;
@@ -17,17 +16,13 @@ use std::path::PathBuf;
 #[derive(clap::Args)]
 #[command(after_help = EXAMPLES)]
 pub struct Args {
-    /// A built-in scene (see `sim scenes`) or the path of a TOML file.
-    #[arg(default_value = "music")]
-    scene: String,
-    /// Change a value of the scene; `effects.NAME=false` takes an effect away. May be repeated.
-    #[arg(long, value_name = "KEY=VALUE", value_parser = setting)]
-    set: Vec<String>,
+    #[command(flatten)]
+    asked: Asked,
     /// Table for people, or JSON.
     #[arg(long, default_value = "table")]
     format: Format,
     /// Also write table.txt, accuracy.json, runs.csv and work-precision.svg into this folder.
-    #[arg(long, value_name = "DIR")]
+    #[arg(long, short, value_name = "DIR")]
     out: Option<PathBuf>,
     /// Timed runs of each setting; the median counts.
     #[arg(long, value_name = "N", default_value_t = 3, value_parser = clap::value_parser!(u16).range(1..))]
@@ -49,7 +44,7 @@ pub fn run(args: &Args) -> Result<()> {
     if args.hard {
         return hard::run(args.format == Format::Json);
     }
-    let scene = load(&args.scene, &args.set)?;
+    let scene = args.asked.load()?;
     // A folder that cannot be is said before minutes are spent.
     if let Some(folder) = &args.out {
         std::fs::create_dir_all(folder)
@@ -72,7 +67,10 @@ pub fn run(args: &Args) -> Result<()> {
             ("table.txt", &table),
             ("accuracy.json", &json),
             ("runs.csv", &csv(&study)),
-            ("work-precision.svg", &figure::draw(&study, &args.set)),
+            (
+                "work-precision.svg",
+                &figure::draw(&study, &args.asked.changes.set),
+            ),
         ] {
             let path = folder.join(name);
             write_whole(&path, |file| file.write_all(text.as_bytes()))
