@@ -81,7 +81,7 @@ struct AnalyzeArgs {
     #[arg(long, value_name = "TOPIC")]
     topic: Vec<String>,
     /// Write the signals to a table; columns are named by their paths (in CSV with their units)
-    #[arg(long, value_name = "FILE.parquet|.csv")]
+    #[arg(long, short, value_name = "FILE.parquet|.csv")]
     out: Option<PathBuf>,
     /// Write one row of each topic in so many, for --out
     #[arg(long, value_name = "N", default_value_t = 1, requires = "out", value_parser = clap::value_parser!(u64).range(1..))]

@@ -19,7 +19,7 @@ pub struct Args {
     #[arg(long, value_name = "N", default_value_t = 0, value_parser = jobs, allow_negative_numbers = true)]
     jobs: usize,
     /// A folder for the result's files (paper.json, paper.txt, runs.csv, pictures).
-    #[arg(long, value_name = "DIR")]
+    #[arg(long, short, value_name = "DIR")]
     out: Option<PathBuf>,
     /// What to print.
     #[arg(long, value_enum, default_value_t = Format::Table)]

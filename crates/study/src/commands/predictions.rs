@@ -21,7 +21,7 @@ pub struct Args {
     jobs: usize,
     /// A folder for predictions.md, predictions.json and the pictures (predictions/*.png), of the experiments that were run; what is there
     /// of others is replaced.
-    #[arg(long, value_name = "DIR")]
+    #[arg(long, short, value_name = "DIR")]
     out: Option<PathBuf>,
     /// What to print.
     #[arg(long, value_enum, default_value_t = Format::Table)]

@@ -23,7 +23,7 @@ pub struct Args {
     #[arg(long, value_name = "N", default_value_t = 1, allow_negative_numbers = true, value_parser = count(1..=1024))]
     cpus: u64,
     /// The study's folder, on a disk that all nodes share. Default: as for `study FILE.toml`.
-    #[arg(long, value_name = "DIR")]
+    #[arg(long, short, value_name = "DIR")]
     out: Option<PathBuf>,
     /// Take over the runs that another study has computed, as `study FILE.toml --reuse DIR` does.
     #[arg(long, value_name = "DIR")]

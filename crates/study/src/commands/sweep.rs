@@ -25,7 +25,7 @@ pub struct Args {
     #[arg(long, value_name = "N", default_value_t = 0, value_parser = jobs, allow_negative_numbers = true)]
     jobs: usize,
     /// The study's folder. Default: the file's name without `.toml`, here.
-    #[arg(long, value_name = "DIR")]
+    #[arg(long, short, value_name = "DIR")]
     out: Option<PathBuf>,
     /// Compute only part K of N, and leave what is there already; `merge` puts all parts together.
     /// Slurm, AWS Batch and PBS say K and N by themselves, Kubernetes says K.
