@@ -27,7 +27,6 @@ for axis, (key, label) in zip(axes, (("rhs_ns", "one right-hand side (ns)"), ("c
     axis.spines[["top", "right"]].set_visible(False)
 axes[0].loglog(n, constant + per_carrier * n, color="#D55E00", lw=1, label=f"{constant:.0f} ns + {per_carrier:.1f} ns × N")
 axes[0].legend(frameon=False, fontsize=8)
-axes[1].axhline(20, color="#999999", lw=0.8)
 axes[2].set_ylim(1, 100)
 figure.savefig(pathlib.Path(__file__).parent / "scaling.png", dpi=110)
 ratio = (at[10_000] - constant) / (at[10] - constant)

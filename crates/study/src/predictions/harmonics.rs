@@ -171,7 +171,7 @@ pub fn run(lab: &Lab) -> Result<Finding, String> {
     ] {
         numbers.push(number(
             name,
-            format!("factor by which lost contact multiplies: {}", LINES[k]),
+            format!("factor by which lost contact multiplies (geometric mean of free over tied, same amplitude and seed): {}", LINES[k]),
             added(k),
             "",
             2,

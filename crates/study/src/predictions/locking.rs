@@ -200,7 +200,7 @@ pub fn run(lab: &Lab) -> Result<Finding, String> {
         .collect();
     Ok(Finding {
         title: "1. Beat locking",
-        claim: "When ritual music is present, carrier stepping frequency and palanquin vertical motion should lock to the dominant beat frequency (within the Adler capture range), and Δz_pp and T_float should rise.",
+        claim: "When ritual music is present, carrier stepping frequency and palanquin vertical motion should lock to the dominant beat frequency (within the Adler capture range). This locking should manifest as an increase in the peak-to-peak vertical amplitude Δz_pp and in the unloading fraction T_float […].",
         experiment: format!(
             "Detuning Δω = 2π(beat − {GAIT_HZ} Hz) against the pull K_m of the music in the paper's music scene, music from the start on. The map is the scene with its noise and \
              its spread of frequencies (0.35 rad/s), two seeds a cell; the edges are bisected without both, over 200 s. Then K_m = {pull} rad/s alone, {seeds} seeds at each detuning. \
