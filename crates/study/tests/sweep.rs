@@ -74,6 +74,24 @@ fn a_range_has_an_extent_that_a_number_can_say() {
     plan(&axis("from = 60, to = 60, count = 1")).unwrap();
 }
 
+/// Listed values have their factors to keep as a range has, and the summary's columns their names.
+#[test]
+fn equal_factors_need_numbers_above_zero_and_columns_names_of_their_own() {
+    let axis = |more: &str| {
+        format!("metrics = [\"t_float\"]\naxes = [{{ key = \"effects.push.0.at_s\", {more} }}]")
+    };
+    let push = "set.effects.push = [{ at_s = 1.0 }]\n";
+    let refused = |more: &str| refused(&format!("{push}{}", axis(more)));
+    let zero = refused("values = [0, 1, 2], spacing = \"log\"");
+    assert!(zero.contains("above zero in `values`"), "{zero}");
+    for name in ["runs", "remarked", "t_float.mean", "t_float.n"] {
+        let taken = refused(&format!("values = [1, 2], name = \"{name}\""));
+        assert!(taken.contains("there is a column"), "{taken}");
+    }
+    let fine = "values = [1, 2], spacing = \"log\", name = \"rms_roll_deg.mean\"";
+    plan(&format!("{push}{}", axis(fine))).unwrap();
+}
+
 #[test]
 fn a_named_value_that_can_never_be_is_a_slip_and_a_range_that_reaches_out_is_none() {
     let axis = |key: &str, values: &str| format!("{{ key = \"{key}\", {values} }}");

@@ -2,7 +2,7 @@
 
 use super::{Format, Input, print};
 use analyze::roles::RolesFile;
-use anyhow::Result;
+use anyhow::{Result, bail};
 use serde_json::json;
 use sim::scene::load;
 use std::path::PathBuf;
@@ -57,7 +57,14 @@ pub fn run(args: &Args) -> Result<Input> {
     for file in &args.files {
         let name = file.display().to_string();
         let (mut field, told) = Field::read(file, roles.as_ref(), args.put_clocks_right)?;
-        let known = given.as_ref().or(told.scene.as_ref());
+        let known = match (&given, &told.scene) {
+            (Some(scene), _) | (None, Some(Ok(scene))) => Some(scene),
+            (None, None) => None,
+            // The usual scene in its place would begin its music at another time.
+            (None, Some(Err(why))) => bail!(
+                "{name}: the scene attached to it cannot be read: {why}; give it with --scene"
+            ),
+        };
         let scene = known.unwrap_or(&usual);
         (field.onset_s, field.build_up_s) = match &scene.effects.music {
             Some(music) => (music.onset_s + told.zero_s, music.build_up_s),

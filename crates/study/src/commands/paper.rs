@@ -45,6 +45,9 @@ pub fn run(args: &Args) -> Result<()> {
             )?);
         }
     }
+    if let Some(folder) = &args.out {
+        make_folder(folder)?;
+    }
     let stop = super::watch_interrupts("interrupted; nothing was written")?;
     let bar = super::progress(scenes.len() as u64)?;
     let results = run_all(&scenes, args.jobs, stop, || bar.inc(1));
@@ -75,7 +78,6 @@ pub fn run(args: &Args) -> Result<()> {
 
     let text = table(&conditions);
     if let Some(folder) = &args.out {
-        make_folder(folder)?;
         // Files hold results alone, so the same study gives the same bytes: the time it took is not among them.
         let mut json = to_json(&conditions, 0.0);
         json.as_object_mut().map(|o| o.remove("wall_s"));

@@ -45,6 +45,9 @@ pub fn run(args: &Args) -> Result<()> {
             );
         }
     }
+    if let Some(folder) = &args.out {
+        make_folder(&folder.join("predictions"))?;
+    }
     let stop = watch_interrupts("interrupted; nothing was written")?;
     let began = Instant::now();
     let mut findings: Vec<(&str, Finding)> = Vec::new();
@@ -78,7 +81,6 @@ pub fn run(args: &Args) -> Result<()> {
     let json = format!("{:#}\n", to_json(&findings));
     if let Some(folder) = &args.out {
         let pictures = folder.join("predictions");
-        make_folder(&pictures)?;
         for (_, finding) in &findings {
             for (stem, _, figure) in &finding.pictures {
                 figure.write(&pictures, stem).map_err(anyhow::Error::msg)?;

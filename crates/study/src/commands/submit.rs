@@ -161,5 +161,6 @@ fn directive(path: &Path) -> Result<String> {
     if text.contains(['"', '\\', '\n']) {
         bail!("{text}: Slurm cannot write its logs into a folder of such a name");
     }
-    Ok(format!("\"{text}\""))
+    // A single % begins one of Slurm's patterns.
+    Ok(format!("\"{}\"", text.replace('%', "%%")))
 }

@@ -63,7 +63,10 @@ pub fn folder(file: &Path, out: Option<&PathBuf>) -> PathBuf {
         // A study that stands in its own folder goes on there.
         match file.parent() {
             Some(parent) if stem.as_os_str() == "study" && parent.join("parts").is_dir() => {
-                parent.into()
+                match parent.as_os_str().is_empty() {
+                    true => ".".into(),
+                    false => parent.into(),
+                }
             }
             _ => stem,
         }

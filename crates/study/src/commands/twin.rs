@@ -37,6 +37,9 @@ const EXAMPLES: &str = "Examples:
 /// Simulates the twins and prints how far their sensors are off.
 pub fn run(args: &Args) -> Result<()> {
     let began = Instant::now();
+    if let Some(folder) = &args.out {
+        make_folder(folder)?;
+    }
     let stop = watch_interrupts("interrupted; nothing was written")?;
     let bar = progress(args.seeds * study::twin::CONDITIONS.len() as u64)?;
     let found = twins(args.first_seed, args.seeds, args.jobs, stop, || bar.inc(1))
@@ -50,7 +53,6 @@ pub fn run(args: &Args) -> Result<()> {
     let text = table(&found);
     let json = format!("{:#}\n", to_json(&found));
     if let Some(folder) = &args.out {
-        make_folder(folder)?;
         write_whole(&folder.join("twin.txt"), text.as_bytes())?;
         write_whole(&folder.join("twin.json"), json.as_bytes())?;
     }

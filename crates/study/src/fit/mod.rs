@@ -70,7 +70,7 @@ pub struct Field {
 pub struct Clocks {
     /// Of the rath's clock beside the carriers': stiffness and damping.
     pub no_contact: Option<&'static str>,
-    /// Of the carriers' clocks beside each other and the beat's: pull and gait.
+    /// Of the carriers' clocks beside each other and the beat's: pull, coupling and gait.
     pub no_pull: Option<&'static str>,
 }
 
@@ -78,7 +78,7 @@ impl Clocks {
     fn spoil(&self, name: &str) -> Option<&'static str> {
         match name {
             "stiffness" | "damping" => self.no_contact,
-            "pull" => self.no_pull,
+            "pull" | "coupling" => self.no_pull,
             _ if name.starts_with("gait") => self.no_pull,
             _ => None,
         }
@@ -223,4 +223,16 @@ fn pair(
             })
         })
         .collect()
+}
+
+#[test]
+fn what_rests_on_several_clocks_has_none_where_they_differ() {
+    let clocks = Clocks {
+        no_pull: Some("apart"),
+        ..Clocks::default()
+    };
+    for name in ["pull", "coupling", "gait 1"] {
+        assert_eq!(clocks.spoil(name), Some("apart"), "{name}");
+    }
+    assert_eq!(clocks.spoil("beat"), None);
 }

@@ -12,14 +12,15 @@ use recording::import::{ImportOptions, ingest};
 use recording::read::{ReadOptions, Recording};
 use recording::write::{RecordingWriter, WriterOptions};
 use sim::scene::Scene;
+use std::collections::HashMap;
 use std::path::Path;
 
 /// What a recording says beside its columns.
 pub struct Told {
     /// Its window of analysis.
     pub window: Window,
-    /// The scene that it was made from, where one is attached.
-    pub scene: Option<Scene>,
+    /// The scene that it was made from, where one is attached, or why that cannot be read.
+    pub scene: Option<Result<Scene, String>>,
     /// Where its scene's time 0 lies after its first message, s.
     pub zero_s: f64,
     /// What is lost, where it is damaged: one sentence.
@@ -84,11 +85,10 @@ impl Field {
             .into_iter()
             .partition(|signal| signal.path.starts_with(COMPRESSION));
         signals.sort_by(|a, b| natural(&a.path, &b.path));
-        let forces = analysis.inputs.force_times().len();
-        let compression_m: Vec<Vec<f64>> = signals
-            .into_iter()
-            .map(|s| s.values)
-            .filter(|v| v.len() == forces)
+        let start_ns = recording.info().start_ns;
+        let forces_s = analysis.inputs.force_times();
+        let compression_m: Vec<Vec<f64>> = (signals.iter())
+            .filter_map(|s| at_times(&s.times_s(start_ns), &s.values, forces_s))
             .collect();
         if analysis.inputs.t_s.is_empty() {
             return Err(anyhow!(
@@ -96,15 +96,14 @@ impl Field {
             ));
         }
         // Whoever writes states and phases says when they were, in the time of their scene.
-        let start_ns = recording.info().start_ns;
         let zero_s = (OWN_TIMES.iter())
             .filter_map(|path| own_times.iter().find(|signal| signal.path == *path))
             .filter_map(|s| Some(s.times_s(start_ns).first()? - s.values.first()?))
             .find(|zero_s| zero_s.is_finite());
-        let scene = recording
-            .attachment("scene.toml")
-            .and_then(|text| String::from_utf8(text).ok())
-            .and_then(|text| sim::scene::parse("scene.toml", &text, &[]).ok());
+        let scene = recording.attachment("scene.toml").map(|bytes| {
+            let text = String::from_utf8(bytes).map_err(|_| "it is no text".to_owned())?;
+            sim::scene::parse("scene.toml", &text, &[]).map_err(|e| e.to_string())
+        });
         let (inputs, quality) = (&analysis.inputs, &analysis.quality);
         let of_kind = |kind: &'static str| {
             let of = quality.iter().filter(move |q| q.kind == kind);
@@ -149,4 +148,28 @@ impl Field {
         };
         Ok((field, told))
     }
+}
+
+/// What stands at each of `wanted_s`, the first of those at one time; `None` where one of them has nothing. A repeated message is one of the forces once.
+fn at_times(t_s: &[f64], x: &[f64], wanted_s: &[f64]) -> Option<Vec<f64>> {
+    if t_s == wanted_s {
+        return Some(x.to_vec());
+    }
+    let mut at = HashMap::with_capacity(x.len());
+    for (t, x) in t_s.iter().zip(x) {
+        at.entry(t.to_bits()).or_insert(*x);
+    }
+    let found = wanted_s.iter().map(|t| at.get(&t.to_bits()).copied());
+    found.collect()
+}
+
+#[test]
+fn a_message_that_is_there_twice_counts_once() {
+    let found = at_times(
+        &[0.0, 0.1, 0.1, 0.2],
+        &[1.0, 2.0, 2.5, 3.0],
+        &[0.0, 0.1, 0.2],
+    );
+    assert_eq!(found, Some(vec![1.0, 2.0, 3.0]));
+    assert_eq!(at_times(&[0.0, 0.2], &[1.0, 3.0], &[0.0, 0.1, 0.2]), None);
 }

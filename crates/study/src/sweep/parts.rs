@@ -18,6 +18,7 @@ use recording::whole::Sink;
 use sim::record::VERSION;
 use std::io::{BufWriter, Write};
 use std::ops::Range;
+use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::path::{Path, PathBuf};
 use std::sync::atomic::AtomicBool;
 use std::time::Duration;
@@ -239,7 +240,7 @@ impl<'p> Store<'p> {
         }
         let damaged =
             |why: ParquetError| NoPart::Damaged(format!("{}: is damaged: {why}", path.display()));
-        let part = Reader::open(&path).map_err(damaged)?;
+        let part = unharmed(|| Reader::open(&path)).map_err(damaged)?;
         for (name, expected) in &self.notes() {
             let there = part.note(name).unwrap_or_default();
             if there != expected {
@@ -257,7 +258,9 @@ impl<'p> Store<'p> {
                 return Err(NoPart::Foreign(foreign));
             }
         }
-        self.rows(block, &part).map(Some).map_err(damaged)
+        unharmed(|| self.rows(block, &part))
+            .map(Some)
+            .map_err(damaged)
     }
 
     fn recordings(&self) -> PathBuf {
@@ -555,4 +558,17 @@ pub fn write_whole(
         };
         format!("{}: cannot be written: {why}", path.display())
     })
+}
+
+/// What `read` gives. A flipped bit may make the library that reads pages break off, which is damage like any other.
+fn unharmed<T>(read: impl FnOnce() -> Result<T, ParquetError>) -> Result<T, ParquetError> {
+    catch_unwind(AssertUnwindSafe(read))
+        .unwrap_or_else(|_| Err(ParquetError::General("its pages make no sense".into())))
+}
+
+#[test]
+fn a_library_that_breaks_off_over_a_part_leaves_it_damaged() {
+    let error = unharmed::<()>(|| panic!("no decoder")).unwrap_err();
+    assert!(error.to_string().contains("no sense"), "{error}");
+    assert_eq!(unharmed(|| Ok(1)).unwrap(), 1);
 }

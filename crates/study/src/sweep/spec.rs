@@ -161,7 +161,12 @@ fn check(spec: &mut Spec) -> Result<(), String> {
             ));
         }
         let name = &spec.axes[k].name;
+        let of_metric = name.rsplit_once('.').is_some_and(|(metric, what)| {
+            super::summary::PARTS.contains(&what) && spec.metrics.iter().any(|m| m == metric)
+        });
         let taken = super::FIXED_COLUMNS.contains(&name.as_str())
+            || ["runs", "remarked"].contains(&name.as_str())
+            || of_metric
             || spec.metrics.contains(name)
             || spec.axes[..k].iter().any(|a| a.name == *name);
         if let Some((key, other, before)) = said_twice(&spec.axes[..=k]) {
@@ -292,6 +297,10 @@ fn check_axis(axis: &Axis) -> Result<(), String> {
         (false, None, None) if axis.count.is_none() => {
             if !axis.along.is_empty() && axis.values.iter().any(|v| number(v).is_none()) {
                 return Err("`with` needs numbers in `values`".into());
+            }
+            let factor = |v: &toml::Value| number(v).is_some_and(|x| x > 0.0);
+            if axis.spacing == Spacing::Log && !axis.values.iter().all(factor) {
+                return Err("equal factors need numbers above zero in `values`".into());
             }
             Ok(())
         }

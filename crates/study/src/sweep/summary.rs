@@ -111,7 +111,7 @@ impl Range {
 }
 
 /// What stands in the table of points of each metric, behind its name and a dot, which no name of a metric has.
-const PARTS: [&str; 7] = ["mean", "sd", "ci95", "q05", "q50", "q95", "n"];
+pub(super) const PARTS: [&str; 7] = ["mean", "sd", "ci95", "q05", "q50", "q95", "n"];
 
 /// The summary of a study. Only the rows of one point are held at a time; a study of sensitivity keeps the means.
 pub struct Summary<W: Write> {
