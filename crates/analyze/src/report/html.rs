@@ -246,7 +246,7 @@ fn metrics_section(out: &mut String, a: &Analysis) {
     let known = |missing: bool| {
         let all = a.metrics.iter();
         all.filter(move |(_, value)| (value.datum == Datum::Missing) == missing)
-            .filter_map(|(name, value)| Some((name, value, metrics::find(name)?)))
+            .map(|(name, value)| (name, value, metrics::find(name)))
     };
     if known(false).count() > 0 {
         let _ = writeln!(
@@ -261,7 +261,8 @@ fn metrics_section(out: &mut String, a: &Analysis) {
             } else {
                 value.unit
             };
-            let mut more = definition(name, metric);
+            // What is held against a truth that the file brings has a name alone.
+            let mut more = metric.map_or_else(String::new, |metric| definition(name, metric));
             if let Some(reason) = &value.reason {
                 let _ = write!(more, "<p>{}</p>", escaped(reason));
             }
@@ -284,7 +285,7 @@ fn metrics_section(out: &mut String, a: &Analysis) {
             let _ = writeln!(
                 out,
                 "<tr><td><details><summary>{}</summary>{more}</details></td><td class=\"n\">{}</td><td>{unit}</td><td>{}</td></tr>",
-                escaped(metric.label),
+                escaped(metric.map_or(name, |metric| metric.label)),
                 shown(&value.datum),
                 escaped(&value.source)
             );
@@ -308,8 +309,8 @@ fn metrics_section(out: &mut String, a: &Analysis) {
         let _ = writeln!(
             out,
             "<tr><td><details><summary>{}</summary>{}</details></td><td>{}</td></tr>",
-            escaped(metric.label),
-            definition(name, metric),
+            escaped(metric.map_or(name, |metric| metric.label)),
+            metric.map_or_else(String::new, |metric| definition(name, metric)),
             escaped(value.reason.as_deref().unwrap_or(""))
         );
     }
@@ -441,6 +442,7 @@ fn recording_section(out: &mut String, a: &Analysis) {
         );
     }
     out.push_str("</tbody></table></div>\n");
+    out.push_str(&first(a.topics.len(), 500));
     if !a.roles.is_empty() {
         out.push_str("<p>Who plays which role:</p>\n<div class=\"scroll\"><table><tbody>\n");
         for (role, players) in &a.roles {

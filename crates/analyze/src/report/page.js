@@ -75,7 +75,8 @@
       this.listen();
     }
     get x() { return (this.spec.time ? shared : this.range) || this.full; }
-    set x(r) { if (this.spec.time) { shared = r; for (const p of plots) if (p.spec.time) p.draw(); } else { this.range = r; this.draw(); } }
+    // Nearer than a ten-thousandth of the whole there is nothing to see, and numbers run out.
+    set x(r) { if (r && !(r[1] - r[0] > (this.full[1] - this.full[0]) * 1e-4)) return; if (this.spec.time) { shared = r; for (const p of plots) if (p.spec.time) p.draw(); } else { this.range = r; this.draw(); } }
 
     yRange(x0, x1) {
       if (this.spec.image) return this.spec.y_range;
@@ -249,7 +250,8 @@
       svg.addEventListener("pointerup", e => {
         const v = at(e), from = start;
         start = null;
-        if (from === null || Math.abs(this.sx(v) - this.sx(from)) <= 6) { this.zoom.setAttribute("visibility", "hidden"); return; }
+        this.zoom.setAttribute("visibility", "hidden");
+        if (from === null || Math.abs(this.sx(v) - this.sx(from)) <= 6) return;
         this.x = [Math.max(this.full[0], Math.min(from, v)), Math.min(this.full[1], Math.max(from, v))];
       });
       svg.addEventListener("pointercancel", () => { start = null; this.zoom.setAttribute("visibility", "hidden"); });
@@ -268,7 +270,7 @@
         if (!to) return;
         e.preventDefault();
         const r = [Math.max(this.full[0], to[0]), Math.min(this.full[1], to[1])];
-        if (r[1] - r[0] > (this.full[1] - this.full[0]) * 1e-4) this.x = r;
+        this.x = r;
       });
     }
   }

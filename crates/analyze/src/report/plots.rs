@@ -10,6 +10,7 @@ use crate::spectrum::{Mode, Options, spectrogram};
 use crate::spline::derivatives;
 use crate::summary::{moves, rounding};
 use recording::{text::counted, topics};
+use std::collections::BTreeMap;
 use std::ops::Range;
 
 /// Okabe and Ito's colours, distinct to every kind of colour vision (jfly, 2008); black comes last: it vanishes on dark paper.
@@ -356,10 +357,13 @@ fn bundled(columns: &[Vec<f64>]) -> [(&'static str, Vec<f64>); 3] {
 
 /// Onset, beat and locking always; other kinds while they are few.
 fn marks(a: &Analysis) -> Vec<(f64, String)> {
-    let count = |kind: &str| a.events.iter().filter(|e| e.kind == kind).count();
+    let mut count: BTreeMap<&str, usize> = BTreeMap::new();
+    for e in &a.events {
+        *count.entry(e.kind).or_default() += 1;
+    }
     a.events
         .iter()
-        .filter(|e| count(e.kind) <= MOST_MARKS && e.kind != "jump")
+        .filter(|e| count[e.kind] <= MOST_MARKS && e.kind != "jump")
         .map(|e| (e.t_s, e.kind.replace('_', " ")))
         .collect()
 }

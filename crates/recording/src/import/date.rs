@@ -43,9 +43,9 @@ fn read_date(cell: &str, clock: &mut Wrapping) -> Option<i64> {
     if cell.find(':')? > 2 {
         return nanoseconds(&cell);
     }
-    // The last colon of four parts stands for the point.
+    // Behind the last colon of four parts stand milliseconds, with or without zeros before them.
     let time = match cell.rsplit_once(':') {
-        Some((whole, part)) if whole.matches(':').count() == 2 => format!("{whole}.{part}"),
+        Some((whole, part)) if whole.matches(':').count() == 2 => format!("{whole}.{part:0>3}"),
         _ => cell,
     };
     let padding = if time.find(':')? == 1 { "0" } else { "" };
@@ -88,6 +88,9 @@ mod tests {
             ("00:00:00.25", 24 * hour + 250_000_000),
             ("23:59:59.75", 24 * hour - 250_000_000),
             ("01:00:00", 25 * hour),
+            ("01:00:01:0", 25 * hour + 1_000_000_000),
+            ("01:00:01:10", 25 * hour + 1_010_000_000),
+            ("01:00:01:250", 25 * hour + 1_250_000_000),
         ] {
             assert_eq!(read_date(text, &mut one), Some(ns), "{text}");
         }

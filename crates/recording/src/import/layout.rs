@@ -84,7 +84,7 @@ impl TimeUnit {
 struct Vector {
     columns: [String; 3],
     unit: String,
-    #[serde(default = "one")]
+    #[serde(default = "one", deserialize_with = "sign")]
     sign: f64,
     /// Its columns may be missing.
     #[serde(default)]
@@ -93,6 +93,16 @@ struct Vector {
 
 fn one() -> f64 {
     1.0
+}
+
+/// Takes a sign.
+fn sign<'de, D: serde::Deserializer<'de>>(from: D) -> Result<f64, D::Error> {
+    match f64::deserialize(from)? {
+        x if x.abs() == 1.0 => Ok(x),
+        x => Err(serde::de::Error::custom(format!(
+            "sign: found {x}, expected 1 or -1"
+        ))),
+    }
 }
 
 /// Finds a layout: a built-in name, or a file.
