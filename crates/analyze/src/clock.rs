@@ -13,6 +13,7 @@ use crate::inputs::{Window, interpolate};
 use crate::median::median;
 use crate::spectrum::{Complex64, rfft};
 use realfft::RealFftPlanner;
+use std::ops::Range;
 
 /// What is known about a device's clock against the reference's.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -93,6 +94,16 @@ pub enum ClockError {
         /// Best correlation.
         best: f64,
     },
+    /// A motion that fits in two ways.
+    #[error(
+        "what both felt repeats itself, and fits at {first_s:+.3} s and at {second_s:+.3} s alike"
+    )]
+    Repeats {
+        /// One offset, s.
+        first_s: f64,
+        /// Another, s.
+        second_s: f64,
+    },
     /// Events that fit in two ways.
     #[error(
         "{paired} events fit at {first_s:+.3} s and at {second_s:+.3} s alike; events at uneven intervals are needed"
@@ -132,7 +143,7 @@ const WINDOW_S: f64 = 10.0;
 /// some 25 Hz or more and hold motion throughout, not only at one end.
 ///
 /// # Errors
-/// When the two overlap by less than 5 s or do not match.
+/// When the two overlap by less than 5 s, do not match, or match at several offsets.
 pub fn from_signals(
     (t_s, x): (&[f64], &[f64]),
     (u_s, y): (&[f64], &[f64]),
@@ -144,7 +155,8 @@ pub fn from_signals(
     };
     let (start, end) = (a.0.min(b.0), a.1.max(b.1));
     let found_s = a.1.min(b.1) - a.0.max(b.0);
-    if found_s + search_s < 5.0 || a.1 - a.0 < 5.0 || b.1 - b.0 < 5.0 {
+    let short = |s: f64| s < LEAST_SHARED_S;
+    if short(found_s + search_s) || short(a.1 - a.0) || short(b.1 - b.0) {
         return Err(ClockError::TooShort {
             found_s: found_s.max(0.0),
         });
@@ -153,10 +165,19 @@ pub fn from_signals(
     let grid: Vec<f64> = (0..n).map(|k| start + k as f64 / RATE_HZ).collect();
     let x = inside(&grid, t_s, x);
     let y = inside(&grid, u_s, y);
-    let (lag, best) = best_lag(&x, &y, (search_s * RATE_HZ) as usize);
-    if best < 0.5 {
+    let tops = best_lags(&x, &y, (search_s * RATE_HZ) as usize);
+    let best = tops.first().map_or(0.0, |top| top.correlation);
+    let Some(top) = tops.first().filter(|_| best >= 0.5) else {
         return Err(ClockError::NoMatch { best });
+    };
+    let as_well = |other: &&Top| top.unexplained() > BETTER * other.unexplained();
+    if let Some(other) = tops[1..].iter().find(as_well) {
+        return Err(ClockError::Repeats {
+            first_s: top.lag / RATE_HZ,
+            second_s: other.lag / RATE_HZ,
+        });
     }
+    let lag = top.lag;
     // Window by window, near the lag of the whole.
     let width = (WINDOW_S * RATE_HZ) as usize;
     let coarse = lag.round() as i64;
@@ -166,9 +187,9 @@ pub fn from_signals(
     while first + width <= n {
         let from = first as i64 + coarse - reach as i64;
         if from >= 0 && from as usize + width + 2 * reach <= n {
-            let q = &y[from as usize..from as usize + width + 2 * reach];
+            let q = &y.values[from as usize..from as usize + width + 2 * reach];
             // A window without motion, or one where only one device was on, has no say.
-            if let Some((shift, match_)) = window_lag(&x[first..first + width], q)
+            if let Some((shift, match_)) = window_lag(&x.values[first..first + width], q)
                 && match_ > 0.8
             {
                 let at = grid[first] + 0.5 * WINDOW_S;
@@ -182,7 +203,7 @@ pub fn from_signals(
         // Two clocks may part by this much from one end of what they share to the other, unseen.
         let unseen_s = 1e-6 * PRIOR_PPM * 0.5 * found_s.max(0.0);
         return Ok(Clock {
-            offset_s: shared_lag(&x, &y, &grid, (a, b), lag) / RATE_HZ,
+            offset_s: lag / RATE_HZ,
             offset_sd_s: TOP_SD_S.hypot(unseen_s),
             drift_ppm: 0.0,
             drift_sd_ppm: None,
@@ -199,94 +220,142 @@ pub fn from_signals(
 }
 
 /// Resampled about its mean; zero where the device was not on.
-fn inside(grid: &[f64], t_s: &[f64], x: &[f64]) -> Vec<f64> {
-    let (first, last) = (t_s[0], t_s[t_s.len() - 1]);
-    let mut out = interpolate(t_s, x, grid);
-    let on = |t: f64| (first..=last).contains(&t);
-    let count = grid.iter().filter(|t| on(**t)).count().max(1);
-    let mean = grid
-        .iter()
-        .zip(&out)
-        .filter(|(t, _)| on(**t))
-        .map(|(_, v)| v)
-        .sum::<f64>()
-        / count as f64;
-    for (t, v) in grid.iter().zip(&mut out) {
-        *v = if on(*t) && v.is_finite() {
-            *v - mean
-        } else {
-            0.0
-        };
+fn inside(grid: &[f64], t_s: &[f64], x: &[f64]) -> Felt {
+    let mut values = interpolate(t_s, x, grid);
+    let on = Window {
+        start_s: t_s[0],
+        end_s: t_s[t_s.len() - 1],
     }
-    out
+    .range(grid);
+    let mean = values[on.clone()].iter().sum::<f64>() / on.len().max(1) as f64;
+    for (k, v) in values.iter_mut().enumerate() {
+        let there = on.contains(&k) && v.is_finite();
+        *v = if there { *v - mean } else { 0.0 };
+    }
+    Felt { on, values }
 }
 
-/// The lag (in samples, refined) by which y is later than x, |lag| ≤ `reach`, and the correlation there.
-fn best_lag(x: &[f64], y: &[f64], reach: usize) -> (f64, f64) {
-    let n = (x.len() + y.len()).next_power_of_two();
+/// A signal about its mean, and the samples where its device was on.
+struct Felt {
+    on: Range<usize>,
+    values: Vec<f64>,
+}
+
+impl Felt {
+    /// Sums of the values and of their squares before each sample.
+    fn sums(&self) -> Vec<[f64; 2]> {
+        let mut sum = [0.0; 2];
+        let each = self.values.iter().map(|v| {
+            sum = [sum[0] + v, sum[1] + v * v];
+            sum
+        });
+        [[0.0; 2]].into_iter().chain(each).collect()
+    }
+}
+
+/// Clocks are compared over no less than this, s, nor over a smaller share of the time that the device was on which was on for less.
+const LEAST_SHARED_S: f64 = 5.0;
+const LEAST_SHARED: f64 = 0.5;
+
+/// The lags by which y may be later than x, |lag| ≤ `reach`: where the correlation is at a maximum, refined, the likeliest first.
+///
+/// ```text
+/// l = argmax −n ln(1 − r²)
+/// ```
+/// r Pearson's correlation of the n samples that both felt at that lag, r > 0, at the top of a parabola: the likelihood of a normal pair against that of two strangers. A device that was
+/// on for a part only is compared over that part, and of a motion that nearly repeats the lag counts that most of it goes with. Source: the
+/// likelihood ratio of a correlation; sums over what is shared as in Padfield, IEEE Trans. Image Process. 21 (2012) 2706.
+fn best_lags(x: &Felt, y: &Felt, reach: usize) -> Vec<Top> {
+    let n = (x.values.len() + y.values.len()).next_power_of_two();
     let pad = |v: &[f64]| {
-        let mean = v.iter().sum::<f64>() / v.len().max(1) as f64;
-        let mut p: Vec<f64> = v.iter().map(|a| a - mean).collect();
+        let mut p = v.to_vec();
         p.resize(n, 0.0);
         p
     };
-    let (px, py) = (pad(x), pad(y));
-    let power = |v: &[f64]| v.iter().map(|a| a * a).sum::<f64>();
-    let scale = (power(&px) * power(&py)).sqrt();
-    if !(scale > 0.0) {
-        return (0.0, 0.0);
-    }
-    let mut cross: Vec<Complex64> = rfft(&px)
+    let mut cross: Vec<Complex64> = rfft(&pad(&x.values))
         .iter()
-        .zip(rfft(&py))
+        .zip(rfft(&pad(&y.values)))
         .map(|(a, b)| a.conj() * b)
         .collect();
     let last = cross.len() - 1;
     (cross[0].im, cross[last].im) = (0.0, 0.0);
     let plan = RealFftPlanner::<f64>::new().plan_fft_inverse(n);
-    let mut correlation = plan.make_output_vec();
+    let mut products = plan.make_output_vec();
     // OK because the lengths are the plan's own and the bins that have to be real are.
-    plan.process(&mut cross, &mut correlation)
+    plan.process(&mut cross, &mut products)
         .expect("buffers of the plan's own length");
-    let at = |lag: i64| correlation[lag.rem_euclid(n as i64) as usize] / n as f64 / scale;
+    let (of_x, of_y) = (x.sums(), y.sums());
+    let shared = |lag: i64| {
+        let from = (x.on.start as i64).max(y.on.start as i64 - lag);
+        let to = (x.on.end as i64).min(y.on.end as i64 - lag);
+        (from, to, to - from)
+    };
+    let least = (LEAST_SHARED * x.on.len().min(y.on.len()) as f64).max(LEAST_SHARED_S * RATE_HZ);
+    let whole = of_x[x.on.end][1] * of_y[y.on.end][1];
+    let at = |lag: i64| {
+        let (from, to, count) = shared(lag);
+        if (count as f64) < least {
+            return 0.0;
+        }
+        let count = count as f64;
+        let over = |sums: &[[f64; 2]], from: i64, to: i64| {
+            let [a, b] = [from, to].map(|k| sums[k as usize]);
+            let sum = b[0] - a[0];
+            [sum, b[1] - a[1] - sum * sum / count]
+        };
+        let [sx, xx] = over(&of_x, from, to);
+        let [sy, yy] = over(&of_y, from + lag, to + lag);
+        let product = products[lag.rem_euclid(n as i64) as usize] / n as f64;
+        // So little is what rounding leaves.
+        match xx * yy > 1e-12 * whole {
+            true => (product - sx * sy / count) / (xx * yy).sqrt(),
+            false => 0.0,
+        }
+    };
     let reach = (reach as i64).min(n as i64 / 2 - 2);
-    let best = (-reach..=reach)
-        .max_by(|a, b| at(*a).total_cmp(&at(*b)))
-        .unwrap_or(0);
-    let (l, c, r) = (at(best - 1), at(best), at(best + 1));
-    let bend = l - 2.0 * c + r;
-    let shift = if bend < 0.0 {
-        0.5 * (l - r) / bend
-    } else {
-        0.0
-    };
-    (best as f64 + shift.clamp(-0.5, 0.5), c)
+    let mut tops = Vec::new();
+    let [mut l, mut c] = [-reach - 1, -reach].map(at);
+    for lag in -reach..=reach {
+        let r = at(lag + 1);
+        if c > 0.0 && c >= l && c > r {
+            let bend = l - 2.0 * c + r;
+            let shift = (0.5 * (l - r) / bend).clamp(-0.5, 0.5);
+            let correlation = (c - 0.25 * (l - r) * shift).min(1.0);
+            tops.push(Top {
+                lag: lag as f64 + shift,
+                correlation,
+                shared: shared(lag).2 as f64,
+            });
+        }
+        (l, c) = (c, r);
+    }
+    tops.sort_by(|a, b| b.tells().total_cmp(&a.tells()));
+    tops
 }
 
-/// A lag (samples) near `lag`, of all that both share: what only one of them felt, more of it the larger a lag is, draws the maximum of the whole
-/// correlation towards none.
-fn shared_lag(x: &[f64], y: &[f64], grid: &[f64], (a, b): (Ends, Ends), lag: f64) -> f64 {
-    let coarse = lag.round();
-    let (late_s, reach) = (coarse / RATE_HZ, (0.3 * RATE_HZ) as usize);
-    let within = Window {
-        start_s: a.0.max(b.0 - late_s + 0.31),
-        end_s: a.1.min(b.1 - late_s - 0.31),
-    };
-    let part = within.range(grid);
-    let from = part.start as i64 + coarse as i64 - reach as i64;
-    let long = part.len() as f64 > RATE_HZ;
-    let found = usize::try_from(from)
-        .ok()
-        .filter(|_| long)
-        .and_then(|from| {
-            let near = y.get(from..from + part.len() + 2 * reach)?;
-            window_lag(x.get(part)?, near)
-        });
-    found.map_or(lag, |(shift, _)| coarse + shift - reach as f64)
+/// A maximum of a correlation over the lag.
+struct Top {
+    /// In samples.
+    lag: f64,
+    correlation: f64,
+    /// Samples that both felt.
+    shared: f64,
 }
 
-/// First and last moment, s.
-type Ends = (f64, f64);
+impl Top {
+    fn unexplained(&self) -> f64 {
+        (1.0 - self.correlation.powi(2)).max(LEAST_UNEXPLAINED)
+    }
+
+    fn tells(&self) -> f64 {
+        -self.shared * self.unexplained().ln()
+    }
+}
+
+/// What signals of one motion leave unexplained of each other, at best, 1: half a sample of [`RATE_HZ`] between straight lines, at 5 Hz.
+const LEAST_UNEXPLAINED: f64 = 1e-4;
+/// Another lag goes as well as the best where that leaves more than this share of what the other leaves unexplained.
+const BETTER: f64 = 0.5;
 
 /// Where in the longer `y` the shorter `x` fits best (samples, refined), and Pearson's correlation there. `None` at the ends of the
 /// search or without motion.
@@ -729,6 +798,30 @@ mod tests {
             assert_eq!((clock.drift_sd_ppm, clock.points), (None, 1));
             assert!((clock.at_s - 0.5 * shared_s).abs() < 1e-9);
         }
+    }
+
+    /// One that was on for a third of a walk whose swing grows and nearly repeats, from its middle on; and the other way round.
+    #[test]
+    fn a_device_that_was_on_for_a_part_is_compared_over_that_part() {
+        let swing = |t: f64| (0.5 + t / 60.0) * (6.8 * t + 0.3 * (0.4 * t).sin()).sin().abs();
+        let t_s: Vec<f64> = (0..12_000).map(|k| f64::from(k) / 200.0).collect();
+        let x: Vec<f64> = t_s.iter().map(|t| swing(*t)).collect();
+        let u_s: Vec<f64> = (0..2000).map(|k| 15.0 + f64::from(k) / 100.0).collect();
+        let y: Vec<f64> = u_s.iter().map(|t| swing(t - 0.15)).collect();
+        for (device, reference, late_s) in [
+            ((&t_s[..], &x[..]), (&u_s[..], &y[..]), 0.15),
+            ((&u_s, &y), (&t_s, &x), -0.15),
+        ] {
+            let clock = from_signals(device, reference, 300.0).unwrap();
+            assert!((clock.offset_s - late_s).abs() < 2e-3, "{clock:?}");
+        }
+        // What repeats itself from turn to turn tells no offset.
+        let x: Vec<f64> = t_s.iter().map(|t| (6.8 * t).sin().abs()).collect();
+        let y: Vec<f64> = u_s.iter().map(|t| (6.8 * t + 1.0).sin().abs()).collect();
+        assert!(matches!(
+            from_signals((&u_s, &y), (&t_s, &x), 300.0),
+            Err(ClockError::Repeats { .. })
+        ));
     }
 
     /// One began when the other had ended, by its own clock.
