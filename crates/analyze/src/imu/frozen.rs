@@ -77,7 +77,7 @@ pub fn frozen(track: &Track) -> Vec<Frozen> {
 }
 
 /// Stretches of equal readings.
-fn runs(readings: &[[f64; 3]]) -> impl Iterator<Item = std::ops::Range<usize>> + '_ {
+pub(super) fn runs(readings: &[[f64; 3]]) -> impl Iterator<Item = std::ops::Range<usize>> + '_ {
     let mut start = 0;
     readings.chunk_by(|a, b| a == b).map(move |run| {
         let range = start..start + run.len();

@@ -1,8 +1,10 @@
-//! Single samples that nothing carried could have felt: a bit that fell over on a wire, a message that was filled with zeros, a register that was read half old and
+//! Samples that nothing carried could have felt: a bit that fell over on a wire, a message that was filled with zeros, a register that was read half old and
 //! half new. One of them turns the attitude and throws the height for seconds, so they count as lost.
 
+use super::frozen::runs;
 use super::track::{Instrument, Track};
 use nalgebra::Vector3;
+use std::ops::Range;
 
 /// So far from both neighbours, in the instrument's unit, on the same side. A fall onto stone is felt by what is carried as up to some 50 m/s² (re-contact after a
 /// float passes 4 g), through a sensor's own low-pass filter, and so over more than one sample: it rises and falls by less than this between them. Nobody turns a
@@ -19,7 +21,7 @@ const AGREE: f64 = 0.25;
 const FELT_M_PER_S2: f64 = 5.0;
 /// Of a rate of nothing: what its neighbours turn by at least, rad/s, about one axis to the same side. A coarse sensor that swings through nought may read zero.
 const TURNED_RAD_PER_S: f64 = 0.2;
-/// Neighbours are no further apart than this, in steps: one more may be lost on either side.
+/// Neighbours are no further apart than this, in steps: one more may be lost on either side of one, or three may be filled with zeros.
 const BESIDE: f64 = 4.5;
 /// With longer steps, s, a whole blow fits between two neighbours.
 const LONGEST_STEP_S: f64 = 0.05;
@@ -27,7 +29,7 @@ const LONGEST_STEP_S: f64 = 0.05;
 /// One line for people.
 pub fn told(count: usize, all: usize) -> String {
     format!(
-        "{count} of {all} samples lie alone beyond what anything carried feels (more than {:.0} {} or {:.0} {} from both neighbours, or nothing at all between others) and count as lost",
+        "{count} of {all} samples lie beyond what anything carried feels (more than {:.0} {} or {:.0} {} from both neighbours, or nothing at all between others) and count as lost",
         beyond(Instrument::Accelerometer),
         Instrument::Accelerometer.unit(),
         beyond(Instrument::Gyroscope),
@@ -35,42 +37,56 @@ pub fn told(count: usize, all: usize) -> String {
     )
 }
 
-/// Which samples are, ascending. None beside another: what comes twice in a row may be a blow.
+/// Which samples are, ascending. No leap beside another: what leaps twice in a row may be a blow.
 pub fn strays(track: &Track) -> Vec<usize> {
     let usual_s = track.period_s().unwrap_or(f64::INFINITY);
     // A clock errs.
     if usual_s > 1.01 * LONGEST_STEP_S {
         return Vec::new();
     }
+    let beside = |a: usize, b: usize| track.t_s[b] - track.t_s[a] < BESIDE * usual_s;
     let is = |k: usize| {
-        let (a, b) = (k - 1, k + 1);
-        let beside = track.t_s[b] - track.t_s[a] < BESIDE * usual_s;
-        beside
-            && (is_empty(track, k)
-                || Instrument::BOTH
-                    .iter()
-                    .any(|of| leaps(track.readings(*of), *of, k)))
+        let leaps = |of: &Instrument| leaps(track.readings(*of), *of, k);
+        beside(k - 1, k + 1) && Instrument::BOTH.iter().any(leaps)
     };
-    let mut found: Vec<usize> = (1..track.len().saturating_sub(1))
-        .filter(|k| is(*k))
-        .collect();
+    let inner = 1..track.len().saturating_sub(1);
+    let mut found: Vec<usize> = inner.clone().filter(|k| is(*k)).collect();
     let all = found.clone();
     found.retain(|k| ![k - 1, k + 1].iter().any(|k| all.binary_search(k).is_ok()));
+    for of in Instrument::BOTH {
+        let within = |run: &Range<usize>| run.start >= inner.start && run.end <= inner.end;
+        let empty = runs(track.readings(of))
+            .filter(|run| within(run) && beside(run.start - 1, run.end))
+            .filter(|run| is_empty(track, of, run));
+        found.extend(empty.flatten());
+    }
+    found.sort_unstable();
+    found.dedup();
     found
 }
 
-/// A reading of nothing at all, of either instrument, between others of something.
-fn is_empty(track: &Track, k: usize) -> bool {
-    let about = |of| [k - 1, k, k + 1].map(|k| Vector3::from(track.readings(of)[k]));
-    let felt = about(Instrument::Accelerometer);
-    let turned = about(Instrument::Gyroscope);
-    let feels = |v: Vector3<f64>| v.norm() > FELT_M_PER_S2;
-    let along = turned[0].dot(&turned[2]);
-    let least = turned[0].norm().min(turned[2].norm());
-    (felt[1] == Vector3::zeros() && feels(felt[0]) && feels(felt[2]))
-        || (turned[1] == Vector3::zeros()
-            && least > TURNED_RAD_PER_S
-            && along > 0.5 * turned[0].norm() * turned[2].norm())
+/// Readings of nothing at all between others of something. An accelerometer may float; a message that was filled with zeros lacks the rate too.
+fn is_empty(track: &Track, of: Instrument, run: &Range<usize>) -> bool {
+    let [before, behind] = [run.start - 1, run.end];
+    let read = |of, k: usize| Vector3::from(track.readings(of)[k]);
+    let nothing = |of| run.clone().all(|k| read(of, k) == Vector3::zeros());
+    let [a, b] = [before, behind].map(|k| read(Instrument::Gyroscope, k));
+    if !nothing(of) {
+        return false;
+    }
+    match of {
+        Instrument::Gyroscope => {
+            let (a_turns, b_turns) = (a.norm(), b.norm());
+            a_turns.min(b_turns) > TURNED_RAD_PER_S && a.dot(&b) > 0.5 * a_turns * b_turns
+        }
+        Instrument::Accelerometer => {
+            let feels = |k| read(of, k).norm() > FELT_M_PER_S2;
+            let turns = a != Vector3::zeros() && b != Vector3::zeros();
+            feels(before)
+                && feels(behind)
+                && (run.len() == 1 || (turns && nothing(Instrument::Gyroscope)))
+        }
+    }
 }
 
 fn leaps(x: &[[f64; 3]], of: Instrument, k: usize) -> bool {
@@ -123,6 +139,33 @@ mod tests {
         track.accel_m_per_s2[100] = [0.0, 0.0, -156.9];
         let beside = track.without(&[99]);
         assert_eq!(strays(&beside), [99, fast - 1]);
+    }
+
+    /// A dropout of the gyroscope, and messages filled with zeros, two and three in a row; not four, nor where it swings through nought.
+    #[test]
+    fn zeros_in_a_row_are_found() {
+        let whole = swaying(100.0);
+        let turns = |k: usize| whole.gyro_rad_per_s[k][0].abs();
+        let fast = |from: usize| (from..1000).find(|k| turns(*k) > 1.8).unwrap();
+        let slow = |from: usize| (from..1000).find(|k| turns(*k) < 0.05).unwrap();
+        let (two, three, four) = (fast(100), fast(200), fast(300));
+        let (filled, through) = (slow(400), slow(500));
+        let mut track = whole.clone();
+        for (from, count) in [
+            (two, 2),
+            (three, 3),
+            (four, 4),
+            (through - 1, 3),
+            (filled, 2),
+        ] {
+            track.gyro_rad_per_s[from..from + count].fill([0.0; 3]);
+        }
+        track.accel_m_per_s2[filled..filled + 2].fill([0.0; 3]);
+        let found = [two..two + 2, three..three + 3, filled..filled + 2];
+        assert_eq!(
+            strays(&track),
+            found.into_iter().flatten().collect::<Vec<_>>()
+        );
     }
 
     /// Blows of one sample and of two, one that leaves the sensor elsewhere, a buzz, free flight, and all that at 10 Hz.
