@@ -90,7 +90,8 @@ impl Arrivals {
     fn by_stamps(&self, start_ns: i64, mut rows: Vec<usize>) -> Option<Axis> {
         let stamp_ns = &self.stamp_ns;
         rows.dedup_by_key(|r| stamp_ns[*r]);
-        let first_ns = stamp_ns[*rows.first()?];
+        // A clock that is not set yet says 0.
+        let first_ns = rows.iter().map(|r| stamp_ns[*r]).find(|ns| *ns != 0)?;
         let log_s = self.log_s(&rows, start_ns);
         let mut stamps: Vec<f64> = rows
             .iter()
@@ -101,6 +102,8 @@ impl Arrivals {
         let dated = dated(log_s, Some(stamps));
         let own_s = dated.own_s();
         let Dated { t_s, remark, .. } = dated;
+        let known = t_s.into_iter().zip(rows).filter(|(t, _)| t.is_finite());
+        let (t_s, rows) = known.unzip();
         let axis = |remark| Axis {
             own_s,
             ..Axis::new(t_s, rows, vec![remark])

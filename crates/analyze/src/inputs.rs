@@ -307,8 +307,10 @@ fn even(t_s: &[f64], step_s: f64) -> bool {
 
 /// Times and values of what is finite.
 pub fn finite(t_s: &[f64], x: &[f64]) -> (Vec<f64>, Vec<f64>) {
-    let known = t_s.iter().zip(x).filter(|(_, x)| x.is_finite());
-    known.unzip()
+    let known = t_s.iter().zip(x);
+    known
+        .filter(|(t, x)| t.is_finite() && x.is_finite())
+        .unzip()
 }
 
 /// A signal about its mean on an even axis, 0 in its holes.

@@ -11,6 +11,7 @@
 use crate::imu::track::period_s;
 use crate::inputs::{mean_step_in, stretches};
 use crate::median::median;
+use recording::text::counted;
 use std::fmt::{self, Display, Formatter};
 use std::ops::Range;
 
@@ -46,7 +47,12 @@ const LEAST_TWICE_S: f64 = 0.3;
 const LEAP_S: f64 = 0.02;
 const LEAP: f64 = 10.0;
 
-/// Times of the samples, s, ascending or not; and what was done, where that is worth a word.
+/// More stamps astray than this share are no exceptions: none is believed then.
+const EXCEPTIONS: f64 = 0.01;
+/// Kind of the remark that stamps tell the times.
+const BY_STAMPS: &str = "by_stamps";
+
+/// Times of the samples, s, ascending or not, NaN where nothing tells them; and what was done, where that is worth a word.
 pub struct Dated {
     /// When.
     pub t_s: Vec<f64>,
@@ -71,8 +77,64 @@ pub fn ends_s(t_s: impl Iterator<Item = f64>) -> Option<(f64, f64)> {
         .reduce(|a, b| (a.0.min(b.0), a.1.max(b.1)))
 }
 
-/// From log times (s since the recording begins) and, where every sample has one, header stamps (s, moved by [`delay_s`]), in the order of the log.
+/// From log times (s since the recording begins) and, where every sample has one, header stamps (s, moved by [`delay_s`]), in the order of the log. Samples
+/// whose stamps are [`astray`] have no time where stamps tell it.
 pub fn dated(log_s: Vec<f64>, stamp_s: Option<Vec<f64>>) -> Dated {
+    let stamp_s = stamp_s.filter(|s| s.len() == log_s.len());
+    let strays = stamp_s
+        .as_ref()
+        .map_or_else(Vec::new, |s| astray(&log_s, s));
+    if strays.is_empty() {
+        return dated_by_all(log_s, stamp_s);
+    }
+    let others = |x: &[f64]| {
+        let others = (0..x.len()).filter(|k| strays.binary_search(k).is_err());
+        others.map(|k| x[k]).collect::<Vec<f64>>()
+    };
+    let found = dated_by_all(others(&log_s), stamp_s.as_deref().map(others));
+    if found.remark.as_ref().is_none_or(|said| said.0 != BY_STAMPS) {
+        return dated_by_all(log_s, None);
+    }
+    let mut known = found.t_s.iter().copied();
+    let t_s = (0..log_s.len()).map(|k| match strays.binary_search(&k) {
+        Ok(_) => f64::NAN,
+        Err(_) => known.next().unwrap_or(f64::NAN),
+    });
+    Dated {
+        t_s: t_s.collect(),
+        remark: found.remark.map(|(kind, text)| {
+            let count = counted(strays.len() as u64, "stamp lies", "stamps lie");
+            (
+                kind,
+                format!("{text}; {count} alone and far off: what was stamped so is left out"),
+            )
+        }),
+        ..found
+    }
+}
+
+/// Stamps that leap from those before and behind them by more than a tenth of the log, and back, ascending: nobody filled them in. A clock that is set anew does
+/// not go back at the next sample, and no message is that late.
+fn astray(log_s: &[f64], stamp_s: &[f64]) -> Vec<usize> {
+    let step_s = |a: usize, b: usize| stamp_s[b] - stamp_s[a];
+    let n = stamp_s.len();
+    let mut steps: Vec<f64> = (1..n).map(|k| step_s(k - 1, k)).collect();
+    let by_stamps_s = median(&mut steps).unwrap_or(0.0).abs() * n as f64;
+    let far_s = SAME_SPAN * span_s(log_s).max(by_stamps_s);
+    let alone = |k: &usize| {
+        let before = k.checked_sub(1).map(|b| step_s(b, *k));
+        let behind = (k + 1 < n).then(|| step_s(k + 1, *k));
+        let [a, b] = [before.or(behind), behind.or(before)].map(Option::unwrap_or_default);
+        a.abs().min(b.abs()) > far_s && a * b > 0.0
+    };
+    let mut found: Vec<usize> = (0..n).filter(alone).collect();
+    if found.len() as f64 > EXCEPTIONS * n as f64 {
+        found.clear();
+    }
+    found
+}
+
+fn dated_by_all(log_s: Vec<f64>, stamp_s: Option<Vec<f64>>) -> Dated {
     let of_log = scatter_s(&log_s);
     if let Some(mut stamp_s) =
         stamp_s.filter(|s| s.len() == log_s.len() && s.iter().all(|s| s.is_finite()))
@@ -94,7 +156,7 @@ pub fn dated(log_s: Vec<f64>, stamp_s: Option<Vec<f64>>) -> Dated {
                 overtaken,
                 own_pace: true,
                 remark: Some((
-                    "by_stamps",
+                    BY_STAMPS,
                     format!(
                         "samples are dated by their header stamps, which span {:.3} s, the log times {:.3} s (written at once, or beside a simulation or a replay?); rates and lines of single signals are by the log",
                         spans[0], spans[1]
@@ -109,7 +171,7 @@ pub fn dated(log_s: Vec<f64>, stamp_s: Option<Vec<f64>>) -> Dated {
                 overtaken,
                 own_pace: false,
                 remark: Some((
-                    "by_stamps",
+                    BY_STAMPS,
                     format!(
                         "samples are dated by their header stamps, whose steps scatter by {:.2} ms, those of the log times by {:.2} ms{}",
                         1e3 * of_stamps,
@@ -505,6 +567,38 @@ mod tests {
         for stamps in [vec![0.0; 6000], taken.iter().map(|t| 1e-3 * t).collect()] {
             assert_eq!(dated(log.clone(), Some(stamps)).t_s, log);
         }
+    }
+
+    /// Late samples of which one in two thousand has a stamp that nobody filled in, or one from elsewhere, first and last among them: these alone have no time.
+    #[test]
+    fn a_stamp_astray_costs_its_own_sample() {
+        let mut random = Random(3);
+        let taken: Vec<f64> = (0..6000).map(|k| 0.01 * f64::from(k)).collect();
+        let late = |t: &f64| t + 0.002 - 0.003 * (1.0 - random.uniform()).ln();
+        let late: Vec<f64> = taken.iter().map(late).collect();
+        for at in [vec![0], vec![3000], vec![1500, 4000, 5999]] {
+            for astray_s in [-1.7e9, 40.0, 9e9] {
+                let mut stamps = taken.clone();
+                at.iter().for_each(|k| stamps[*k] += astray_s);
+                let found = dated(late.clone(), Some(stamps));
+                let (kind, said) = found.remark.expect("a remark");
+                assert!(
+                    kind == "by_stamps" && said.contains("alone and far off"),
+                    "{said}"
+                );
+                let lost: Vec<usize> = (0..6000).filter(|k| found.t_s[*k].is_nan()).collect();
+                assert_eq!(lost, at);
+                let known = found.t_s.iter().zip(&taken).filter(|(t, _)| t.is_finite());
+                let off = known
+                    .map(|(t, k)| (t - k - 0.002).abs())
+                    .fold(0.0, f64::max);
+                assert!(off < 5e-5, "{off}");
+            }
+        }
+        // Where the log's times do, none is lost.
+        let mut stamps = taken.clone();
+        stamps[3000] = -1.7e9;
+        assert_eq!(dated(taken.clone(), Some(stamps)).t_s, taken);
     }
 
     #[test]
