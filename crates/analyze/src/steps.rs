@@ -42,7 +42,7 @@ pub const SHORTEST_S: f64 = 5.0;
 const LEAST_SHARE: f64 = 0.05;
 const GAP_S: f64 = 10.0;
 /// What straight lines may bridge of a swing that lasts a third of a second and more, s.
-const BRIDGED_S: f64 = 0.2;
+pub(crate) const BRIDGED_S: f64 = 0.2;
 /// A swing is the RMS over so long, s. Within half of that of where it falls silent the band rings on.
 const SWING_OVER_S: f64 = 2.0;
 /// So near the ends of a record an analytic signal errs, s.
@@ -431,11 +431,17 @@ fn median_rate(at: &[f64]) -> Option<f64> {
     (gaps.len() >= 2).then(|| RATE_HZ / quantile(&gaps, 0.5))
 }
 
+/// Intervals between ascending steps, pauses left out, s.
+pub fn walked_s(step_s: &[f64]) -> Vec<f64> {
+    let mut gaps: Vec<f64> = step_s.windows(2).map(|w| w[1] - w[0]).collect();
+    let usual = quantile(&gaps, 0.5);
+    gaps.retain(|g| *g < 1.7 * usual);
+    gaps
+}
+
 /// Steps per second: one over the mean interval, pauses left out; and 1.96 standard errors of it, Hz. Of at least three steps, ascending, s.
 pub fn rate_of(step_s: &[f64]) -> (f64, f64) {
-    let gaps: Vec<f64> = step_s.windows(2).map(|w| w[1] - w[0]).collect();
-    let median = quantile(&gaps, 0.5);
-    let walked: Vec<f64> = gaps.into_iter().filter(|g| *g < 1.7 * median).collect();
+    let walked = walked_s(step_s);
     let n = walked.len().max(1) as f64;
     let mean = walked.iter().sum::<f64>() / n;
     let variance = walked.iter().map(|g| (g - mean).powi(2)).sum::<f64>() / (n - 1.0).max(1.0);

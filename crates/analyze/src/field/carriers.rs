@@ -10,11 +10,11 @@ use crate::imu::track::{BRIDGED_S, period_s};
 use crate::imu::vertical::height;
 use crate::inputs::{Clocks, Window, interpolate, mean_step_s, stretches};
 use crate::median::median;
-use crate::metrics::{Datum, Metrics, Need, find};
+use crate::metrics::{Datum, Metrics, Need, Value, find};
 use crate::phase::{hilbert, order_parameter};
 use crate::quality::Quality;
 use crate::spectrum::Complex64;
-use crate::steps::{StepError, Steps, steps_in};
+use crate::steps::{self, StepError, Steps, steps_in, walked_s};
 use nalgebra::{UnitQuaternion, Vector3};
 
 /// How far clocks have to part to be put right, s: less cannot be told from a true lag between steps.
@@ -408,6 +408,89 @@ impl Carriers {
             .collect()
     }
 
+    /// Gives the interval of the step rate what its carriers' sensors do not tell of the window: their rates then are to the others as those of parts so long are to
+    /// each other.
+    ///
+    /// ```text
+    /// δ = 1.96/N Σ s_j σ_j
+    /// ```
+    /// s_j the share of the window that sensor j does not tell, σ_j the RMS of what the rates of parts of that length, a fifth of the window at most, differ by from
+    /// their walker's mean (Hz), N the carriers who count. Added up, for a tempo that changes does so for all. Where they lack more than a fifth of all that N
+    /// would tell there is none: see [`by_holes`].
+    pub fn rate_by_holes(&self, value: &mut Value, window: Window) {
+        let Some([low, high]) = value.ci95 else {
+            return;
+        };
+        let on = |worn: &Worn, steps: &Steps| {
+            let common = |t: &f64| t - worn.ahead_s;
+            Some([
+                steps.t_s.first().map(common)?,
+                steps.t_s.last().map(common)?,
+            ])
+        };
+        let walking = || {
+            self.worn
+                .iter()
+                .filter_map(|w| Some((w, w.steps.as_ref().ok()?)))
+        };
+        let ends: Vec<[f64; 2]> = walking().filter_map(|(w, s)| on(w, s)).collect();
+        let first_s = ends.iter().map(|on| on[0]).fold(f64::MAX, f64::min);
+        let last_s = ends.iter().map(|on| on[1]).fold(f64::MIN, f64::max);
+        let window = Window {
+            start_s: window.start_s.max(first_s),
+            end_s: window.end_s.min(last_s),
+        };
+        let whole_s = window.end_s - window.start_s;
+        // What one took between steps, and what one's sensor does not tell, s.
+        let told = |((worn, found), step_s): ((&Worn, &Steps), Vec<f64>)| {
+            let inside = &step_s[window.range(&step_s)];
+            let [on_s, off_s] = on(worn, found)?;
+            let parts = stretches(&worn.t_s, steps::BRIDGED_S).into_iter();
+            let seen_s = parts.map(|part| {
+                let [a, b] = [part.start, part.end - 1].map(|k| worn.t_s[k] - worn.ahead_s);
+                let seen = Window {
+                    start_s: a.max(on_s),
+                    end_s: b.min(off_s),
+                };
+                seen.overlap_s(window)
+            });
+            let lost_s = (whole_s - seen_s.sum::<f64>()).max(0.0);
+            (inside.len() >= 3).then(|| (walked_s(inside), lost_s))
+        };
+        let told: Vec<(Vec<f64>, f64)> = walking().zip(self.step_s()).filter_map(told).collect();
+        let share = told.iter().map(|(_, lost_s)| lost_s).sum::<f64>()
+            / (whole_s * told.len().max(1) as f64);
+        if !(share > 0.0) {
+            return;
+        }
+        if share > MOST_UNKNOWN {
+            value.ci95 = None;
+            value.reason = Some(format!(
+                "without an interval: {:.0} % of what the carriers' sensors would tell of the window is not recorded",
+                100.0 * share
+            ));
+            return;
+        }
+        let mean = |gaps: &[f64]| gaps.iter().sum::<f64>() / gaps.len() as f64;
+        let spread = |long_s: f64| {
+            let each = told.iter().flat_map(|(gaps, _)| {
+                let usual = mean(gaps);
+                let count = ((long_s / usual).round() as usize).max(1);
+                gaps.chunks(count)
+                    .map(move |part| 1.0 / mean(part) - 1.0 / usual)
+            });
+            let off: Vec<f64> = each.collect();
+            (off.iter().map(|d| d * d).sum::<f64>() / off.len() as f64).sqrt()
+        };
+        let longest_s = MOST_UNKNOWN * whole_s;
+        let each = told.iter().filter(|(_, lost_s)| *lost_s > 0.0);
+        let each = each.map(|(_, lost_s)| lost_s / whole_s * spread(lost_s.min(longest_s)));
+        let by_holes = 1.96 * each.sum::<f64>() / told.len() as f64;
+        let (middle, half) = (0.5 * (low + high), 0.5 * (high - low));
+        let half = half.hypot(by_holes);
+        value.ci95 = Some([middle - half, middle + half]);
+    }
+
     /// Steps of the first who walks, s.
     pub fn first_steps(&self) -> Option<&[f64]> {
         self.worn
@@ -660,6 +743,51 @@ mod tests {
         assert!(why.starts_with("without an interval: in 33 %"), "{why}");
     }
 
+    /// Two whose tempo rises in music, one unseen for half a minute before it: the rate of what is left is too high, within what is said. One who is unseen for half of the
+    /// time may have done anything.
+    #[test]
+    fn a_hole_in_one_carrier_widens_the_step_rates_interval() {
+        let rate = |hole: Option<(f64, f64)>| {
+            let mut carriers = Carriers::default();
+            for k in 0..2 {
+                let lost = |t: f64| k == 1 && hole.is_some_and(|(a, b)| t > a && t < b);
+                let t_s = (0..6000).map(|k| 0.02 * f64::from(k)).filter(|t| !lost(*t));
+                let t_s: Vec<f64> = t_s.collect();
+                let turned = |t: f64| 2.0 * t + 0.15 * (t - 60.0).max(0.0);
+                let up = |t: &f64| 9.81 + 2.0 * (TAU * turned(*t)).cos();
+                let track = Track {
+                    accel_m_per_s2: t_s.iter().map(|t| [0.0, 0.0, up(t)]).collect(),
+                    gyro_rad_per_s: vec![[0.0; 3]; t_s.len()],
+                    t_s,
+                    dropped: 0,
+                };
+                carriers.add(&format!("/imu/{k}"), &track, Options::default(), 9.81, 0.0);
+            }
+            let inputs = crate::inputs::Inputs {
+                step_s: carriers.step_s(),
+                ..Default::default()
+            };
+            let metrics = metrics_of(&inputs, Window::ALL, |name| name == "step_rate_hz");
+            let told = metrics.get("step_rate_hz").unwrap().clone();
+            let mut value = told.clone();
+            carriers.rate_by_holes(&mut value, Window::ALL);
+            (told, value)
+        };
+        let holds = |value: &Value, x: f64| value.ci95.is_some_and(|[a, b]| (a..=b).contains(&x));
+        let (told, whole) = rate(None);
+        assert_eq!(told.ci95, whole.ci95);
+        let whole = whole.as_f64().unwrap();
+        let (told, value) = rate(Some((20.0, 56.0)));
+        assert!(
+            !holds(&told, whole) && holds(&value, whole),
+            "{told:?} {value:?} {whole}"
+        );
+        let [low, high] = value.ci95.unwrap();
+        assert!(high - low < 0.06, "{low} {high}");
+        let (_, value) = rate(Some((10.0, 70.0)));
+        assert!(value.ci95.is_none() && value.reason.unwrap().contains("25 %"));
+    }
+
     /// What matches tell of clocks that are right, 0.2 s off, and further off than is looked for (music, one clock 8.3, 6.2 and 13.1 s off).
     #[test]
     fn clocks_are_right_only_where_the_load_moves_so() {
@@ -821,7 +949,7 @@ mod tests {
     /// Errors by different causes add by squares; other offsets of the clocks that go with the motion stretch what is there.
     #[test]
     fn an_interval_holds_all_that_may_err() {
-        let value = |x: f64| crate::metrics::Value::number(x);
+        let value = |x: f64| Value::number(x);
         let of = |synchrony: f64| {
             Metrics(vec![
                 ("synchrony", value(synchrony)),

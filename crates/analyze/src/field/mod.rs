@@ -621,6 +621,9 @@ impl Field {
             if ours && let Some(v) = estimated.get(name) {
                 *value = v.clone();
             }
+            if *name == "step_rate_hz" {
+                self.carriers.rate_by_holes(value, window);
+            }
             if let (Some(topic), Some(why)) = (&self.topic, &self.no_motion)
                 && interval::gives(name)
                 && value.reason.is_some()
