@@ -387,6 +387,24 @@ pub fn drawn(t_s: &[f64], x: &[f64], at_s: &[f64], step_s: f64) -> Vec<f64> {
     smooth.unwrap_or_else(|| interpolate(t_s, x, at_s))
 }
 
+/// As [`drawn`], but NaN before the first sample, behind the last, and in holes. Both time axes ascend.
+pub fn drawn_within(t_s: &[f64], x: &[f64], at_s: &[f64]) -> Vec<f64> {
+    let mut out = vec![f64::NAN; at_s.len()];
+    let parts = stretches(t_s, 0.0);
+    let step_s = mean_step_in(t_s, &parts).unwrap_or(0.0);
+    for part in parts {
+        let (t_s, x) = (&t_s[part.clone()], &x[part]);
+        let ends = Window {
+            start_s: t_s[0],
+            end_s: t_s[t_s.len() - 1],
+        };
+        let within = ends.range(at_s);
+        let there = drawn(t_s, x, &at_s[within.clone()], step_s);
+        out[within].copy_from_slice(&there);
+    }
+    out
+}
+
 /// `x(t)` at the times `at_s` by straight lines between samples; held beyond the ends. Both time axes ascend.
 pub fn interpolate(t_s: &[f64], x: &[f64], at_s: &[f64]) -> Vec<f64> {
     let last = t_s.len().min(x.len());

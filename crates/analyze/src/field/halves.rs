@@ -1,12 +1,16 @@
 //! Two topics of one device, the gyroscope's and the accelerometer's, as drivers of depth cameras publish them: each message fills its half and leaves zeros
 //! in the other.
 
+use std::sync::Arc;
+
 use recording::signal::{Signal, field_of};
 
 use super::columns::{ACCEL, ACCEL_MARK, Columns, GYRO, GYRO_MARK};
-use crate::inputs::{drawn, mean_step_in, stretches};
+use crate::inputs::drawn_within;
 
-/// Gives `topic` what only its other half measures, drawn between that one's samples and NaN in its holes. What was done, or why nothing, in a sentence.
+/// Gives `topic` what only its other half measures: all is put where the acceleration was measured, the angular velocity drawn between its own samples and NaN
+/// in their holes. An acceleration that is drawn between few samples would look like one of many, and lacks how hard it lands. What was done, or why nothing, in a
+/// sentence.
 pub(super) fn join(
     columns: &mut Columns,
     topic: &str,
@@ -17,37 +21,41 @@ pub(super) fn join(
         [(GYRO, GYRO_MARK), (ACCEL, ACCEL_MARK)]
             .map(|(fields, mark)| nothing(columns, topic, fields, mark))
     };
-    let (fields, mark, what) = match (lacks(topic), lacks(other)) {
-        ([false, true], [true, false]) => (ACCEL, ACCEL_MARK, "acceleration"),
-        ([true, false], [false, true]) => (GYRO, GYRO_MARK, "angular velocity"),
+    let (turns, feels, what) = match (lacks(topic), lacks(other)) {
+        ([false, true], [true, false]) => (topic, other, "acceleration"),
+        ([true, false], [false, true]) => (other, topic, "angular velocity"),
         _ => {
             return Some(format!(
                 "by its name {other} is the other half of this device, but the two are not an accelerometer and a gyroscope alone: it is left aside"
             ));
         }
     };
-    let own = if fields == ACCEL { GYRO } else { ACCEL };
-    let at_s = columns.dates(topic, own[0], stamped)?.t_s;
-    let taken_s = columns.dates(other, fields[0], stamped)?.t_s;
-    let axis = columns.get(topic, own[0])?.times_ns.clone();
-    let given = columns
-        .values(other, fields)?
+    let at_s = columns.dates(feels, ACCEL[0], stamped)?.t_s;
+    let taken_s = columns.dates(turns, GYRO[0], stamped)?.t_s;
+    let axis = columns.get(feels, ACCEL[0])?.times_ns.clone();
+    let rates = columns
+        .values(turns, GYRO)?
         .map(|x| put(&taken_s, x, &at_s));
-    columns.signals.retain(|s| {
-        let field = field_of(&s.path, topic);
-        field.is_none_or(|field| field != mark && !fields.contains(&field))
+    let signal = |field: &str, times_ns: &Arc<[i64]>, values: Vec<f64>| Signal {
+        topic: topic.to_owned(),
+        path: format!("{topic}.{field}"),
+        unit: String::new(),
+        times_ns: times_ns.clone(),
+        values,
+    };
+    let without = |field: &&str| !GYRO.contains(field) && *field != GYRO_MARK;
+    let of_feeling = columns.signals.iter().filter_map(|s| {
+        let field = field_of(&s.path, feels).filter(without)?;
+        Some(signal(field, &s.times_ns, s.values.clone()))
     });
-    for (field, values) in fields.iter().zip(given) {
-        columns.signals.push(Signal {
-            topic: topic.to_owned(),
-            path: format!("{topic}.{field}"),
-            unit: String::new(),
-            times_ns: axis.clone(),
-            values,
-        });
-    }
+    let rates = GYRO.iter().zip(rates);
+    let rates = rates.map(|(field, values)| signal(field, &axis, values));
+    let joined: Vec<Signal> = of_feeling.chain(rates).collect();
+    let others = |s: &Signal| field_of(&s.path, topic).is_none();
+    columns.signals.retain(others);
+    columns.signals.extend(joined);
     Some(format!(
-        "its {what} is that of {other}, drawn between the samples there: by their names they are halves of one device"
+        "its {what} is that of {other}, and the angular velocity is drawn between its samples to where the acceleration was measured: by their names they are halves of one device"
     ))
 }
 
@@ -74,16 +82,8 @@ fn put(t_s: &[f64], x: &[f64], at_s: &[f64]) -> Vec<f64> {
     order.sort_by(|a, b| at_s[*a].total_cmp(&at_s[*b]));
     let sorted: Vec<f64> = order.iter().map(|k| at_s[*k]).collect();
     let mut out = vec![f64::NAN; at_s.len()];
-    let parts = stretches(&t_s, 0.0);
-    let step_s = mean_step_in(&t_s, &parts).unwrap_or(0.0);
-    for part in parts {
-        let (t_s, x) = (&t_s[part.clone()], &x[part]);
-        let within = sorted.partition_point(|at| *at < t_s[0])
-            ..sorted.partition_point(|at| *at <= t_s[t_s.len() - 1]);
-        let drawn = drawn(t_s, x, &sorted[within.clone()], step_s);
-        for (k, y) in order[within].iter().zip(drawn) {
-            out[*k] = y;
-        }
+    for (k, y) in order.into_iter().zip(drawn_within(&t_s, &x, &sorted)) {
+        out[k] = y;
     }
     out
 }
@@ -127,41 +127,40 @@ mod tests {
     }
 
     #[test]
-    fn the_half_that_a_topic_lacks_is_drawn_where_it_was_measured() {
+    fn the_half_that_a_topic_lacks_is_put_where_the_acceleration_was_measured() {
         let [fast, slow] = times_ns();
-        for keeps_fast in [true, false] {
-            let [g, a] = [topic("/gyro", &fast, gyro), topic("/accel", &slow, accel)];
-            let mut columns = Columns::new([g, a].concat(), 0);
-            let (keeps, gives) = match keeps_fast {
+        for (of_gyro, of_accel, keeps_gyro) in [
+            (&fast, &slow, true),
+            (&fast, &slow, false),
+            (&slow, &fast, true),
+            (&slow, &fast, false),
+        ] {
+            let signals = [
+                topic("/gyro", of_gyro, gyro),
+                topic("/accel", of_accel, accel),
+            ];
+            let mut columns = Columns::new(signals.concat(), 0);
+            let (keeps, gives) = match keeps_gyro {
                 true => ("/gyro", "/accel"),
                 false => ("/accel", "/gyro"),
             };
             let told = join(&mut columns, keeps, gives, &["/gyro", "/accel"]).unwrap();
             assert!(told.contains(gives), "{told}");
-            let [x, y, z] = match keeps_fast {
-                true => columns.values(keeps, ACCEL).unwrap(),
-                false => columns.values(keeps, GYRO).unwrap(),
-            };
-            let (axis, largest) = match keeps_fast {
-                true => (&fast, 5e-4),
-                false => (&slow, 1e-5),
-            };
-            assert_eq!(x.len(), axis.len());
+            let felt = columns.values(keeps, ACCEL).unwrap();
+            let [x, ..] = columns.values(keeps, GYRO).unwrap();
+            assert_eq!(*columns.get(keeps, GYRO[0]).unwrap().times_ns, **of_accel);
             let mut there = 0;
-            for (k, t_ns) in axis.iter().enumerate() {
+            for (k, t_ns) in of_accel.iter().enumerate() {
                 let t = *t_ns as f64 / 1e9;
-                let truth = if keeps_fast { accel(t) } else { gyro(t) };
-                let truth = if keeps_fast { &truth[3..] } else { &truth[..3] };
-                // Within the other's times, but for its hole.
-                let measured = match keeps_fast {
-                    true => !(0.9924..2.0003).contains(&t),
-                    false => (0.1..=0.1 + 1199.0 * 0.0025).contains(&t),
+                assert_eq!(felt.map(|x| x[k]), accel(t)[3..]);
+                // Within the gyroscope's times, but for its hole.
+                let measured = match of_gyro == &fast {
+                    true => (0.1..=0.1 + 1199.0 * 0.0025).contains(&t),
+                    false => !(0.9924..2.0003).contains(&t),
                 };
-                for (x, truth) in [x[k], y[k], z[k]].iter().zip(truth) {
-                    match measured {
-                        true => assert!((x - truth).abs() < largest, "{t}: {x} {truth}"),
-                        false => assert!(x.is_nan(), "{t}: {x}"),
-                    }
+                match measured {
+                    true => assert!((x[k] - gyro(t)[0]).abs() < 1e-4, "{t}: {}", x[k]),
+                    false => assert!(x[k].is_nan(), "{t}: {}", x[k]),
                 }
                 there += usize::from(measured);
             }
@@ -208,8 +207,9 @@ mod tests {
         let mut columns = Columns::new(signals, 0);
         join(&mut columns, "/gyro", "/accel", &["/gyro", "/accel"]).unwrap();
         assert!(columns.get("/gyro", ACCEL_MARK).is_none());
+        assert!(columns.get("/gyro", GYRO_MARK).is_none());
         assert!(columns.get("/accel", GYRO_MARK).is_some());
         let [_, _, z] = columns.values("/gyro", ACCEL).unwrap();
-        assert!((z[0] - accel(0.1)[5]).abs() < 1e-3, "{}", z[0]);
+        assert_eq!(z[0], accel(3e-4)[5]);
     }
 }
