@@ -8,6 +8,7 @@
 pub mod cdr;
 pub mod finding;
 mod foreign;
+pub mod held;
 pub mod import;
 pub mod load;
 pub mod merge;

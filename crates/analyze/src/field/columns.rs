@@ -8,6 +8,7 @@ use recording::signal::{Signal, field_of, seconds_since};
 
 use super::dates::{Dated, are_two, dated, delay_s, ends_s, mixed};
 use crate::imu::Track;
+use crate::imu::held::without_held;
 use crate::imu::stray::strays;
 use crate::imu::track::period_s;
 
@@ -210,13 +211,17 @@ impl Columns {
         let often = period_s(columns[0]).is_some_and(|s| s <= LONGEST_STEP_OF_TWO_S);
         let two = often && are_two(&columns[4..], TWO_M_PER_S2);
         let [t_s, x, y, z, accel @ ..] = columns;
-        let track = Track::from_columns(t_s, [x, y, z], accel);
+        let mut track = Track::from_columns(t_s, [x, y, z], accel);
         let dropped = track.dropped - if turns { without } else { 0 };
         if dropped as f64 > MANY * n as f64 {
             remarks.push((
                 "left_out",
                 format!("{dropped} of {n} samples are left out: not finite, beyond any sensor's range, or no later than the one before"),
             ));
+        }
+        if let Some((new, told)) = without_held(&track) {
+            remarks.push(("held", told));
+            track = new;
         }
         let strays = strays(&track);
         Some(Sensor {

@@ -6,7 +6,8 @@
 //! | module | gives |
 //! |---|---|
 //! | [`track`] | a clean series of samples out of whatever columns a file had |
-//! | [`stray`] | single samples that nothing carried could have felt |
+//! | [`held`] | readings that only repeat |
+//! | [`stray`] | samples that nothing carried could have felt |
 //! | [`bridge`] | what short holes most likely held |
 //! | [`orientation`] | sensor → earth (z up), causal and batch |
 //! | [`vertical`] | height by drift-free double integration, with its valid band |
@@ -31,6 +32,7 @@ pub mod budget;
 pub mod floating;
 pub mod frozen;
 pub mod gravity;
+pub mod held;
 pub mod interval;
 pub mod orientation;
 pub mod rath;

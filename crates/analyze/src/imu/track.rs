@@ -121,9 +121,12 @@ impl Track {
 
     /// All samples but these, which ascend.
     pub fn without(&self, left_out: &[usize]) -> Self {
-        let kept: Vec<usize> = (0..self.len())
-            .filter(|k| left_out.binary_search(k).is_err())
-            .collect();
+        let kept = (0..self.len()).filter(|k| left_out.binary_search(k).is_err());
+        self.only(&kept.collect::<Vec<_>>())
+    }
+
+    /// Only these samples, which ascend.
+    pub fn only(&self, kept: &[usize]) -> Self {
         Self {
             t_s: kept.iter().map(|k| self.t_s[*k]).collect(),
             gyro_rad_per_s: kept.iter().map(|k| self.gyro_rad_per_s[*k]).collect(),

@@ -2,6 +2,7 @@
 //! points up at rest), angular velocity in rad/s, covariance −1 for what is not given.
 
 use crate::cdr::{self, Quaternion};
+use crate::held::new_readings;
 
 /// Standard gravity, m/s² (3rd General Conference on Weights and Measures, 1901).
 pub(super) const STANDARD_GRAVITY: f64 = 9.80665;
@@ -88,20 +89,11 @@ impl Log {
     }
 }
 
-/// A track without the rows in which a logger only repeated it: one that writes several sensors into one table holds each one's last value
-/// between its samples. `None` where it does not.
-///
-/// Held is what repeats the row before to the last digit in at least a quarter of the rows, about as often each time: of a sensor with few digits
-/// that hardly moves, values last now short, now long.
+/// A track without the rows in which a logger only repeated it ([`new_readings`]). `None` where it does not.
 pub(super) fn without_repeats(track: &Track) -> Option<Track> {
-    let bits = |row: &(i64, [f64; 3])| row.1.map(f64::to_bits);
-    let held: Vec<_> = track.chunk_by(|a, b| bits(a) == bits(b)).collect();
-    let mut lasts: Vec<usize> = held.iter().map(|same| same.len()).collect();
-    lasts.sort_unstable();
-    let new = held.len();
-    let evenly = *lasts.get(new * 19 / 20)? <= lasts[new / 2] * 3 / 2 + 1;
-    let is_held = new >= 8 && new * 4 <= track.len() * 3 && evenly;
-    is_held.then(|| held.iter().map(|same| same[0]).collect())
+    let readings: Vec<[f64; 3]> = track.iter().map(|row| row.1).collect();
+    let new = new_readings(&readings)?;
+    Some(new.into_iter().map(|k| track[k]).collect())
 }
 
 /// So many samples on either side of an interval tell what is usual there.
