@@ -78,10 +78,11 @@ fn a_range_has_an_extent_that_a_number_can_say() {
 #[test]
 fn equal_factors_need_numbers_above_zero_and_columns_names_of_their_own() {
     let axis = |more: &str| {
-        format!("metrics = [\"t_float\"]\naxes = [{{ key = \"effects.push.0.at_s\", {more} }}]")
+        format!(
+            "metrics = [\"t_float\"]\naxes = [{{ key = \"effects.music.strength_rad_per_s\", {more} }}]"
+        )
     };
-    let push = "set.effects.push = [{ at_s = 1.0 }]\n";
-    let refused = |more: &str| refused(&format!("{push}{}", axis(more)));
+    let refused = |more: &str| refused(&axis(more));
     let zero = refused("values = [0, 1, 2], spacing = \"log\"");
     assert!(zero.contains("above zero in `values`"), "{zero}");
     for name in ["runs", "remarked", "t_float.mean", "t_float.n"] {
@@ -89,7 +90,7 @@ fn equal_factors_need_numbers_above_zero_and_columns_names_of_their_own() {
         assert!(taken.contains("there is a column"), "{taken}");
     }
     let fine = "values = [1, 2], spacing = \"log\", name = \"rms_roll_deg.mean\"";
-    plan(&format!("{push}{}", axis(fine))).unwrap();
+    plan(&axis(fine)).unwrap();
 }
 
 #[test]
