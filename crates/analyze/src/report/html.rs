@@ -44,6 +44,8 @@ const MAP: [[u8; 3]; 9] = [
 
 /// Events listed; more are counted.
 const MOST_EVENTS: usize = 400;
+/// Topics listed.
+const MOST_TOPICS: usize = 500;
 /// Signals listed.
 const MOST_SIGNALS: usize = 2000;
 /// Points of all curves over time together, of some 18 bytes each: a page stays below 3 MB however long the recording is.
@@ -246,7 +248,13 @@ fn metrics_section(out: &mut String, a: &Analysis) {
     let known = |missing: bool| {
         let all = a.metrics.iter();
         all.filter(move |(_, value)| (value.datum == Datum::Missing) == missing)
-            .map(|(name, value)| (name, value, metrics::find(name)))
+            .map(|(name, value)| {
+                // What is held against a truth that the file brings has a name alone.
+                let metric = metrics::find(name);
+                let label = metric.map_or(name, |metric| metric.label);
+                let said = metric.map_or_else(String::new, |metric| definition(name, metric));
+                (label, value, said)
+            })
     };
     if known(false).count() > 0 {
         let _ = writeln!(
@@ -255,14 +263,12 @@ fn metrics_section(out: &mut String, a: &Analysis) {
             a.window.start_s, a.window.end_s
         );
         out.push_str("<div class=\"scroll\"><table class=\"metrics\"><thead><tr><th>metric</th><th class=\"n\">value</th><th>unit</th><th>from</th></tr></thead><tbody>\n");
-        for (name, value, metric) in known(false) {
+        for (label, value, mut more) in known(false) {
             let unit = if matches!(value.unit, "1" | "bool" | "-") {
                 ""
             } else {
                 value.unit
             };
-            // What is held against a truth that the file brings has a name alone.
-            let mut more = metric.map_or_else(String::new, |metric| definition(name, metric));
             if let Some(reason) = &value.reason {
                 let _ = write!(more, "<p>{}</p>", escaped(reason));
             }
@@ -285,7 +291,7 @@ fn metrics_section(out: &mut String, a: &Analysis) {
             let _ = writeln!(
                 out,
                 "<tr><td><details><summary>{}</summary>{more}</details></td><td class=\"n\">{}</td><td>{unit}</td><td>{}</td></tr>",
-                escaped(metric.map_or(name, |metric| metric.label)),
+                escaped(label),
                 shown(&value.datum),
                 escaped(&value.source)
             );
@@ -305,12 +311,11 @@ fn metrics_section(out: &mut String, a: &Analysis) {
             "metrics have no value here"
         )
     );
-    for (name, value, metric) in known(true) {
+    for (label, value, said) in known(true) {
         let _ = writeln!(
             out,
-            "<tr><td><details><summary>{}</summary>{}</details></td><td>{}</td></tr>",
-            escaped(metric.map_or(name, |metric| metric.label)),
-            metric.map_or_else(String::new, |metric| definition(name, metric)),
+            "<tr><td><details><summary>{}</summary>{said}</details></td><td>{}</td></tr>",
+            escaped(label),
             escaped(value.reason.as_deref().unwrap_or(""))
         );
     }
@@ -430,7 +435,7 @@ fn recording_section(out: &mut String, a: &Analysis) {
         }
     );
     out.push_str("<div class=\"scroll\"><table class=\"topics\"><thead><tr><th>topic</th><th>schema</th><th>encoding</th><th class=\"n\">messages</th><th class=\"n\">Hz</th></tr></thead><tbody>\n");
-    for t in a.topics.iter().take(500) {
+    for t in a.topics.iter().take(MOST_TOPICS) {
         let _ = writeln!(
             out,
             "<tr><td><code>{}</code></td><td>{}</td><td>{}</td><td class=\"n\">{}</td><td class=\"n\">{}</td></tr>",
@@ -442,7 +447,7 @@ fn recording_section(out: &mut String, a: &Analysis) {
         );
     }
     out.push_str("</tbody></table></div>\n");
-    out.push_str(&first(a.topics.len(), 500));
+    out.push_str(&first(a.topics.len(), MOST_TOPICS));
     if !a.roles.is_empty() {
         out.push_str("<p>Who plays which role:</p>\n<div class=\"scroll\"><table><tbody>\n");
         for (role, players) in &a.roles {

@@ -45,7 +45,9 @@ fn read_date(cell: &str, clock: &mut Wrapping) -> Option<i64> {
     }
     // Behind the last colon of four parts stand milliseconds, with or without zeros before them.
     let time = match cell.rsplit_once(':') {
-        Some((whole, part)) if whole.matches(':').count() == 2 => format!("{whole}.{part:0>3}"),
+        Some((whole, part)) if whole.matches(':').count() == 2 && !part.is_empty() => {
+            format!("{whole}.{part:0>3}")
+        }
         _ => cell,
     };
     let padding = if time.find(':')? == 1 { "0" } else { "" };
@@ -100,6 +102,7 @@ mod tests {
             "1.5",
             "x:y:z",
             "25:00:00",
+            "10:00:00:",
             "1969-12-31 23:59:59",
             "2018-13-03 00:00:00",
         ] {

@@ -119,18 +119,21 @@ impl Study {
                 self.cheapest_where(|r| rolls(r) && others(r)),
             ),
             Judge::Height => ("the height to 1 mm", self.cheapest(1e-3)),
-            Judge::Other => ("", self.cheapest_where(others)),
+            Judge::Other => (
+                "x, y, pitch and yaw to 1 % of how far they go",
+                self.cheapest_where(others),
+            ),
             Judge::Nothing => return "nothing moves, so no setting can be judged".into(),
         };
         let beside = match self.judge {
-            Judge::Other => "x, y, pitch and yaw to 1 % of how far they go",
             Judge::Roll if self.others_move => {
                 ", with x, y, pitch and yaw to 1 % of how far they go"
             }
             Judge::Height if self.others_move => ", with x, y, pitch and yaw to 1e-3 m or rad",
             _ => "",
         };
-        let what = format!("{what}{beside}");
+        // Where more follows, what stands beside is set off on both sides.
+        let set_off = if beside.is_empty() { "" } else { "," };
         let digit = self
             .cost_of_a_digit()
             .map(|c| {
@@ -142,13 +145,12 @@ impl Study {
             .unwrap_or_default();
         match cheapest {
             Some(r) => format!(
-                "for {what}{} the cheapest is {} at {}: {:.2} ms{digit}",
-                if what.contains(", with") { "," } else { "" },
+                "for {what}{beside}{set_off} the cheapest is {} at {}: {:.2} ms{digit}",
                 r.method,
                 r.setting_text(),
                 r.cpu_s * 1e3
             ),
-            None => format!("no setting gives {what}{digit}"),
+            None => format!("no setting gives {what}{beside}{digit}"),
         }
     }
 

@@ -81,7 +81,7 @@ const MOST_JOBS: usize = 100_000;
 /// Takes a number of threads.
 fn jobs(text: &str) -> Result<usize, String> {
     let given = text.parse().ok().filter(|jobs| *jobs <= MOST_JOBS);
-    given.ok_or_else(|| "expected a whole number, 0 for one per core".into())
+    given.ok_or_else(|| format!("expected a whole number, 0 for one per core, up to {MOST_JOBS}"))
 }
 
 /// What stdout gets.

@@ -161,12 +161,8 @@ fn check(spec: &mut Spec) -> Result<(), String> {
             ));
         }
         let name = &spec.axes[k].name;
-        let of_metric = name.rsplit_once('.').is_some_and(|(metric, what)| {
-            super::summary::PARTS.contains(&what) && spec.metrics.iter().any(|m| m == metric)
-        });
         let taken = super::FIXED_COLUMNS.contains(&name.as_str())
-            || ["runs", "remarked"].contains(&name.as_str())
-            || of_metric
+            || super::summary::has_column(name, &spec.metrics)
             || spec.metrics.contains(name)
             || spec.axes[..k].iter().any(|a| a.name == *name);
         if let Some((key, other, before)) = said_twice(&spec.axes[..=k]) {

@@ -111,7 +111,17 @@ impl Range {
 }
 
 /// What stands in the table of points of each metric, behind its name and a dot, which no name of a metric has.
-pub(super) const PARTS: [&str; 7] = ["mean", "sd", "ci95", "q05", "q50", "q95", "n"];
+const PARTS: [&str; 7] = ["mean", "sd", "ci95", "q05", "q50", "q95", "n"];
+/// What is counted of the runs of each point.
+const COUNTS: [&str; 3] = ["runs", "failed", "remarked"];
+
+/// Whether the table of points has a column of that name, whatever the axes are.
+pub(super) fn has_column(name: &str, metrics: &[String]) -> bool {
+    let of_metric = |(metric, part): (&str, &str)| {
+        PARTS.contains(&part) && metrics.iter().any(|known| known == metric)
+    };
+    COUNTS.contains(&name) || name.rsplit_once('.').is_some_and(of_metric)
+}
 
 /// The summary of a study. Only the rows of one point are held at a time; a study of sensitivity keeps the means.
 pub struct Summary<W: Write> {
@@ -181,7 +191,7 @@ impl<W: Write> Summary<W> {
         for axis in &plan.spec.axes {
             write!(csv, ",{}", quoted(&axis.name))?;
         }
-        write!(csv, ",runs,failed,remarked")?;
+        write!(csv, ",{}", COUNTS.join(","))?;
         for name in &metrics {
             for part in PARTS {
                 write!(csv, ",{name}.{part}")?;
