@@ -11,6 +11,7 @@ pub(crate) mod dates;
 mod halves;
 mod judge;
 mod place;
+mod read;
 mod sound;
 mod thin;
 
@@ -19,37 +20,18 @@ pub(crate) use judge::wants as is_of_truth;
 use std::collections::{BTreeMap, BTreeSet};
 use std::f64::consts::FRAC_PI_2;
 
-use recording::read::{ReadError, Recording};
-use recording::signal::field_of;
-use recording::text::counted;
-
 use crate::beat::lock::Course;
 use crate::events::Event;
-use crate::imu::Track;
-use crate::imu::axes::misfit;
-use crate::imu::bias::far_off;
-use crate::imu::bridge;
-use crate::imu::frozen::frozen;
 use crate::imu::interval::{self, Lost};
-use crate::imu::orientation::Options;
-use crate::imu::rath::{self, Motion, Settings};
-use crate::imu::saturation::saturated;
-use crate::imu::stray;
-use crate::imu::track::Instrument;
-use crate::imu::unit::other_unit;
+use crate::imu::rath::Motion;
 use crate::imu::unloading::unloadings;
-use crate::inputs::{self, Inputs, Window};
+use crate::inputs::{Inputs, Window};
 use crate::metrics::{Metrics, Value, metrics_of};
 use crate::quality::Quality;
-use crate::request::{DeviceClocks, Request};
-use crate::roles::{Role, Roles, Sensors, about_the_load, stands_beside};
+use crate::roles::{Role, Roles};
 use carriers::Carriers;
-use clocks::Clocks;
 pub(crate) use columns::{ACCEL, GYRO};
-use columns::{ACCEL_MARK, BEAT, Columns, GYRO_MARK, STAMPS, Sensor};
-use dates::Dated;
 use judge::Judge;
-use sound::Heard;
 
 /// What a recording's sensors say.
 #[derive(Default)]
@@ -77,9 +59,6 @@ pub struct Field {
     pub own_s: BTreeMap<String, (f64, f64)>,
 }
 
-/// Of a log that is too long for memory so much is read before and behind the window, s.
-const ABOUT_S: f64 = 60.0;
-
 /// A pose and a sensor that lean by so different an amount are not on one body: by this factor and as many degrees more.
 const OTHER_BODY: f64 = 1.5;
 const OTHER_BODY_DEG: f64 = 1.0;
@@ -102,380 +81,6 @@ struct Filled {
 }
 
 impl Field {
-    /// Reads the sensors' topics; nothing when the recording has none. Clocks are put on the rath's by taps, or the carriers' on each other by
-    /// their motion, as the request says. Beats are read beside sensors, and where the beat is not known. `window` is asked with the time of the
-    /// sensors' last sample (s); of a log that is too long, what lies about the window of the request is read.
-    ///
-    /// # Errors
-    /// Where the file cannot be read.
-    pub fn read(
-        recording: &Recording,
-        roles: &Roles,
-        gravity_m_per_s2: f64,
-        request: &Request,
-        beat_is_known: bool,
-        window: impl FnOnce(f64) -> Window,
-    ) -> Result<Self, ReadError> {
-        let (truth, devices, asked) = (request.truth, request.clocks, request.asked());
-        let others = [Role::Beats, Role::Truth];
-        let others = others.iter().flat_map(|r| roles.patterns(*r));
-        let topics: Vec<&str> = (roles.inertial().into_iter())
-            .chain(others.map(String::as_str))
-            .filter(|t| recording.info().channels.iter().any(|c| c.topic == *t))
-            .collect();
-        let imus = roles
-            .patterns(Role::Imu)
-            .iter()
-            .chain(roles.patterns(Role::Carriers));
-        let mut field = Self::default();
-        let sound = field.listen(recording)?;
-        let senses = imus.clone().next().is_some();
-        let beats = roles.topic(Role::Beats).is_some() && !beat_is_known;
-        if topics.is_empty() || !(senses || beats || truth) {
-            return Ok(field);
-        }
-        let mut part = Window::ALL;
-        let mut factors = thin::factors(recording, roles, part)?;
-        if factors.is_err() && asked != Window::ALL {
-            part = Window {
-                start_s: asked.start_s - ABOUT_S,
-                end_s: asked.end_s + ABOUT_S,
-            };
-            factors = thin::factors(recording, roles, part)?;
-            if factors.is_ok() {
-                let text = format!(
-                    "motion is estimated from what lies within {ABOUT_S} s of the window alone: the whole would take too much memory, and taps elsewhere are not looked for"
-                );
-                field.quality.push(Quality::remark("", "part", text));
-            }
-        }
-        let factors = match factors {
-            Ok(factors) => factors,
-            Err(samples) => {
-                let why = format!(
-                    "motion is not estimated from {samples} inertial samples, which would take too much memory: give a --window of an hour or two, or name fewer sensors in a roles file"
-                );
-                field
-                    .quality
-                    .push(Quality::remark("", "too_long", why.clone()));
-                field.topic = roles.topic(Role::Imu).map(str::to_owned);
-                field.no_motion = Some(why);
-                return Ok(field);
-            }
-        };
-        let thinned = |topic: &str| {
-            let factor = factors.get(topic);
-            factor.is_some_and(|factor| *factor > 1 || part != Window::ALL)
-        };
-        let wanted = |path: &str| {
-            let mut whole = topics.iter().filter(|t| !thinned(t));
-            let field = whole.find_map(|topic| field_of(path, topic));
-            field.is_some_and(|field| {
-                GYRO.contains(&field)
-                    || ACCEL.contains(&field)
-                    || field == GYRO_MARK
-                    || field == ACCEL_MARK
-                    || STAMPS.as_flattened().contains(&field)
-                    || judge::wants(field)
-                    || BEAT.contains(&field)
-            }) || (truth && path.starts_with(judge::STEP_TOPIC))
-        };
-        let (mut signals, _) = recording.signals(&wanted)?;
-        signals.extend(thin::read(recording, &factors, part)?);
-        if let Some(topic) = roles.topic(Role::Beats)
-            && !signals
-                .iter()
-                .any(|s| field_of(&s.path, topic) == Some(BEAT[1]))
-        {
-            signals.push(columns::came(recording, topic)?);
-        }
-        let start_ns = recording.info().start_ns;
-        // What is dated long before all others belongs to no time of the recording.
-        for s in signals.iter_mut().filter(|_| recording.info().early > 0) {
-            let known = s.times_ns.iter().zip(&s.values);
-            let known = known.filter(|(t, _)| **t >= start_ns);
-            let (times_ns, values): (Vec<i64>, Vec<f64>) = known.unzip();
-            (s.times_ns, s.values) = (times_ns.into(), values);
-        }
-        for (topic, factor) in factors.iter().filter(|(_, factor)| **factor > 1) {
-            field.quality.push(Quality::remark(
-                topic,
-                "thinned",
-                format!("motion is estimated from means over {factor} samples each, so that memory stays small"),
-            ));
-        }
-        let mut columns = Columns::new(signals, start_ns);
-        let sensors: Vec<&str> = imus.clone().map(String::as_str).collect();
-        let stamped = [&roles.inertial(), roles.topic(Role::Truth).as_slice()].concat();
-        for topic in &sensors {
-            let told = (roles.other_half(topic))
-                .and_then(|other| halves::join(&mut columns, topic, other, &stamped));
-            let told = told.map(|text| Quality::remark(topic, "halves", text));
-            field.quality.extend(told);
-        }
-        let dates = |topic: &&str| columns.dates(topic, ACCEL[0], &stamped);
-        let dates: Vec<Option<Dated>> = sensors.iter().map(dates).collect();
-        for (topic, dated) in sensors.iter().zip(&dates) {
-            let own_s = dated.as_ref().and_then(Dated::own_s);
-            field
-                .own_s
-                .extend(own_s.map(|ends| ((*topic).to_owned(), ends)));
-        }
-        let window = window(field.last_s());
-        let places = place::places(recording);
-        let options = options(place::is_simulated(recording), &roles.sensors);
-        let one_clock = devices == DeviceClocks::One;
-        let leave = devices == DeviceClocks::Told;
-        let mut clocks = Clocks::default();
-        for (topic, dated) in imus.zip(dates) {
-            let Some(Sensor {
-                mut track,
-                strays_s,
-                turns,
-                feels,
-                two,
-                remarks,
-            }) = dated.and_then(|dated| columns.sensor(topic, dated))
-            else {
-                continue;
-            };
-            let said = remarks.into_iter();
-            let said = said.map(|(kind, text)| Quality::remark(topic, kind, text));
-            field.quality.extend(said);
-            if let Some(first_s) = strays_s.first() {
-                let (count, all) = (strays_s.len(), track.len() + strays_s.len());
-                field.quality.push(Quality {
-                    count: count as u64,
-                    t_s: Some(*first_s),
-                    ..Quality::remark(topic, "stray", stray::told(count, all))
-                });
-            }
-            let is_rath = roles.topic(Role::Imu) == Some(topic.as_str());
-            let carries = roles.patterns(Role::Carriers).contains(topic);
-            if two {
-                let why = "its samples tell of two sensors by turns, which publish under one name: give each a topic of its own";
-                field
-                    .quality
-                    .push(Quality::remark(topic, "two_sensors", why.to_owned()));
-                if is_rath {
-                    field.topic = Some(topic.clone());
-                    field.no_motion = Some(why.to_owned());
-                }
-                continue;
-            }
-            let within = window.range(&track.t_s);
-            let mut lost = |kind, told: String, samples: &[usize], what: Option<Lost>| {
-                field.quality.push(Quality {
-                    count: samples.len() as u64,
-                    t_s: Some(track.t_s[samples[0]]),
-                    ..Quality::remark(topic, kind, told)
-                });
-                if samples.iter().any(|k| within.contains(k)) {
-                    if let Some(what) = what.filter(|_| is_rath || carries) {
-                        field.lose(topic, kind, what, is_rath);
-                    }
-                }
-            };
-            for end in saturated(&track) {
-                let what = Some(Lost::Peaks(end.instrument));
-                lost("saturated", end.told(track.len()), &end.samples, what);
-            }
-            // What a device says it does not have stands still too.
-            let has = |instrument| match instrument {
-                Instrument::Gyroscope => turns,
-                Instrument::Accelerometer => feels,
-            };
-            for still in frozen(&track).into_iter().filter(|s| has(s.instrument)) {
-                let all = still.axis.is_none().then_some(Lost::All(still.instrument));
-                lost("frozen", still.told(track.len()), &still.samples, all);
-            }
-            if turns && feels {
-                let said = if let Some(found) = other_unit(&track, gravity_m_per_s2) {
-                    Some(("unit", found.told(), Some(Lost::Unit)))
-                } else if let Some(found) = misfit(&track, gravity_m_per_s2) {
-                    Some(("axes", found.told(), Some(Lost::Axes)))
-                } else if let Some(found) = far_off(&track, gravity_m_per_s2) {
-                    track.take_off_bias(found.bias_rad_per_s);
-                    let lost = found.is_absurd().then_some(Lost::Unit);
-                    Some(("bias", found.told(), lost))
-                } else {
-                    None
-                };
-                if let Some((kind, told, lost)) = said {
-                    field.quality.push(Quality::remark(topic, kind, told));
-                    if let Some(lost) = lost.filter(|_| is_rath) {
-                        field.lose(topic, kind, lost, true);
-                    } else if lost.is_some() && carries {
-                        // Whatever it reads, the accelerometer alone tells steps.
-                        track.gyro_rad_per_s.fill([0.0; 3]);
-                    }
-                }
-            }
-            if !is_rath && roles.patterns(Role::Imu).contains(topic) {
-                if !one_clock {
-                    clocks.hold_against(topic, &track);
-                }
-                continue;
-            }
-            let mut clock_sd_s = 0.0;
-            if !one_clock {
-                if is_rath {
-                    clocks = Clocks::of_rath(topic, &track, leave);
-                } else {
-                    clock_sd_s = clocks.put_right(topic, &mut track, window);
-                }
-            }
-            if is_rath {
-                let here = places.get(topic).copied().unwrap_or_default();
-                let settings = Settings {
-                    orientation: options,
-                    gravity_m_per_s2,
-                    level_over: window,
-                    ..here.or_as_said(&roles.sensors)
-                };
-                field.topic = Some(topic.clone());
-                let lacking = |what, mark| Some(format!("no {what} ({mark} is -1)"));
-                match (turns, feels) {
-                    (true, true) => field.motion(topic, &track, settings),
-                    (false, _) => field.no_motion = lacking("gyroscope", GYRO_MARK),
-                    (_, false) => field.no_motion = lacking("accelerometer", ACCEL_MARK),
-                }
-            }
-            if !feels {
-                continue;
-            }
-            // The one sensor of a walker's phone plays the rath's role for want of another: steps tell. Who names it, or says where it sits on the load,
-            // says what it is.
-            let said = roles.is_said(Role::Imu)
-                || roles.sensors.place_m.is_some()
-                || roles.sensors.mounting_roll_pitch_yaw_deg.is_some();
-            let alone = roles.patterns(Role::Carriers).is_empty();
-            if !is_rath || (alone && !said && !about_the_load(topic)) {
-                field
-                    .carriers
-                    .add(topic, &track, options, gravity_m_per_s2, clock_sd_s);
-            }
-        }
-        field.quality.extend(without_a_role(recording, roles));
-        if let Some(topic) = roles.topic(Role::Beats) {
-            let (told, number, remark) = columns.beats(topic);
-            if told.len() >= 3 {
-                (field.beat_s, field.beat_source) = (told, "beat");
-                field.beat_number = number;
-                let said = remark.map(|(kind, text)| Quality::remark(topic, kind, text));
-                field.quality.extend(said);
-            }
-        }
-        if let Some((topic, onset_s)) = sound
-            && field.beat_source == "sound"
-        {
-            let set = clocks.put_sound_right(&topic, &onset_s, &mut field.beat_s);
-            // Messages that were logged beside the sensors' came when the log says.
-            field.sound_is_adrift = !set && !one_clock && place::is_put_together(recording);
-            if field.sound_is_adrift {
-                let why = format!(
-                    "nothing tells when this sound began beside the steps: {} have no value; tap the sensors near the microphone or say --one-clock",
-                    BY_SOUNDS_CLOCK.join(", ")
-                );
-                field
-                    .quality
-                    .push(Quality::remark(&topic, "clocks_apart", why));
-            }
-        }
-        if clocks.any_apart {
-            field.carriers.clocks = inputs::Clocks::LeftApart;
-        }
-        field.quality.extend(field.carriers.leave_out(window));
-        if !one_clock {
-            field.align(roles, &clocks.set, leave);
-        }
-        field.quality.append(&mut clocks.remarks);
-        if truth {
-            field.judge = Judge::read(&columns, roles, recording, &stamped);
-        }
-        Ok(field)
-    }
-
-    /// Beats from sound, where the recording has sound; its topic and all that begins in it (s).
-    fn listen(&mut self, recording: &Recording) -> Result<Option<(String, Vec<f64>)>, ReadError> {
-        let Some(heard) = sound::listen(recording)? else {
-            return Ok(None);
-        };
-        let Heard {
-            topic,
-            onset_s,
-            beats,
-            remarks,
-        } = heard;
-        let said = remarks.into_iter();
-        self.quality
-            .extend(said.map(|text| Quality::remark(&topic, "sound", text)));
-        match beats {
-            Ok(found) => {
-                self.beat_s = found.beat_s;
-                self.beat_source = "sound";
-            }
-            Err(error) => self
-                .quality
-                .push(Quality::remark(&topic, "no_beat", error.to_string())),
-        }
-        Ok(Some((topic, onset_s)))
-    }
-
-    fn motion(&mut self, topic: &str, track: &Track, settings: Settings) {
-        match rath::motion(track, &settings) {
-            Ok(motion) => {
-                let drawn_s = motion.drawn_s();
-                if drawn_s > 0.0 {
-                    self.quality.push(Quality::remark(
-                        topic,
-                        "drawn_through",
-                        format!(
-                            "{drawn_s:.2} s in holes of up to {:.1} s are drawn through by what the samples beside them let expect; intervals hold what as many holes again change",
-                            bridge::LONGEST_S
-                        ),
-                    ));
-                }
-                let [left_out_s, _] = motion.left_out_s(Window::ALL);
-                if left_out_s > 0.0 {
-                    self.quality.push(Quality::remark(
-                        topic,
-                        "holes",
-                        format!(
-                            "motion is estimated in {} without a hole, {:.2} s are left out; within {:.1} s of a hole there is no height",
-                            counted(motion.stretches.len() as u64, "stretch", "stretches"),
-                            left_out_s,
-                            rath::BESIDE_HOLES / settings.height_corner_hz
-                        ),
-                    ));
-                }
-                if let Some(lean_deg) = motion.misdeclared_deg() {
-                    self.quality.push(Quality::remark(
-                        topic,
-                        "mounting",
-                        format!("as it is declared to be mounted, the load leans by {lean_deg:.0}° on average: it lies on its side or its back, or the sensor sits otherwise; what rests on its motion has no interval"),
-                    ));
-                    self.lose(topic, "mounting", Lost::Mounting, true);
-                }
-                if motion.forward_is_unknown() {
-                    let text = "its x stands upright, and which way of it is forward nothing tells: roll and pitch may be each other, or mixed; give imu_mounting_roll_pitch_yaw_deg in a roles file";
-                    self.quality
-                        .push(Quality::remark(topic, "forward", text.to_owned()));
-                    self.lose(topic, "forward", Lost::Forward, true);
-                }
-                if let Some(turned) = motion.turned() {
-                    self.quality.push(Quality {
-                        t_s: Some(turned.t_s),
-                        ..Quality::remark(topic, "turned", turned.told())
-                    });
-                    self.lose(topic, "turned", Lost::Turned, true);
-                }
-                self.motion = Some(motion);
-            }
-            Err(error) => self.no_motion = Some(error.to_string()),
-        }
-    }
-
     /// Takes note of what a sensor, the rath's or a carrier's, did not tell, as a remark of this kind says.
     fn lose(&mut self, topic: &str, kind: &'static str, what: Lost, is_rath: bool) {
         self.doubts.insert((topic.to_owned(), kind));
@@ -496,14 +101,6 @@ impl Field {
         speaking.map(|(topic, kind)| {
             format!("{topic} is in doubt ({kind}, see the quality of the data): numbers that hang on that may be far off and have no interval")
         })
-    }
-
-    /// Puts the carriers' clocks on each other, by the motion of the rath that they all drive, or says how with `leave`.
-    fn align(&mut self, roles: &Roles, set: &[String], leave: bool) {
-        if roles.patterns(Role::Carriers).len() >= 2 {
-            let motion = self.motion.as_ref();
-            self.quality.extend(self.carriers.align(motion, set, leave));
-        }
     }
 
     /// Gives `inputs` the columns that it lacks.
@@ -761,47 +358,5 @@ impl Field {
         }
         out.extend(self.carriers.quality());
         out
-    }
-}
-
-/// Names the inertial sensors that play no role where nobody is known to carry: their names do not say so.
-fn without_a_role(recording: &Recording, roles: &Roles) -> Option<Quality> {
-    let played = roles.patterns(Role::Imu);
-    let told = |topic: &String| roles.chosen.iter().any(|(chosen, _)| chosen == topic);
-    if !roles.patterns(Role::Carriers).is_empty() || played.iter().any(told) {
-        return None;
-    }
-    let channels = recording.info().channels.iter();
-    let mut left: Vec<&str> = channels
-        .filter(|c| c.schema.replacen("/msg/", "/", 1) == "sensor_msgs/Imu")
-        .map(|c| c.topic.as_str())
-        .filter(|topic| {
-            let plays = |topic: &str| played.iter().any(|p| p == topic);
-            !roles.device(topic).any(plays) && !stands_beside(topic)
-        })
-        .collect();
-    left.sort_unstable();
-    left.dedup();
-    (!left.is_empty()).then(|| {
-        let text = format!(
-            "{} {} left aside: no name says who carries; name them in a file for --roles, as `carriers` if they do",
-            left.join(", "),
-            if left.len() == 1 { "is" } else { "are" }
-        );
-        Quality::remark("", "no_role", text)
-    })
-}
-
-/// What the user says of the samples' age; else those of a simulated sensor are true at their stamps, and others as old as usual.
-fn options(simulated: bool, said: &Sensors) -> Options {
-    let usual = if simulated {
-        Options::without_latency()
-    } else {
-        Options::default()
-    };
-    Options {
-        latency_s: said.gyro_age_s.unwrap_or(usual.latency_s),
-        accel_latency_s: said.accel_age_s.unwrap_or(usual.accel_latency_s),
-        ..usual
     }
 }
