@@ -134,6 +134,19 @@ pub struct Finding {
     pub text: String,
 }
 
+impl Finding {
+    /// One that has no place in time.
+    pub(crate) fn new(topic: &str, kind: Kind, count: u64, text: String) -> Self {
+        Self {
+            topic: topic.to_owned(),
+            kind,
+            count,
+            t_s: None,
+            text,
+        }
+    }
+}
+
 impl fmt::Display for Finding {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         if !self.topic.is_empty() {

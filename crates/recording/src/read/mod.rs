@@ -24,7 +24,9 @@ mod ros1;
 mod ros2msg;
 mod rows;
 mod stream;
+mod taker;
 mod types;
+mod watch;
 
 use std::{
     collections::BTreeMap,
@@ -47,7 +49,7 @@ pub use container::ends_whole;
 pub use decoders::supported;
 pub use raw::RawMessage;
 pub(crate) use raw::RawMessages;
-pub use stream::{Batch, Column};
+pub use taker::{Batch, Column};
 
 use crate::{Finding, Kind, Signal};
 
