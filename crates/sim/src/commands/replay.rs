@@ -11,7 +11,7 @@ use sim::model::Model;
 use sim::record::Recorder;
 use sim::replay::{Course, Drive, Misfit, Options, Replay, Take, misfit};
 use sim::run::{Listener, Sample, method_of, run_model, settings};
-use sim::scene::{load, parse};
+use sim::scene::{Scene, load, parse};
 use sim::sensors::Reading;
 use sim::solve::Stopped;
 use std::collections::{BTreeMap, VecDeque};
@@ -106,26 +106,19 @@ pub fn run(args: &Args) -> Result<Input> {
     }
     let recording = Recording::open(&args.file, &ReadOptions::default())?;
     let name = args.file.display().to_string();
-    let attached = match args.scene {
-        Some(_) => None,
-        None => recording.attachment("scene.toml"),
-    };
-    let with = |set: &[String]| match (&args.scene, &attached) {
-        (Some(scene), _) => load(scene, set).map_err(anyhow::Error::new),
-        (None, Some(text)) => parse("scene.toml", &String::from_utf8_lossy(text), set)
-            .with_context(|| format!("{name}: the scene attached to it; give one with --scene")),
-        (None, None) => load(USUAL, set).map_err(anyhow::Error::new),
-    };
-    let scene = with(&args.changes.set)?;
+    let source = Source::of(args, &recording);
+    let scene = source.scene(&args.changes.set)?;
     let take = Take::read(&recording)?;
-    let drive = match args.drive {
-        What::Phases => Drive::Phases,
-        What::Shoulders => Drive::Shoulders,
-        What::Beat => Drive::Beat,
+    let made_by = match source {
+        Source::Attached { .. } => source.scene(&[]).ok(),
+        Source::Given(_) | Source::Usual => None,
     };
-    let made_by = attached.as_ref().and_then(|_| with(&[]).ok());
     let options = Options {
-        drive,
+        drive: match args.drive {
+            What::Phases => Drive::Phases,
+            What::Shoulders => Drive::Shoulders,
+            What::Beat => Drive::Beat,
+        },
         made_by: made_by.as_ref(),
         from_s: args.from,
         to_s: args.to,
@@ -133,25 +126,16 @@ pub fn run(args: &Args) -> Result<Input> {
     let replay = take
         .scene(&scene, &options)
         .map_err(|why| anyhow!("{name}: {why}"))?;
-    for (k, set) in args.changes.set.iter().enumerate() {
-        let mut others = args.changes.set.clone();
-        others.remove(k);
-        // A setting may ask for others, and then it does something.
-        let Ok(without) = with(&others) else {
-            continue;
-        };
-        let same = |other: Replay| other.scene == replay.scene;
-        if without != scene && take.scene(&without, &options).is_ok_and(same) {
-            recording::note!(
-                "sim: --set {set} changes nothing: in a replay the recording decides it"
-            );
-        }
-    }
-    let settle_s = args.settle.unwrap_or(if replay.starts_as_measured {
-        0.0
-    } else {
-        SETTLE_S
+    tell_idle_settings(&args.changes.set, &scene, &replay, |set| {
+        let without = source.scene(set).ok()?;
+        let replayed = take.scene(&without, &options).ok()?.scene;
+        Some((without, replayed))
     });
+    let settle_s = match args.settle {
+        Some(settle_s) => settle_s,
+        None if replay.starts_as_measured => 0.0,
+        None => SETTLE_S,
+    };
     if settle_s >= replay.scene.duration_s {
         bail!(
             "--settle leaves {settle_s} s out, but the replay lasts {} s only",
@@ -168,63 +152,19 @@ pub fn run(args: &Args) -> Result<Input> {
     let inputs: Vec<&Path> = [Some(&*args.file), scene].into_iter().flatten().collect();
     super::may_write(&out, "mcap", &inputs)?;
     let model = Model::new(&replay.scene);
-    let writer = RecordingWriter::create(&out, &WriterOptions::beside())?;
-    let mut recorder = Recorder::at(&model, writer, replay.epoch_ns)?;
-    let measured = Measured::of(&recording, &take, &replay, recorder.writer())?;
-    let mut both = Both {
-        recorder,
-        measured,
-        courses: COMPARED
-            .iter()
-            .map(|c| (c.signal, Course::default()))
-            .collect(),
-        epoch_ns: replay.epoch_ns,
-        failed: None,
-        progress: patient_bar(
-            (replay.scene.duration_s * 1e3) as u64,
-            "{wide_bar} {percent}% of the replay, {eta} left",
-        ),
-    };
-    let (_, outcome) = run_model(
-        &model,
-        method_of(&replay.scene),
-        &settings(&replay.scene),
-        &mut both,
-    );
-    both.progress.finish_and_clear();
-    // The first that failed knows the cause.
-    if let Some(error) = both.recorder.failure().or(both.failed) {
-        return Err(error.into());
-    }
-    match outcome {
-        Ok(()) | Err(Stopped::ByObserver { .. }) => {}
-        Err(error) => {
-            return Err(error).with_context(|| {
-                format!("the replay of {name} did not run to its end; no file was made")
-            });
-        }
-    }
+    let mut both = play(&out, &model, &recording, &take, &replay, &name)?;
     let found: Vec<Misfit> = COMPARED
         .iter()
         .filter_map(|c| {
             let measured = c.of(&take, &replay)?;
             let mean = c.field != "position_m.z" || take.height_has_mean();
-            misfit(
-                c.signal,
-                &measured,
-                both.courses.get(c.signal)?,
-                window_s,
-                mean,
-                c.turn,
-            )
+            let course = both.courses.get(c.signal)?;
+            misfit(c.signal, &measured, course, window_s, mean, c.turn)
         })
         .collect();
-    let mut recorder = both.recorder;
-    both.measured.write(i64::MAX, recorder.writer())?;
-    recorder
-        .writer()
-        .metadata("replay", &record(&name, &replay, &found))?;
-    recorder.finish()?;
+    both.measured.write(i64::MAX, both.recorder.writer())?;
+    (both.recorder.writer()).metadata("replay", &record(&name, &replay, &found))?;
+    both.recorder.finish()?;
     recording::note!(
         "{}: {} s of {name} from {:.3} s on, driven by {} samples of {}",
         out.display(),
@@ -233,7 +173,7 @@ pub fn run(args: &Args) -> Result<Input> {
         replay.samples,
         replay.topic
     );
-    if args.scene.is_none() && attached.is_none() {
+    if matches!(source, Source::Usual) {
         recording::note!(
             "sim: {name}: no scene is attached to it, so the scene `{USUAL}` was driven; --scene gives another"
         );
@@ -250,6 +190,108 @@ pub fn run(args: &Args) -> Result<Input> {
     } else {
         Input::Damaged
     })
+}
+
+/// Where the scene that is driven comes from.
+enum Source<'a> {
+    Given(&'a str),
+    Attached { file: &'a Path, text: Vec<u8> },
+    Usual,
+}
+
+impl<'a> Source<'a> {
+    fn of(args: &'a Args, recording: &Recording) -> Self {
+        match (&args.scene, recording.attachment("scene.toml")) {
+            (Some(scene), _) => Self::Given(scene),
+            (None, Some(text)) => Self::Attached {
+                file: &args.file,
+                text,
+            },
+            (None, None) => Self::Usual,
+        }
+    }
+
+    /// The scene with these settings.
+    fn scene(&self, set: &[String]) -> Result<Scene> {
+        Ok(match self {
+            Self::Given(scene) => load(scene, set)?,
+            Self::Attached { file, text } => {
+                let text = String::from_utf8_lossy(text);
+                parse("scene.toml", &text, set).with_context(|| {
+                    let file = file.display();
+                    format!("{file}: the scene attached to it; give one with --scene")
+                })?
+            }
+            Self::Usual => load(USUAL, set)?,
+        })
+    }
+}
+
+/// Says which settings change the scene but not its replay; `without` gives both with fewer settings, nothing where they cannot be.
+fn tell_idle_settings(
+    set: &[String],
+    scene: &Scene,
+    replay: &Replay,
+    without: impl Fn(&[String]) -> Option<(Scene, Scene)>,
+) {
+    for k in 0..set.len() {
+        let mut others = set.to_vec();
+        let setting = others.remove(k);
+        // A setting may ask for others, and then it does something.
+        if let Some((other, replayed)) = without(&others)
+            && other != *scene
+            && replayed == replay.scene
+        {
+            recording::note!(
+                "sim: --set {setting} changes nothing: in a replay the recording decides it"
+            );
+        }
+    }
+}
+
+/// Runs the model to its end, and records it beside what was measured.
+fn play<'m>(
+    out: &Path,
+    model: &'m Model,
+    recording: &Recording,
+    take: &Take,
+    replay: &Replay,
+    name: &str,
+) -> Result<Both<'m>> {
+    let writer = RecordingWriter::create(out, &WriterOptions::beside())?;
+    let mut recorder = Recorder::at(model, writer, replay.epoch_ns)?;
+    let measured = Measured::of(recording, take, replay, recorder.writer())?;
+    let mut both = Both {
+        recorder,
+        measured,
+        courses: COMPARED
+            .iter()
+            .map(|c| (c.signal, Course::default()))
+            .collect(),
+        epoch_ns: replay.epoch_ns,
+        failed: None,
+        progress: patient_bar(
+            (replay.scene.duration_s * 1e3) as u64,
+            "{wide_bar} {percent}% of the replay, {eta} left",
+        ),
+    };
+    let (_, outcome) = run_model(
+        model,
+        method_of(&replay.scene),
+        &settings(&replay.scene),
+        &mut both,
+    );
+    both.progress.finish_and_clear();
+    // The first that failed knows the cause.
+    if let Some(error) = both.recorder.failure().or(both.failed.take()) {
+        return Err(error.into());
+    }
+    match outcome {
+        Ok(()) | Err(Stopped::ByObserver { .. }) => Ok(both),
+        Err(error) => Err(error).with_context(|| {
+            format!("the replay of {name} did not run to its end; no file was made")
+        }),
+    }
 }
 
 /// One line of what is compared.

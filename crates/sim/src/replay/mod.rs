@@ -4,8 +4,10 @@
 //! [`Take::read`] finds what was measured, [`Take::scene`] makes a scene of it that runs like any other, [`misfit`] compares.
 
 mod beat;
+mod drive;
 mod misfit;
 mod take;
 
+pub use drive::{Drive, Options, Replay};
 pub use misfit::{Course, Misfit, misfit};
-pub use take::{Drive, Options, Replay, Take};
+pub use take::Take;

@@ -1,5 +1,6 @@
 //! What a scene must satisfy beyond its types.
 
+use super::Freedom::{Roll, Tilt, Yaw};
 use super::Scene;
 use super::problem::{
     Checker, LAST_STAMP_S, MOST_SAMPLES, PAST_LAST_STAMP, Problem, larger, problem, shown,
@@ -16,6 +17,17 @@ const ROUNDED: f64 = 1e-3;
 /// # Errors
 /// The first [`Problem`] found.
 pub fn check(scene: &Scene) -> Result<(), Problem> {
+    run(scene)?;
+    freedom(scene)?;
+    body(scene)?;
+    carriers(scene)?;
+    start(scene)?;
+    solver(scene)?;
+    crate::effects::check(scene)
+}
+
+/// How long it runs, what it logs, and by which clock.
+fn run(scene: &Scene) -> Result<(), Problem> {
     Checker::positive("duration_s", scene.duration_s)?;
     Checker::positive("log_rate_hz", scene.log_rate_hz)?;
     if scene.log_rate_hz > 1e9 {
@@ -56,7 +68,10 @@ pub fn check(scene: &Scene) -> Result<(), Problem> {
             format!("found {}, expected a number below 2^56", scene.seed),
         ));
     }
+    Ok(())
+}
 
+fn freedom(scene: &Scene) -> Result<(), Problem> {
     if scene.freedom.is_empty() {
         return Err(problem(
             "freedom",
@@ -78,21 +93,25 @@ pub fn check(scene: &Scene) -> Result<(), Problem> {
             ),
         ));
     }
-    {
-        use super::Freedom::{Roll, Tilt, Yaw};
-        let has = |f| scene.freedom.contains(&f);
-        let level = scene.start.roll_pitch_yaw_deg[1].to_radians().cos().abs();
-        if has(Roll) && has(Yaw) && !has(Tilt) && level < 0.01 {
-            return Err(problem(
-                "freedom",
-                "roll and yaw are the same turn while the pole is held upright; free the tilt too",
-            ));
-        }
+    let has = |f| scene.freedom.contains(&f);
+    let level = scene.start.roll_pitch_yaw_deg[1].to_radians().cos().abs();
+    if has(Roll) && has(Yaw) && !has(Tilt) && level < 0.01 {
+        return Err(problem(
+            "freedom",
+            "roll and yaw are the same turn while the pole is held upright; free the tilt too",
+        ));
     }
+    Ok(())
+}
+
+fn body(scene: &Scene) -> Result<(), Problem> {
     Checker::positive("body.mass_kg", scene.body.mass_kg)?;
     Checker::all_finite("body.gravity_m_per_s2", &scene.body.gravity_m_per_s2)?;
     Body::new(&scene.body).map_err(|message| problem("body.inertia_kg_m2", message))?;
+    Ok(())
+}
 
+fn carriers(scene: &Scene) -> Result<(), Problem> {
     let n = scene.carriers.count();
     if n == 0 {
         return Err(problem(
@@ -120,7 +139,10 @@ pub fn check(scene: &Scene) -> Result<(), Problem> {
         scene.carriers.initial_phase_sd_rad,
     )?;
     Checker::all_finite("carriers.walk_m_per_s", &scene.carriers.walk_m_per_s)?;
+    Ok(())
+}
 
+fn start(scene: &Scene) -> Result<(), Problem> {
     let start = &scene.start;
     if let Some(z) = start.height_m {
         Checker::finite("start.height_m", z)?;
@@ -152,7 +174,10 @@ pub fn check(scene: &Scene) -> Result<(), Problem> {
             }
         }
     }
+    Ok(())
+}
 
+fn solver(scene: &Scene) -> Result<(), Problem> {
     if !(1e-13..=1e-1).contains(&scene.solver.tolerance) {
         return Err(problem(
             "solver.tolerance",
@@ -176,6 +201,5 @@ pub fn check(scene: &Scene) -> Result<(), Problem> {
             ),
         ));
     }
-
-    crate::effects::check(scene)
+    Ok(())
 }
