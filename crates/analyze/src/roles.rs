@@ -354,6 +354,18 @@ pub struct Sensors {
     pub mounting_error_deg: Option<f64>,
 }
 
+/// A topic and the type of its messages.
+type Typed<'a> = (&'a str, String);
+
+/// The topics of these types.
+fn of_type(channels: &[Typed], schemas: &[&str]) -> Vec<String> {
+    channels
+        .iter()
+        .filter(|(_, s)| schemas.contains(&s.as_str()))
+        .map(|(t, _)| (*t).to_owned())
+        .collect()
+}
+
 impl Roles {
     /// From the channels (topic, schema) of a recording, and what the user says; the user's word stands over inference, role by role.
     pub fn infer<'a>(
@@ -367,9 +379,22 @@ impl Roles {
         channels.sort();
         channels.dedup();
         let mut roles = Roles::default();
+        roles.fields_of(&channels, user);
+        roles.sensors_of(&channels, user);
+        roles.beats_of(&channels);
+        roles.truth_of(&channels);
+        if let Some(user) = user {
+            roles.as_said(user, &channels);
+        }
+        roles.once(&channels);
+        roles
+    }
+
+    /// What each field of a known type is for.
+    fn fields_of(&mut self, channels: &[Typed], user: Option<&RolesFile>) {
         for (schema, role, field) in by_schema() {
             // Rows of one role stand in order of preference; forces may come from several topics of one type.
-            if roles.patterns.contains_key(&role) {
+            if self.patterns.contains_key(&role) {
                 continue;
             }
             let mut found: Vec<String> = channels
@@ -383,25 +408,22 @@ impl Roles {
                     let topics = found.iter().map(|path| path.trim_end_matches(&field));
                     let topics = topics.map(|t| t.trim_end_matches('.').to_owned());
                     let topics: Vec<String> = topics.collect();
-                    roles.choose(&topics, "height and angles are taken from this topic");
+                    self.choose(&topics, "height and angles are taken from this topic");
                 }
                 found.truncate(1);
             }
             if !found.is_empty() {
-                roles.patterns.insert(role, found);
+                self.patterns.insert(role, found);
             }
         }
-        let of_type = |schemas: &[&str]| -> Vec<String> {
-            channels
-                .iter()
-                .filter(|(_, s)| schemas.contains(&s.as_str()))
-                .map(|(t, _)| (*t).to_owned())
-                .collect()
-        };
-        let inertial = of_type(&["sensor_msgs/Imu"]);
-        roles.halves = halves(&inertial);
+    }
+
+    /// Which inertial sensors are on the load, and which on who carries it.
+    fn sensors_of(&mut self, channels: &[Typed], user: Option<&RolesFile>) {
+        let inertial = of_type(channels, &["sensor_msgs/Imu"]);
+        self.halves = halves(&inertial);
         // The gyroscope stands for both: it is sampled at least as fast.
-        let stands = |t: &String| !roles.halves.contains_key(t) || half(t).is_some_and(|h| h.0);
+        let stands = |t: &String| !self.halves.contains_key(t) || half(t).is_some_and(|h| h.0);
         let (carriers, others): (Vec<String>, Vec<String>) = inertial
             .into_iter()
             .filter(stands)
@@ -410,75 +432,83 @@ impl Roles {
             let first = preferred(&others);
             let said = user.is_some_and(|user| !user.imu.is_empty());
             if !said && !about_the_load(&first) && !is_body(&first) {
-                roles.choose(
+                self.choose(
                     &others,
                     "what is carried is taken to move as this sensor says",
                 );
             }
             let also = others.into_iter().filter(|t| about_the_load(t));
             let also: Vec<String> = also.filter(|t| *t != first).collect();
-            roles
-                .patterns
+            self.patterns
                 .insert(Role::Imu, [vec![first], also].concat());
         }
         if !carriers.is_empty() {
-            roles
-                .patterns
+            self.patterns
                 .insert(Role::Carriers, natural_order(carriers));
         }
-        let states = !of_type(&["rath.State"]).is_empty();
-        let beats = of_type(&["rath.Beat"]).into_iter();
+    }
+
+    fn beats_of(&mut self, channels: &[Typed]) {
+        let beats = of_type(channels, &["rath.Beat"]).into_iter();
         // Whatever its messages hold: one is a beat.
         let named = channels.iter().filter(|(t, _)| *t == "/beat");
         if let Some(topic) = beats.chain(named.map(|(t, _)| (*t).to_owned())).next() {
-            roles.patterns.insert(Role::Beats, vec![topic]);
+            self.patterns.insert(Role::Beats, vec![topic]);
         }
+    }
+
+    fn truth_of(&mut self, channels: &[Typed]) {
         let poses = POSES.iter().map(|(schema, ..)| *schema);
         let pose: Vec<&str> = poses.chain(["rath.State"]).collect();
-        if let Some(truth) = of_type(&pose).into_iter().find(|t| is_truth(t)) {
-            roles.patterns.insert(Role::Truth, vec![truth]);
-        } else if let Some(state) = of_type(&["rath.State"]).first() {
-            roles.patterns.insert(Role::Truth, vec![state.clone()]);
+        if let Some(truth) = of_type(channels, &pose).into_iter().find(|t| is_truth(t)) {
+            self.patterns.insert(Role::Truth, vec![truth]);
+        } else if let Some(state) = of_type(channels, &["rath.State"]).first() {
+            self.patterns.insert(Role::Truth, vec![state.clone()]);
         }
-        if let Some(user) = user {
-            roles.sensors = Sensors {
-                place_m: user.imu_place_m,
-                mounting_roll_pitch_yaw_deg: user.imu_mounting_roll_pitch_yaw_deg,
-                gyro_age_s: user.gyro_age_s,
-                accel_age_s: user.accel_age_s,
-                accel_bias_m_per_s2: user.accel_bias_m_per_s2,
-                gyro_scale_error: user.gyro_scale_error,
-                mounting_error_deg: user.imu_mounting_error_deg,
-            };
-            let motion = [Role::Height, Role::Roll, Role::Pitch, Role::Yaw];
-            let says = |role: &Role| !user.patterns(*role).is_empty();
-            let there = |p: &String| channels.iter().any(|(t, _)| matches(p, t));
-            let sensed = user.imu.iter().any(there);
-            if sensed && !motion.iter().any(says) && !states {
-                roles.leave_poses_out(motion);
-            }
-            for role in Role::ALL {
-                let mut said = user.patterns(role);
-                if said.is_empty() {
-                    continue;
-                }
-                if role.is_topic() {
-                    said = roles.topics(role, &said, &channels);
-                }
-                roles.patterns.insert(role, said);
-                roles.said.insert(role);
-            }
+    }
+
+    /// What the user says takes the place of what names and types tell.
+    fn as_said(&mut self, user: &RolesFile, channels: &[Typed]) {
+        self.sensors = Sensors {
+            place_m: user.imu_place_m,
+            mounting_roll_pitch_yaw_deg: user.imu_mounting_roll_pitch_yaw_deg,
+            gyro_age_s: user.gyro_age_s,
+            accel_age_s: user.accel_age_s,
+            accel_bias_m_per_s2: user.accel_bias_m_per_s2,
+            gyro_scale_error: user.gyro_scale_error,
+            mounting_error_deg: user.imu_mounting_error_deg,
+        };
+        let motion = [Role::Height, Role::Roll, Role::Pitch, Role::Yaw];
+        let says = |role: &Role| !user.patterns(*role).is_empty();
+        let states = !of_type(channels, &["rath.State"]).is_empty();
+        let there = |p: &String| channels.iter().any(|(t, _)| matches(p, t));
+        let sensed = user.imu.iter().any(there);
+        if sensed && !motion.iter().any(says) && !states {
+            self.leave_poses_out(motion);
         }
-        // One sensor is not on the load and on who carries it; and beats are heard in a sound without a role.
-        let load = roles.patterns(Role::Imu).iter();
+        for role in Role::ALL {
+            let mut said = user.patterns(role);
+            if said.is_empty() {
+                continue;
+            }
+            if role.is_topic() {
+                said = self.topics(role, &said, channels);
+            }
+            self.patterns.insert(role, said);
+            self.said.insert(role);
+        }
+    }
+
+    /// One sensor is not on the load and on who carries it; and beats are heard in a sound without a role.
+    fn once(&mut self, channels: &[Typed]) {
+        let load = self.patterns(Role::Imu).iter();
         let load: Vec<String> = load
-            .flat_map(|topic| roles.device(topic))
+            .flat_map(|topic| self.device(topic))
             .map(str::to_owned)
             .collect();
         let is_sound = |topic: &String| channels.iter().any(|(t, s)| t == topic && s == SOUND);
-        roles.leave_out(Role::Carriers, |topic| load.contains(topic));
-        roles.leave_out(Role::Beats, is_sound);
-        roles
+        self.leave_out(Role::Carriers, |topic| load.contains(topic));
+        self.leave_out(Role::Beats, is_sound);
     }
 
     /// The topics that patterns of a role name, each once: `*` stands for those that are there, of inertial sensors where some are meant. What is

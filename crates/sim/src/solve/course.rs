@@ -10,6 +10,11 @@ pub fn same_moment_s(t_s: f64) -> f64 {
     (4.0 * f64::EPSILON * t_s).max(1e-12)
 }
 
+/// What is due so near the end of a step is not due before it, s.
+pub fn just_before_s(t_s: f64) -> f64 {
+    2.0 * same_moment_s(t_s)
+}
+
 /// No step is shorter, s, but for what is left before a moment that none may cross.
 pub fn smallest_step_s(t_s: f64) -> f64 {
     0.1 * same_moment_s(t_s)

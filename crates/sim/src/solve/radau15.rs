@@ -28,7 +28,7 @@ mod stages;
 mod tableau;
 mod turn;
 
-use super::course::{Course, same_moment_s, smallest_step_s};
+use super::course::{Course, just_before_s, same_moment_s, smallest_step_s};
 use super::events::{self, Looks};
 use super::{Observer, SLOWEST_PER_S, Settings, Stats, Stopped, dop853, pair};
 use crate::freedoms::rotation;
@@ -432,6 +432,24 @@ impl<'m, E: Solve> Run<'m, E> {
         self.look_around();
         let t0 = self.course.t_s;
         let left = self.course.stop_s() - t0;
+        let (h, solved) = self.accepted(t0, left)?;
+        let (h, solved, event) = self.cut(t0, h, solved)?;
+        let end_s = event.map_or(h, |theta| theta * h);
+        while let Some(t) = self.course.sample_due(t0 + end_s - just_before_s(t0)) {
+            let theta = ((t - t0) / h).clamp(0.0, 1.0);
+            if solved.between > self.trust {
+                self.aside(theta, h);
+            } else {
+                self.read(theta);
+            }
+            self.course.model.freedoms().project(&mut self.at);
+            self.course.sample(&self.at, false, observer)?;
+        }
+        self.arrive(t0, h, left, event, observer)
+    }
+
+    /// The longest step that errs little enough, and what is to be tried behind it.
+    fn accepted(&mut self, t0: f64, left: f64) -> Result<(f64, Solved), Stopped> {
         let wanted = self.sizes.wanted_s(self.h_next);
         let bend = self.bend();
         let bend_s = bend.map_or(f64::INFINITY, |bend| self.turn.reach_s(&bend));
@@ -491,19 +509,27 @@ impl<'m, E: Solve> Run<'m, E> {
         } else {
             proposal
         };
-        // What is due at the end of the step is not due before it.
-        let before_s = 2.0 * same_moment_s(t0);
-        let event = loop {
+        Ok((h, solved))
+    }
+
+    /// Cuts a step short at an event, and before a sample, that its polynomial does not hold; gives where in it the event is, as a part of it.
+    fn cut(
+        &mut self,
+        t0: f64,
+        mut h: f64,
+        mut solved: Solved,
+    ) -> Result<(f64, Solved, Option<f64>), Stopped> {
+        loop {
             // Where the polynomial does not hold an event, its place only tells how long the step should be.
             let roughly = solved.between > TRUST;
             let event = self.event(t0, h, roughly);
             let until = event.map_or(h, |theta| theta * h);
-            let due = self.course.log_due(t0 + until - before_s);
+            let due = self.course.log_due(t0 + until - just_before_s(t0));
             let cut = match (due, event) {
                 (Some(t), _) if solved.between > self.trust => t - t0,
                 (_, Some(theta)) if roughly && theta < 0.99 => 1.001 * theta * h + ROUGHLY * h,
-                (_, Some(_)) if roughly => break self.event(t0, h, false),
-                _ => break event,
+                (_, Some(_)) if roughly => return Ok((h, solved, self.event(t0, h, false))),
+                _ => return Ok((h, solved, event)),
             };
             self.course.check_work()?;
             solved = self.solve(cut, Some(cut / h), 1.0);
@@ -518,18 +544,19 @@ impl<'m, E: Solve> Run<'m, E> {
                 }
                 solved = self.solve(h, None, 1.0);
             }
-        };
-        let end_s = event.map_or(h, |theta| theta * h);
-        while let Some(t) = self.course.sample_due(t0 + end_s - before_s) {
-            let theta = ((t - t0) / h).clamp(0.0, 1.0);
-            if solved.between > self.trust {
-                self.aside(theta, h);
-            } else {
-                self.read(theta);
-            }
-            self.course.model.freedoms().project(&mut self.at);
-            self.course.sample(&self.at, false, observer)?;
         }
+    }
+
+    /// Goes to the end of a step, or to the event in it, which happens there.
+    fn arrive(
+        &mut self,
+        t0: f64,
+        h: f64,
+        left: f64,
+        event: Option<f64>,
+        observer: &mut dyn Observer,
+    ) -> Result<(), Stopped> {
+        let end_s = event.map_or(h, |theta| theta * h);
         self.read(end_s / h);
         std::mem::swap(&mut self.course.y, &mut self.at);
         let t1 = if h == left && event.is_none() {

@@ -11,7 +11,7 @@
 //! Source: Hairer & Wanner, Solving Ordinary Differential Equations II, 2nd ed. (1996), IV.8; constants and step-size control as in
 //! `scipy.integrate.Radau` (BSD-3-Clause).
 
-use super::course::{Course, same_moment_s, smallest_step_s};
+use super::course::{Course, just_before_s, same_moment_s, smallest_step_s};
 use super::events::{self, Looks};
 use super::{Observer, Settings, Stats, Stopped};
 use crate::model::{Differentiator, Model};
@@ -458,8 +458,7 @@ impl<'m> Radau<'m> {
         let (tried, error, rounds) = self.solve(course, wanted)?;
         let mut h = tried;
         let proposal = tried * (safety(rounds) * self.predicted(tried, error)).clamp(SHRINK, GROW);
-        // What is due at the end of the step is not due before it.
-        let before_s = 2.0 * same_moment_s(t0);
+        let before_s = just_before_s(t0);
         let mut behind = BEHIND;
         let event = loop {
             self.polynomial(h);
