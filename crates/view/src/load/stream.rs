@@ -32,18 +32,9 @@ pub fn others(
     dates: &mut Dates,
     findings: &mut Vec<Finding>,
 ) -> Result<(), ReadError> {
-    let info = recording.info();
-    let mut messages: BTreeMap<&str, u64> = BTreeMap::new();
-    for channel in &info.channels {
-        *messages.entry(&channel.topic).or_default() += channel.messages;
-    }
-    let curves = 8 * plan.imus.len() as u64
-        + info
-            .channels
-            .iter()
-            .filter(|c| !plan.is_ours(&c.topic) && !plan.imus.contains(&c.topic.as_str()))
-            .count() as u64
-            * 6;
+    let channels = recording.info().channels.iter();
+    let plain = channels.filter(|c| !plan.is_ours(&c.topic) && !plan.imus.contains(&&*c.topic));
+    let curves = 8 * plan.imus.len() as u64 + 6 * plain.count() as u64;
     if curves == 0 {
         return Ok(());
     }
@@ -51,30 +42,80 @@ pub fn others(
         Detail::Thinned => (POINTS / curves).max(MIN_POINTS),
         Detail::Whole => u64::MAX,
     };
-    let (start_ns, end_ns) = (info.start_ns, info.end_ns);
-    let mut coarsest_ns = 0;
-    let mut thin = |name: &str, topic: &str| {
-        let thin = Thin::new(
-            name,
-            start_ns,
-            end_ns,
-            messages.get(topic).copied().unwrap_or(0),
-            points,
-        );
-        coarsest_ns = coarsest_ns.max(thin.interval_ns());
-        thin
-    };
-    let mut times: BTreeMap<String, Times> = BTreeMap::new();
-    let mut sensors: BTreeMap<&str, sensor::Stream> = BTreeMap::new();
-    let mut plain: BTreeMap<String, Vec<(String, String, Thin)>> = BTreeMap::new();
-    let mut left_out: BTreeSet<String> = BTreeSet::new();
-    let mut fields_left_out: BTreeMap<String, BTreeSet<String>> = BTreeMap::new();
+    let mut pass = Pass::new(recording, plan, points);
     // The second pass looks at other fields of the same file: what is odd about it was said in the first.
-    let more = recording.stream(&|path| plan.is_streamed(path), &mut |batch: &Batch<'_>| {
-        if !times.contains_key(batch.topic) {
-            times.insert(batch.topic.to_owned(), Times::default());
+    let more = recording.stream(&|path| plan.is_streamed(path), &mut |batch| {
+        pass.push(batch, dates);
+    })?;
+    for finding in more {
+        if !findings.contains(&finding) {
+            findings.push(finding);
         }
-        let Some(times) = times.get_mut(batch.topic) else {
+    }
+    pass.finish(take, detail);
+    Ok(())
+}
+
+/// Begins curves that are thinned alike.
+struct Thinner<'a> {
+    recording: &'a Recording,
+    /// Points of each.
+    points: u64,
+    /// Of the coarsest, ns.
+    coarsest_ns: i64,
+}
+
+impl Thinner<'_> {
+    /// A curve of this name, of a topic with so many messages.
+    fn curve(&mut self, name: &str, messages: u64) -> Thin {
+        let info = self.recording.info();
+        let thin = Thin::new(name, info.start_ns, info.end_ns, messages, self.points);
+        self.coarsest_ns = self.coarsest_ns.max(thin.interval_ns());
+        thin
+    }
+}
+
+/// What comes together while the recording streams by.
+struct Pass<'a> {
+    plan: &'a Plan<'a>,
+    thinner: Thinner<'a>,
+    /// How many each topic has.
+    messages: BTreeMap<&'a str, u64>,
+    times: BTreeMap<String, Times>,
+    sensors: BTreeMap<&'a str, sensor::Stream>,
+    /// Field, unit and curve, by topic.
+    plain: BTreeMap<String, Vec<(String, String, Thin)>>,
+    left_out: BTreeSet<String>,
+    fields_left_out: BTreeMap<String, BTreeSet<String>>,
+}
+
+impl<'a> Pass<'a> {
+    fn new(recording: &'a Recording, plan: &'a Plan<'a>, points: u64) -> Self {
+        let mut messages: BTreeMap<&str, u64> = BTreeMap::new();
+        for channel in &recording.info().channels {
+            *messages.entry(&channel.topic).or_default() += channel.messages;
+        }
+        Self {
+            plan,
+            thinner: Thinner {
+                recording,
+                points,
+                coarsest_ns: 0,
+            },
+            messages,
+            times: BTreeMap::new(),
+            sensors: BTreeMap::new(),
+            plain: BTreeMap::new(),
+            left_out: BTreeSet::new(),
+            fields_left_out: BTreeMap::new(),
+        }
+    }
+
+    fn push(&mut self, batch: &Batch<'_>, dates: &mut Dates) {
+        if !self.times.contains_key(batch.topic) {
+            self.times.insert(batch.topic.to_owned(), Times::default());
+        }
+        let Some(times) = self.times.get_mut(batch.topic) else {
             return;
         };
         let rate_hz = dates.rates_hz.get(batch.topic).copied();
@@ -83,22 +124,26 @@ pub fn others(
             None => *batch,
         };
         times.push(batch.times_ns);
-        if let Some(topic) = plan.imus.iter().find(|topic| **topic == batch.topic) {
-            let count = messages.get(topic).copied().unwrap_or(0);
-            // One without a rate is no sensor, but may have curves.
-            if let Some(rate_hz) = rate_hz {
-                let new = || sensor::Stream::new(rate_hz, count, |name| thin(name, topic));
-                sensors.entry(topic).or_insert_with(new).push(batch, times);
-                return;
-            }
+        let count = self.messages.get(batch.topic).copied().unwrap_or(0);
+        // One without a rate is no sensor, but may have curves.
+        if let Some(topic) = self.plan.imus.iter().find(|topic| **topic == batch.topic)
+            && let Some(rate_hz) = rate_hz
+        {
+            let thinner = &mut self.thinner;
+            let new = || sensor::Stream::new(rate_hz, count, |name| thinner.curve(name, count));
+            let sensor = self.sensors.entry(topic).or_insert_with(new);
+            sensor.push(batch, times);
+            return;
         }
-        let known = plain.len();
-        let Some(topic) = (match plain.contains_key(batch.topic) {
-            true => plain.get_mut(batch.topic),
-            false if known < MAX_READ => Some(plain.entry(batch.topic.to_owned()).or_default()),
+        let known = self.plain.len();
+        let Some(topic) = (match self.plain.contains_key(batch.topic) {
+            true => self.plain.get_mut(batch.topic),
+            false if known < MAX_READ => {
+                Some(self.plain.entry(batch.topic.to_owned()).or_default())
+            }
             false => None,
         }) else {
-            left_out.insert(batch.topic.to_owned());
+            self.left_out.insert(batch.topic.to_owned());
             return;
         };
         for column in batch.columns {
@@ -111,73 +156,67 @@ pub fn others(
                 Some(at) => at,
                 None if topic.len() < MAX_CURVES => {
                     let unit = unit_of(batch.schema, field).to_owned();
-                    topic.push((field.to_owned(), unit, thin(field, batch.topic)));
+                    topic.push((field.to_owned(), unit, self.thinner.curve(field, count)));
                     topic.len() - 1
                 }
                 None => {
-                    fields_left_out
-                        .entry(batch.topic.to_owned())
-                        .or_default()
-                        .insert(field.to_owned());
+                    let fields = self.fields_left_out.entry(batch.topic.to_owned());
+                    fields.or_default().insert(field.to_owned());
                     continue;
                 }
             };
-            topic[at]
-                .2
-                .push_between_gaps(batch.times_ns, column.rows, column.values, times);
-        }
-    })?;
-    for finding in more {
-        if !findings.contains(&finding) {
-            findings.push(finding);
+            let (.., thin) = &mut topic[at];
+            thin.push_between_gaps(batch.times_ns, column.rows, column.values, times);
         }
     }
-    for (topic, times) in &times {
-        if let Some((first_ns, last_ns)) = times.ends_ns()
-            && first_ns == last_ns
-            && times.count() > 1
-        {
+
+    /// Gives the curves, and says what was left out of them.
+    fn finish(mut self, take: &mut Take, detail: Detail) {
+        let start_ns = self.thinner.recording.info().start_ns;
+        for (topic, times) in &self.times {
+            if let Some((first_ns, last_ns)) = times.ends_ns()
+                && first_ns == last_ns
+                && times.count() > 1
+            {
+                take.notes.push(format!(
+                    "{topic}: all {} messages are of one moment, {:.3} s: no curve can be drawn.",
+                    times.count(),
+                    recording::signal::seconds_since(&[first_ns], start_ns)[0]
+                ));
+            }
+        }
+        take.imus = (self.sensors.into_iter())
+            .map(|(topic, sensor)| sensor.finish(topic, &self.times[topic]))
+            .filter(Sensor::has_any)
+            .collect();
+        // The load's own sensor comes first.
+        take.imus
+            .sort_by_key(|sensor| Some(&sensor.topic) != take.main_imu.as_ref());
+        take.topics = (self.plain.into_iter())
+            .map(|(name, curves)| topic(name, curves, detail))
+            .filter(|t| !t.plots.is_empty())
+            .collect();
+        self.left_out.extend(kept_out(&mut take.topics));
+        if !self.left_out.is_empty() {
+            let names: Vec<&str> = self.left_out.iter().map(String::as_str).collect();
             take.notes.push(format!(
-                "{topic}: all {} messages are of one moment, {:.3} s: no curve can be drawn.",
-                times.count(),
-                recording::signal::seconds_since(&[first_ns], start_ns)[0]
+                "{MAX_TOPICS} topics beside the sensors are drawn; not these: {}.",
+                names.join(", ")
+            ));
+        }
+        for (topic, fields) in self.fields_left_out {
+            take.notes.push(format!(
+                "{topic}: {MAX_CURVES} of {} fields are drawn.",
+                MAX_CURVES + fields.len()
+            ));
+        }
+        if self.thinner.coarsest_ns > 0 {
+            take.notes.push(format!(
+                "Curves with many samples show the smallest and the largest value of every {:.3} s at their own times.",
+                self.thinner.coarsest_ns as f64 / 1e9
             ));
         }
     }
-    take.imus = sensors
-        .into_iter()
-        .map(|(topic, sensor)| sensor.finish(topic, &times[topic]))
-        .filter(Sensor::has_any)
-        .collect();
-    // The load's own sensor comes first.
-    take.imus
-        .sort_by_key(|sensor| Some(&sensor.topic) != take.main_imu.as_ref());
-    take.topics = plain
-        .into_iter()
-        .map(|(name, curves)| topic(name, curves, detail))
-        .filter(|t| !t.plots.is_empty())
-        .collect();
-    left_out.extend(kept_out(&mut take.topics));
-    if !left_out.is_empty() {
-        let names: Vec<&str> = left_out.iter().map(String::as_str).collect();
-        take.notes.push(format!(
-            "{MAX_TOPICS} topics beside the sensors are drawn; not these: {}.",
-            names.join(", ")
-        ));
-    }
-    for (topic, fields) in fields_left_out {
-        take.notes.push(format!(
-            "{topic}: {MAX_CURVES} of {} fields are drawn.",
-            MAX_CURVES + fields.len()
-        ));
-    }
-    if coarsest_ns > 0 {
-        take.notes.push(format!(
-            "Curves with many samples show the smallest and the largest value of every {:.3} s at their own times.",
-            coarsest_ns as f64 / 1e9
-        ));
-    }
-    Ok(())
 }
 
 /// Plots of one topic without a unit; more could not be read.
