@@ -19,8 +19,12 @@ use crate::{
 /// A recorder may begin a part before the last one ends, by no more than this, ns.
 const MOST_OVERLAP_NS: i64 = 1_000_000_000;
 
-/// A longer pause between parts is remarked on, and between messages parts the time in which a topic is held, ns.
+/// A longer pause between parts is remarked on, and between messages parts the time in which a topic is held, unless its messages are usually
+/// that far apart, ns.
 const PAUSE_NS: i64 = 10_000_000_000;
+
+/// A topic's messages are usually no more than so many of its median intervals apart.
+const USUAL: i64 = 3;
 
 /// The metadata record that readers go by: of several all keys, with their last values.
 const OWN_RECORD: &str = "rath";
@@ -154,24 +158,24 @@ impl Part {
             let mut held = BTreeMap::new();
             // None of their messages may have come.
             for topic in self.topics() {
-                held.insert(topic.to_owned(), Vec::new());
+                held.insert(topic.to_owned(), (0, Vec::new()));
             }
             let mut source = RawMessages::of(&self.recording);
             let mut note = |message: &RawMessage<'_>| {
-                if let Some(stretches) = held.get_mut(message.topic) {
+                if let Some((messages, stretches)) = held.get_mut(message.topic) {
+                    *messages += 1;
                     lengthen(stretches, message.log_time_ns);
                 }
             };
             while source.give(&mut note).is_some() {}
-            for stretches in held.values_mut() {
+            let joined = held.into_iter().map(|(topic, (messages, mut stretches))| {
                 stretches.sort_unstable();
-                stretches.dedup_by(|next, last| {
-                    let goes_on = next.0 - last.1 <= PAUSE_NS;
-                    last.1 = if goes_on { last.1.max(next.1) } else { last.1 };
-                    goes_on
-                });
-            }
-            held
+                join(&mut stretches, PAUSE_NS);
+                let long_ns = usual_pause_ns(&stretches, messages).unwrap_or(0);
+                join(&mut stretches, long_ns.saturating_mul(USUAL));
+                (topic, stretches)
+            });
+            joined.collect()
         })
     }
 }
@@ -186,6 +190,27 @@ fn lengthen(stretches: &mut Vec<(i64, i64)>, t_ns: i64) {
         }
         _ => stretches.push((t_ns, t_ns)),
     }
+}
+
+/// Makes one of stretches in order with no longer pause than this between them.
+fn join(stretches: &mut Vec<(i64, i64)>, pause_ns: i64) {
+    stretches.dedup_by(|next, last| {
+        let goes_on = next.0.saturating_sub(last.1) <= pause_ns;
+        last.1 = if goes_on { last.1.max(next.1) } else { last.1 };
+        goes_on
+    });
+}
+
+/// The median of the intervals of so many messages, ns, where that is one of the pauses between stretches: all others are shorter.
+fn usual_pause_ns(stretches: &[(i64, i64)], messages: usize) -> Option<i64> {
+    let pauses = stretches.windows(2);
+    let mut pauses: Vec<i64> = pauses
+        .map(|pair| pair[1].0.saturating_sub(pair[0].1))
+        .collect();
+    pauses.sort_unstable();
+    let shorter = messages.saturating_sub(stretches.len());
+    let middle = messages.saturating_sub(1) / 2;
+    pauses.get(middle.checked_sub(shorter)?).copied()
 }
 
 /// For how long stretches in order are together, ns.

@@ -320,6 +320,40 @@ fn topics_that_are_held_one_after_the_other_fit_though_the_files_overlap() {
     );
 }
 
+/// What comes once in a while is held from its first message to its last: its own intervals say what a pause is.
+#[test]
+fn a_slow_topic_that_two_hold_is_refused() {
+    let folder = folder();
+    let slow = |name: &str, times_s: &[i64]| {
+        let path = folder.path().join(name);
+        let mut writer = RecordingWriter::create(&path, &WriterOptions::default()).expect("begins");
+        let battery = (writer.channel("/battery", MessageKind::Float64)).expect("takes it");
+        for t_s in times_s {
+            writer
+                .message(battery, t_s * SECOND_NS, &Float64 { data: 1.0 })
+                .expect("takes it");
+        }
+        writer.finish().expect("ends");
+        path
+    };
+    let every_30: Vec<i64> = (0..11).map(|k| 30 * k).collect();
+    let late = [&[600], &every_30[..]].concat();
+    let whole = slow("whole.mcap", &every_30);
+    for copy in [slow("copy.mcap", &every_30), slow("late.mcap", &late)] {
+        let error = open(&[whole.clone(), copy]).err().expect("refused");
+        let said = error.to_string();
+        assert!(
+            said.contains("/battery") && said.contains("(for 300.0 s)"),
+            "{said}"
+        );
+    }
+    // Parts of a bag; one that fills a pause of another.
+    let paused = slow("paused.mcap", &[0, 30, 60, 90, 300, 330, 360]);
+    let filling = slow("filling.mcap", &[120, 150, 180, 210]);
+    let next = slow("next.mcap", &[390, 420]);
+    open(&[paused, filling, next]).expect("fits");
+}
+
 #[test]
 fn what_is_left_of_a_damaged_part_is_taken_and_what_is_lost_is_said() {
     let folder = folder();
