@@ -289,10 +289,13 @@ impl Parts {
     pub fn losses(&self) -> Vec<String> {
         let mut losses = Vec::new();
         for part in &self.0 {
-            let told = part
-                .losses
-                .iter()
-                .map(|loss| format!("{}: {loss}", part.name));
+            let told = part.losses.iter().map(|loss| {
+                // Their sentences are the same for one as for all.
+                let uncounted = matches!(loss.kind, Kind::TimeOutOfRange | Kind::UnknownChannel);
+                let count = counted(loss.count, "message", "messages");
+                let count = uncounted.then(|| format!(" ({count} left out)"));
+                format!("{}: {loss}{}", part.name, count.unwrap_or_default())
+            });
             losses.extend(told);
         }
         losses

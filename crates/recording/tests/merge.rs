@@ -381,6 +381,33 @@ fn what_is_left_of_a_damaged_part_is_taken_and_what_is_lost_is_said() {
     );
 }
 
+#[test]
+fn messages_whose_times_cannot_be_held_are_counted() {
+    let folder = folder();
+    let [late, out] = ["late.mcap", "out.mcap"].map(|name| folder.path().join(name));
+    let mut writer = mcap::Writer::new(fs::File::create(&late).expect("begins")).expect("begins");
+    let channel = (writer.add_channel(0, "/a", "json", &[].into())).expect("takes it");
+    for (sequence, log_time) in [5, u64::MAX, 6, 1 << 63, 7].into_iter().enumerate() {
+        let header = mcap::records::MessageHeader {
+            channel_id: channel,
+            sequence: sequence as u32,
+            log_time,
+            publish_time: log_time,
+        };
+        writer
+            .write_to_known_channel(&header, b"1")
+            .expect("takes it");
+    }
+    writer.finish().expect("ends");
+    let parts = open(&[late]).expect("fits");
+    let losses = parts.losses();
+    let said =
+        "/a: log times beyond the year 2262 cannot be held in nanoseconds (2 messages left out)";
+    assert!(losses.len() == 1 && losses[0].ends_with(said), "{losses:?}");
+    let mut writer = RecordingWriter::create(&out, &WriterOptions::default()).expect("begins");
+    assert_eq!(parts.write(&mut writer, |_| {}).expect("writes"), 3);
+}
+
 /// Parts that begin with what was kept from before the clock was set lie one after the other all the same.
 #[test]
 fn a_message_dated_long_before_all_others_makes_no_overlap() {
