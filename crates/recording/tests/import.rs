@@ -1284,6 +1284,30 @@ fn a_folder_of_several_devices_gives_each_a_topic() {
     }
 }
 
+/// Only a file's name has an ending.
+#[test]
+fn a_dot_in_a_folders_name_or_a_layouts_is_kept() {
+    let folder = folder();
+    let log = "t,ax,ay,az\n1,0,0,9.8\n";
+    let layout = |device: &str| {
+        let text = format!(
+            "{device}\n[time]\ncolumn = \"t\"\nunit = \"s\"\n[acceleration]\ncolumns = [\"ax\", \"ay\", \"az\"]\nunit = \"m/s^2\"\n"
+        );
+        file(folder.path(), "layout.toml", &text)
+    };
+    for (device, given, topic) in [
+        ("", "carrier.2/log.csv", "/imu/log"),
+        ("", "carrier.2", "/imu/carrier_2"),
+        ("device = \"belt.3\"", "carrier.2", "/imu/belt_3"),
+    ] {
+        file(folder.path(), "carrier.2/log.csv", log);
+        let layout = layout(device);
+        let given = [folder.path().join(given)];
+        let got = ingest(folder.path(), &given, layout.to_str()).expect("ingests");
+        assert_eq!(got.ingested.topics, [(topic.to_owned(), 1)]);
+    }
+}
+
 /// Each note stands under the topic that it is of, and tells the file.
 #[test]
 fn notes_of_devices_with_one_name_stand_apart() {

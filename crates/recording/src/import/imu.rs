@@ -1,6 +1,8 @@
 //! Inertial logs on their way to `sensor_msgs/msg/Imu` in the convention of REP-145: specific force in m/s² (+g on the axis that
 //! points up at rest), angular velocity in rad/s, covariance −1 for what is not given.
 
+use std::{ffi::OsStr, path::Path};
+
 use crate::cdr::{self, Quaternion};
 use crate::held::new_readings;
 
@@ -228,13 +230,19 @@ impl Sample {
     }
 }
 
-/// A device's name out of a file's: letters, digits, `_` and `-`.
-pub(super) fn device_name(file: &str) -> String {
-    let stem = std::path::Path::new(file)
-        .file_stem()
-        .and_then(|stem| stem.to_str())
-        .unwrap_or("device");
-    let name: String = stem
+/// A device's name out of that of a file, whose ending does not count, or of a folder, in which a dot ends nothing.
+pub(super) fn device_name(path: &str) -> String {
+    let path = Path::new(path);
+    let name = match path.is_dir() {
+        true => path.file_name(),
+        false => path.file_stem(),
+    };
+    spelled(name.and_then(OsStr::to_str).unwrap_or_default())
+}
+
+/// A device's name as topics take it: letters, digits, `_` and `-`.
+pub(super) fn spelled(name: &str) -> String {
+    let name: String = name
         .chars()
         .map(|c| {
             if c.is_ascii_alphanumeric() || c == '-' {

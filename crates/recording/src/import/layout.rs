@@ -269,8 +269,9 @@ pub(super) fn read(layout: &Layout, name: &str, text: &str) -> Result<Log, Impor
         track(force, "acceleration")?,
         track(rate, "angular velocity")?,
     );
-    let device = layout.device.as_deref().unwrap_or(name);
-    Ok(Log::join(imu::device_name(device), force, rate, notes))
+    let device = layout.device.as_deref();
+    let device = device.map_or_else(|| imu::device_name(name), imu::spelled);
+    Ok(Log::join(device, force, rate, notes))
 }
 
 #[cfg(test)]
