@@ -95,8 +95,23 @@ pub struct ImportOptions<'a> {
     pub sound_start_s: f64,
 }
 
-/// Texts larger than this, unpacked, are refused.
-const MAX_TEXT_BYTES: u64 = 2 << 30;
+/// A log that takes more memory than this is refused: some fifteen hours of a device at 100 Hz.
+const MAX_BYTES: u64 = 3 << 30;
+/// What a row takes besides its cells, here and as a sample: 240 to 360 were measured.
+const ROW_BYTES: u64 = 350;
+/// What a cell takes besides its text.
+const CELL_BYTES: u64 = 8;
+/// Every text is held once as it is and once in cells.
+const COPIES: u64 = 2;
+
+/// About what a text takes with the rows that are made of it; a small zip may hold many short ones.
+fn bytes_taken(text: &str) -> u64 {
+    let count = |is: fn(u8) -> bool| text.bytes().filter(|byte| is(*byte)).count() as u64;
+    let returns = text.matches("\r\n").count() as u64;
+    let rows = count(|byte| matches!(byte, b'\n' | b'\r')) - returns;
+    let cells = count(|byte| matches!(byte, b',' | b';' | b'\t'));
+    COPIES * text.len() as u64 + CELL_BYTES * cells + ROW_BYTES * rows
+}
 
 /// The files of a log: one, or those of a folder or zip.
 struct Files {
@@ -230,7 +245,7 @@ pub fn ingest(
             continue;
         }
         wav::refuse(path)?;
-        let files = open(path)?;
+        let files = open(path, MAX_BYTES)?;
         let read = read(&files, layout.as_ref()).map_err(|error| error.within(&files.name))?;
         for mut log in read {
             log.name = unique(&mut devices, log.name);
@@ -553,8 +568,8 @@ fn unknown(files: &Files) -> ImportError {
     ))
 }
 
-/// Reads the texts of a file, folder or zip.
-fn open(path: &Path) -> Result<Files, ImportError> {
+/// Reads the texts of a file, folder or zip, which may take so many bytes of memory in all.
+fn open(path: &Path, most_bytes: u64) -> Result<Files, ImportError> {
     let name = path.display().to_string();
     let io = |cause| ImportError::Io {
         name: name.clone(),
@@ -564,18 +579,20 @@ fn open(path: &Path) -> Result<Files, ImportError> {
         name: name.clone(),
         problem,
     };
-    let mut left = MAX_TEXT_BYTES;
+    let mut left = most_bytes;
     let mut text = |from: &mut dyn Read, what: &str| -> Result<String, ImportError> {
         let mut bytes = Vec::new();
-        from.take(left + 1)
+        from.take(left / COPIES + 1)
             .read_to_end(&mut bytes)
             .map_err(|error| content(format!("{what} cannot be read: {error}")))?;
-        left = left.checked_sub(bytes.len() as u64).ok_or_else(|| {
+        let text = decoded(bytes);
+        left = left.checked_sub(bytes_taken(&text)).ok_or_else(|| {
+            let most = most_bytes as f64 / f64::from(1 << 30);
             content(format!(
-                "holds more than {MAX_TEXT_BYTES} bytes of text, the limit"
+                "its rows take more than {most:.1} GiB of memory, the limit; give the files in it one by one, or split it (`analyze merge` puts recordings together)"
             ))
         })?;
-        Ok(decoded(bytes))
+        Ok(text)
     };
     let (mut texts, mut sounds, mut others) = (Vec::new(), Vec::new(), Vec::new());
     let mut is_log = |name: &str| {
@@ -742,4 +759,28 @@ fn halves(logs: &[imu::Log]) -> Option<String> {
     Some(format!(
         "{rate} has no acceleration and {force} no angular velocity: if they are of one device, give the zip or the folder that they come from instead"
     ))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_rows_take_is_counted_before_it_is_taken() {
+        assert_eq!(bytes_taken("a;b\r\n1,2\n"), 18 + 16 + 700);
+        assert_eq!(bytes_taken("1\r2\r"), 8 + 700);
+        let folder = tempfile::tempdir().expect("a folder");
+        let path = folder.path().join("short.zip");
+        let mut zip = zip::ZipWriter::new(fs::File::create(&path).expect("creates"));
+        zip.start_file("a.csv", zip::write::SimpleFileOptions::default())
+            .expect("starts");
+        io::Write::write_all(&mut zip, "1,2\n".repeat(10_000).as_bytes()).expect("writes");
+        zip.finish().expect("finishes");
+        let said = open(&path, 3_000_000).err().expect("refused").to_string();
+        assert!(
+            said.ends_with("short.zip: its rows take more than 0.0 GiB of memory, the limit; give the files in it one by one, or split it (`analyze merge` puts recordings together)"),
+            "{said}"
+        );
+        assert!(open(&path, 4_000_000).is_ok());
+    }
 }
