@@ -154,6 +154,36 @@ fn a_quotation_mark_too_many_is_an_error_where_it_stands() {
     );
 }
 
+/// Commas in names and numbers are as many as semicolons; a semicolon in a name is none between cells.
+#[test]
+fn the_first_rows_tell_what_separates_cells() {
+    let folder = folder();
+    let layout = |text: &str| {
+        let mut names = text.split('|');
+        let mut next = || names.next().expect("a name");
+        format!(
+            "[time]\ncolumn = '{}'\nunit = 'ms'\n[acceleration]\ncolumns = ['{}', '{}', '{}']\nunit = 'm/s^2'\n",
+            next(),
+            next(),
+            next(),
+            next()
+        )
+    };
+    for (names, separator, row) in [
+        ("t|x, m/s2|y, m/s2|z, m/s2", ";", "0;0,5;0,25;9,5"),
+        ("t, ms|x, m/s2|y, m/s2|z, m/s2", ";", "0;0.5;0.25;9.5"),
+        ("t;ms|x;1|y;2|z", ",", "0,0.5,0.25,9.5"),
+    ] {
+        let laid = file(folder.path(), "layout.toml", &layout(names));
+        let header = names.replace('|', separator);
+        let text = format!("{header}\n{row}\n{row}\n");
+        let path = file(folder.path(), "log.csv", &text);
+        let got = ingest(folder.path(), &[path], laid.to_str());
+        let got = got.unwrap_or_else(|error| panic!("{header}: {error}"));
+        assert_eq!(got.values("/imu/log.linear_acceleration.y"), [0.25; 2]);
+    }
+}
+
 #[test]
 fn a_log_cut_within_its_last_number_loses_that_row_alone() {
     let folder = folder();

@@ -8,7 +8,7 @@ use super::{
     HEADER_LINES, ImportError,
     date::times_ns,
     imu::{self, Log, STANDARD_GRAVITY, Track},
-    table::Table,
+    table::{Table, below_header},
 };
 use crate::text::{document::from_toml, read_text};
 
@@ -144,15 +144,14 @@ pub(super) fn fitting(text: &str) -> Option<Layout> {
 
 /// Whether a text has the header, with the columns that a layout needs.
 pub(super) fn fits(layout: &Layout, text: &str) -> bool {
-    let mut lines = text.lines().take(HEADER_LINES);
-    let Some(header) = lines.find(|line| layout.is_header(line)) else {
+    let is_header = |line: &str| layout.is_header(line);
+    let Some((_, text)) = below_header(text, HEADER_LINES, is_header) else {
         return false;
     };
     let needed = [&layout.acceleration, &layout.angular_velocity];
     let needed = needed.into_iter().flatten().filter(|v| !v.optional);
     let mut needed = needed.flat_map(|v| &v.columns).chain([&layout.time.column]);
-    Table::parse("", header, |_| true)
-        .is_ok_and(|table| needed.all(|column| table.find(column).is_some()))
+    Table::header_of(text).is_ok_and(|table| needed.all(|column| table.find(column).is_some()))
 }
 
 /// Other spellings of units, and the one that is meant.

@@ -35,16 +35,7 @@ impl Table {
             name: name.to_owned(),
             problem,
         };
-        let mut offset = 0;
-        let mut found = None;
-        for (number, line) in text.split_inclusive('\n').enumerate() {
-            if is_header(line.trim_end()) {
-                found = Some((number + 1, offset, line));
-                break;
-            }
-            offset += line.len();
-        }
-        let Some((header_line, offset, header)) = found else {
+        let Some((header_line, rest)) = below_header(text, usize::MAX, is_header) else {
             let first: String = text
                 .lines()
                 .next()
@@ -56,22 +47,26 @@ impl Table {
                 "has no header line that is known; it begins with {first:?}"
             )));
         };
-        let rest = &text[offset..];
-        Self::below(name, rest, header, header_line)
+        Self::below(name, rest, separator(rest), header_line)
+    }
+
+    /// Reads the header that a text begins with as a table without rows.
+    pub fn header_of(text: &str) -> Result<Self, ImportError> {
+        let header = text.lines().next().unwrap_or_default();
+        Self::below("", header, separator(text), 1)
     }
 
     /// Reads a table that begins with its header.
     fn below(
         name: &str,
         text: &str,
-        header: &str,
+        separator: u8,
         header_line: usize,
     ) -> Result<Self, ImportError> {
         let problem = |problem: String| ImportError::Content {
             name: name.to_owned(),
             problem,
         };
-        let separator = separator(header);
         let mut reader = csv::ReaderBuilder::new()
             .delimiter(separator)
             .flexible(true)
@@ -139,7 +134,7 @@ impl Table {
     pub fn headless(name: &str, text: &str, columns: &[&str]) -> Result<Self, ImportError> {
         let cells = text.lines().next().unwrap_or_default().split(',').count();
         let header = columns[..cells.min(columns.len())].join(",");
-        Self::below(name, &format!("{header}\n{text}"), &header, 0)
+        Self::below(name, &format!("{header}\n{text}"), b',', 0)
     }
 
     /// Leaves out a last row that was cut off, and says which rows are left out as broken; `log` is the log that this table belongs to.
@@ -380,21 +375,51 @@ const MOST_OVERLONG: u64 = 10;
 /// Rows that come later than this behind their time belong to another recording.
 const LATE_S: f64 = 1.0;
 
-/// The sign that separates the header's names: the commonest of tab, semicolon, comma outside quotes.
-fn separator(header: &str) -> u8 {
-    let mut counts = [(b'\t', 0), (b';', 0), (b',', 0)];
+/// Which of so many first lines of a text is its header, from 1, and the text from there on.
+pub(super) fn below_header(
+    text: &str,
+    lines: usize,
+    is_header: impl Fn(&str) -> bool,
+) -> Option<(usize, &str)> {
+    let mut rest = text;
+    for (number, line) in text.split_inclusive('\n').take(lines).enumerate() {
+        if is_header(line.trim_end()) {
+            return Some((number + 1, rest));
+        }
+        rest = &rest[line.len()..];
+    }
+    None
+}
+
+/// Signs that separate cells; of two that fit as well, the first: a comma may also be a decimal sign, or stand in a name.
+const SEPARATORS: [u8; 3] = [b'\t', b';', b','];
+
+/// The sign that separates the cells of a text that begins with its header: of those that most of the first rows have as often as the header, or of
+/// all where none is, the commonest in the header.
+fn separator(text: &str) -> u8 {
+    let mut lines = text.lines().map(separators);
+    let header = lines.next().unwrap_or_default();
+    let rows = lines.filter(|counts| counts.iter().any(|count| *count > 0));
+    let rows: Vec<[usize; 3]> = rows.take(CELLS).collect();
+    let fits = |k: usize| {
+        let alike = rows.iter().filter(|counts| counts[k] == header[k]).count();
+        header[k] > 0 && alike > 0 && 2 * alike >= rows.len()
+    };
+    let best = (0..3).rev().max_by_key(|k| (fits(*k), header[*k]));
+    best.map_or(b',', |k| SEPARATORS[k])
+}
+
+/// How often each separator stands in a line, outside quotes.
+fn separators(line: &str) -> [usize; 3] {
+    let mut counts = [0; 3];
     let mut quoted = false;
-    for byte in header.bytes() {
+    for byte in line.bytes() {
         quoted ^= byte == b'"';
-        if let Some((_, count)) = counts.iter_mut().find(|(sign, _)| *sign == byte && !quoted) {
-            *count += 1;
+        if let Some(k) = SEPARATORS.iter().position(|sign| *sign == byte && !quoted) {
+            counts[k] += 1;
         }
     }
     counts
-        .iter()
-        .copied()
-        .max_by_key(|&(_, count)| count)
-        .map_or(b',', |(sign, _)| sign)
 }
 
 /// Whether a cell has no value, or says so.
