@@ -185,6 +185,17 @@ fn the_first_rows_tell_what_separates_cells() {
 }
 
 #[test]
+fn a_header_without_end_is_refused() {
+    let folder = folder();
+    let text = format!("t,x,y,z{}\n0,0,0,9.8\n", ",0".repeat(1 << 20));
+    let error = refused(folder.path(), &text);
+    assert!(
+        error.ends_with("log.csv: line 1, the header, has 2097159 bytes; expected names of columns in at most 1048576: are line ends missing?"),
+        "{error}"
+    );
+}
+
+#[test]
 fn a_log_cut_within_its_last_number_loses_that_row_alone() {
     let folder = folder();
     let rows = (0..50).map(|k| format!("{},0,0,9.812\n", 10 * k));

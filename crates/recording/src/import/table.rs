@@ -47,6 +47,12 @@ impl Table {
                 "has no header line that is known; it begins with {first:?}"
             )));
         };
+        let length = rest.find('\n').unwrap_or(rest.len());
+        if length > MOST_HEADER_BYTES {
+            return Err(problem(format!(
+                "line {header_line}, the header, has {length} bytes; expected names of columns in at most {MOST_HEADER_BYTES}: are line ends missing?"
+            )));
+        }
         Self::below(name, rest, separator(rest), header_line)
     }
 
@@ -365,6 +371,9 @@ impl Table {
         ])
     }
 }
+
+/// No table has names as long as this.
+const MOST_HEADER_BYTES: usize = 1 << 20;
 
 /// So many cells of a column tell how long they are.
 const CELLS: usize = 20;
