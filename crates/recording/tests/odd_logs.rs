@@ -196,6 +196,18 @@ fn a_header_without_end_is_refused() {
 }
 
 #[test]
+fn a_layout_that_names_a_column_twice_is_refused() {
+    let folder = folder();
+    let layout = LAYOUT.replace("\"y\"", "\"X \"");
+    let layout = file(folder.path(), "twice.toml", &layout);
+    let log = file(folder.path(), "log.csv", "t,x,y,z\n0,0,0,9.8\n");
+    let error = ingest(folder.path(), &[log], layout.to_str()).err();
+    let said = error.expect("refused").to_string();
+    let wanted = "twice.toml: is no layout: it names the column \"X \" twice; expected another for each number";
+    assert!(said.ends_with(wanted), "{said}");
+}
+
+#[test]
 fn a_log_cut_within_its_last_number_loses_that_row_alone() {
     let folder = folder();
     let rows = (0..50).map(|k| format!("{},0,0,9.812\n", 10 * k));

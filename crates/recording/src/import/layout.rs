@@ -1,6 +1,6 @@
 //! Any CSV with inertial columns, by a layout in TOML; docs/recording.md has one with every key.
 
-use std::path::Path;
+use std::{collections::HashSet, path::Path};
 
 use serde::Deserialize;
 
@@ -8,7 +8,7 @@ use super::{
     HEADER_LINES, ImportError,
     date::times_ns,
     imu::{self, Log, STANDARD_GRAVITY, Track},
-    table::{Table, below_header},
+    table::{Table, below_header, plain},
 };
 use crate::text::{document::from_toml, read_text};
 
@@ -44,6 +44,14 @@ impl Layout {
             Some(header) => line.trim_start_matches('"').starts_with(header.as_str()),
             None => !line.is_empty(),
         }
+    }
+
+    /// The names of all columns.
+    fn columns(&self) -> impl Iterator<Item = &str> {
+        let vectors = [&self.acceleration, &self.angular_velocity];
+        let of_vectors = vectors.into_iter().flatten().flat_map(|v| &v.columns);
+        let all = of_vectors.chain([&self.time.column]);
+        all.map(String::as_str)
     }
 }
 
@@ -127,10 +135,22 @@ pub(super) fn find(name: &str) -> Result<Layout, ImportError> {
             )));
         }
     };
-    from_toml(&text).map_err(|wrong| ImportError::Content {
+    let layout: Layout = from_toml(&text).map_err(|wrong| ImportError::Content {
         name: wrong.place(name),
         problem: format!("is no layout: {}", wrong.message),
-    })
+    })?;
+    let mut seen = HashSet::new();
+    let mut again = layout
+        .columns()
+        .filter(|column| !seen.insert(plain(column)));
+    let twice = again.next().map(str::to_owned);
+    drop(again);
+    match twice {
+        Some(twice) => Err(problem(format!(
+            "is no layout: it names the column {twice:?} twice; expected another for each number"
+        ))),
+        None => Ok(layout),
+    }
 }
 
 /// The built-in layout that fits a text: its header is there, with the columns that it needs.

@@ -436,7 +436,8 @@ fn is_missing(cell: &str) -> bool {
     cell.is_empty() || NOTHING.iter().any(|word| cell.eq_ignore_ascii_case(word))
 }
 
-fn plain(name: &str) -> String {
+/// A column's name without what does not count in it.
+pub(super) fn plain(name: &str) -> String {
     name.replace('²', "^2")
         .chars()
         .filter(|c| !matches!(c, ' ' | '_' | '"'))
