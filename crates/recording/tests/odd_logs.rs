@@ -245,12 +245,29 @@ fn what_is_beside_logs_and_no_log_is_named() {
         "a.csv",
         "PacketCounter,SampleTimeFine,Acc_X,Acc_Y,Acc_Z\n1,5,0,0,9.8\n",
     );
-    for name in ["b.zip", "c.tsv", ".hidden", "sub/d.csv"] {
+    for name in ["b.zip", "c.tsv", ".hidden", "sub/d.csv", "sub.csv/d.csv"] {
         file(&device, name, "");
     }
+    #[cfg(unix)]
+    {
+        let pipe = device.join("pipe.csv");
+        std::os::unix::net::UnixListener::bind(pipe).expect("makes one");
+        std::os::unix::fs::symlink("a.csv", device.join("linked.csv")).expect("links");
+    }
     let got = ingest(folder.path(), &[device], None).expect("ingests");
-    let told = note(&got, "neither CSV nor text").expect("a note");
-    assert!(told.ends_with(": b.zip, c.tsv, sub"), "{told}");
+    let told = note(&got, "no files of CSV or text").expect("a note");
+    let others: Vec<&str> = told
+        .rsplit(": ")
+        .next()
+        .expect("names")
+        .split(", ")
+        .collect();
+    if cfg!(unix) {
+        assert_eq!(others, ["b.zip", "c.tsv", "pipe.csv", "sub", "sub.csv"]);
+        assert_eq!(got.ingested.topics.len(), 2);
+    } else {
+        assert_eq!(others, ["b.zip", "c.tsv", "sub", "sub.csv"]);
+    }
 }
 
 #[test]

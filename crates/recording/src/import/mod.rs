@@ -265,7 +265,7 @@ pub fn ingest(
             let more = (more > 0).then(|| format!("{more} more"));
             let others = Vec::from_iter(named.chain(more)).join(", ");
             beside.push(format!(
-                "{}: left out, for they are neither CSV nor text: {others}",
+                "{}: left out, for they are no files of CSV or text: {others}",
                 path.display()
             ));
         }
@@ -595,17 +595,18 @@ fn open(path: &Path, most_bytes: u64) -> Result<Files, ImportError> {
         Ok(text)
     };
     let (mut texts, mut sounds, mut others) = (Vec::new(), Vec::new(), Vec::new());
-    let mut is_log = |name: &str| {
+    let mut is_log = |name: &str, is_file: bool| {
         // Hidden files are a system's own: macOS puts one beside each file of a zip.
         if file_name(name).starts_with('.') {
             return false;
         }
-        if wav::is_named(name) {
+        let is_log = is_file && is_text(name);
+        if is_file && wav::is_named(name) {
             sounds.push(file_name(name).to_owned());
-        } else if !is_text(name) {
+        } else if !is_log {
             others.push(name.to_owned());
         }
-        is_text(name)
+        is_log
     };
     if path.is_dir() {
         // Apps put at most one level of folders (`meta`) beside their tables.
@@ -621,7 +622,9 @@ fn open(path: &Path, most_bytes: u64) -> Result<Files, ImportError> {
             entries.sort_by_key(fs::DirEntry::file_name);
             for entry in entries {
                 let what = format!("{inside}{}", entry.file_name().to_string_lossy());
-                if what == "meta" || !is_log(&what) {
+                // A pipe may never end; links are followed.
+                let is_file = entry.path().is_file();
+                if what == "meta" || !is_log(&what, is_file) {
                     continue;
                 }
                 let mut file = fs::File::open(entry.path()).map_err(io)?;
@@ -662,7 +665,7 @@ fn open(path: &Path, most_bytes: u64) -> Result<Files, ImportError> {
             if entry_name == "xl/workbook.xml" {
                 return Err(content(format!("is {}", foreign::EXCEL)));
             }
-            if entry.is_dir() || !is_log(&entry_name) {
+            if entry.is_dir() || !is_log(&entry_name, true) {
                 continue;
             }
             let read = text(&mut entry, &entry_name)?;
