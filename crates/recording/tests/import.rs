@@ -1547,6 +1547,26 @@ fn a_log_of_the_archive_stands_alone() {
 }
 
 #[test]
+fn a_log_of_the_archive_whose_times_step_back_is_refused() {
+    let folder = folder();
+    let path = folder.path().join("logs.npz");
+    let mut zip = zip::ZipWriter::new(fs::File::create(&path).expect("creates"));
+    zip.start_file("t.npy", zip::write::SimpleFileOptions::default())
+        .expect("starts");
+    let head = "{'descr': '<f8', 'fortran_order': False, 'shape': (3,), }\n";
+    let mut array = b"\x93NUMPY\x01\x00".to_vec();
+    array.extend((head.len() as u16).to_le_bytes());
+    array.extend(head.bytes());
+    array.extend([0.0, 0.5, 0.25].map(f64::to_le_bytes).concat());
+    std::io::Write::write_all(&mut zip, &array).expect("writes");
+    zip.finish().expect("finishes");
+    let error = ingest(folder.path(), &[path], None).err().expect("refused");
+    let said = error.to_string();
+    let wanted = "logs.npz: t[2] is 0.25 after 0.5; expected times that go on";
+    assert!(said.ends_with(wanted), "{said}");
+}
+
+#[test]
 fn a_row_without_a_time_costs_no_other_in_any_format() {
     let folder = folder();
     let shimmer = "Shimmer_A_Timestamp_Unix_CAL,Shimmer_A_Accel_LN_X_CAL,Shimmer_A_Accel_LN_Y_CAL,Shimmer_A_Accel_LN_Z_CAL\nms,m/(s^2),m/(s^2),m/(s^2)\n";

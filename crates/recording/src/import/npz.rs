@@ -209,6 +209,14 @@ fn read(path: &Path) -> Result<Log, ImportError> {
             t_s[position]
         )));
     }
+    if let Some(late) = t_s.windows(2).position(|pair| pair[1] < pair[0]) {
+        return Err(columns.problem(format!(
+            "t[{}] is {} after {}; expected times that go on",
+            late + 1,
+            t_s[late + 1],
+            t_s[late]
+        )));
+    }
     let phase_rad = columns.table("walker_phase", n, None)?;
     let carriers = phase_rad[0].len() as u64;
     let (_, positions) = columns.array("walker_pos", &[Some(n), Some(carriers), Some(3)])?;
