@@ -42,6 +42,9 @@ fn forget(path: &Path) {
     }
 }
 
+/// So much of a name stands in the temporary one, which is longer: systems take 255 bytes, some 143.
+const MOST_NAME_BYTES: usize = 100;
+
 /// Where the bytes go.
 pub enum Sink {
     /// A file that is not complete.
@@ -87,6 +90,8 @@ impl Sink {
                     Box::new(device),
                 )));
             }
+            // Found out now, not when all is written.
+            Err(error) if error.kind() == io::ErrorKind::InvalidFilename => return Err(error),
             Ok(found) if found.permissions().readonly() => {
                 return Err(io::Error::new(
                     io::ErrorKind::PermissionDenied,
@@ -100,9 +105,9 @@ impl Sink {
             Some(parent) if !parent.as_os_str().is_empty() => parent,
             _ => Path::new("."),
         };
-        let mut prefix = std::ffi::OsString::from(".");
-        prefix.push(path.file_name().ok_or(io::ErrorKind::InvalidInput)?);
-        prefix.push(".");
+        let name = path.file_name().ok_or(io::ErrorKind::InvalidInput)?;
+        let name = name.to_string_lossy();
+        let prefix = format!(".{}.", &name[..name.floor_char_boundary(MOST_NAME_BYTES)]);
         let mut builder = tempfile::Builder::new();
         builder.prefix(&prefix).suffix(".part");
         #[cfg(unix)]
@@ -334,7 +339,7 @@ mod tests {
     #[test]
     fn no_error_says_the_temporary_name() {
         let folder = tempfile::tempdir().unwrap();
-        let long = "x".repeat(250);
+        let long = "x".repeat(256);
         let error = write_whole::<Error>(&folder.path().join(&long), |_| Ok(())).unwrap_err();
         assert!(!error.to_string().contains(&long), "{error}");
         assert!(error.to_string().contains("too long"), "{error}");

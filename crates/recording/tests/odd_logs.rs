@@ -301,6 +301,17 @@ fn phyphox_behind_a_line_and_in_a_zip_of_another_system() {
     assert_eq!(got.times("/imu/walk"), [start_ns, start_ns + 100_000_000]);
 }
 
+/// The name until it is whole is longer.
+#[test]
+fn a_name_may_be_as_long_as_the_system_takes() {
+    let folder = folder();
+    let out = folder.path().join(format!("{}ड.mcap", "a".repeat(247)));
+    recording::whole::write_whole(&out, |_| Ok::<_, std::io::Error>(())).expect("writes");
+    let out = folder.path().join(format!("{}.mcap", "ड".repeat(83)));
+    recording::whole::write_whole(&out, |_| Ok::<_, std::io::Error>(())).expect("writes");
+    assert_eq!(fs::read_dir(folder.path()).expect("reads").count(), 2);
+}
+
 /// A file that replaces another is as open to others as that was.
 #[cfg(unix)]
 #[test]
