@@ -1937,6 +1937,10 @@ fn bad_input_gets_one_clear_sentence() {
         );
     }
     assert_eq!(analyze(&[]).status.code(), Some(2));
+    for wrong in ["nan", "-inf", "2e6", "soon"] {
+        let args = ["ingest", "x.wav", "--out", "x.mcap", "--sound-start", wrong];
+        assert_eq!(analyze(&args).status.code(), Some(2), "{wrong}");
+    }
     assert_eq!(
         analyze(&["x.mcap", "--window", "60..15"]).status.code(),
         Some(2)

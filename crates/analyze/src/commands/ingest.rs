@@ -2,7 +2,6 @@
 
 use std::path::{Path, PathBuf};
 
-use anyhow::bail;
 use clap::Args;
 use recording::import::{self, ImportError};
 use recording::whole::{Output, may_write};
@@ -40,9 +39,18 @@ pub(super) struct IngestArgs {
         long,
         value_name = "SECONDS",
         default_value_t = 0.0,
-        allow_negative_numbers = true
+        value_parser = sound_start,
+        allow_hyphen_values = true
     )]
     sound_start: f64,
+}
+
+/// Takes when the sound begins.
+fn sound_start(text: &str) -> Result<f64, String> {
+    match text.parse::<f64>() {
+        Ok(x) if x.abs() <= 1e6 => Ok(x),
+        _ => Err("expected seconds up to 1000000".into()),
+    }
 }
 
 pub(super) fn run(args: &IngestArgs) -> anyhow::Result<Done> {
@@ -63,12 +71,6 @@ fn ingest(args: &IngestArgs) -> anyhow::Result<Done> {
     let layout = args.layout.iter().map(Path::new);
     let inputs = args.files.iter().map(AsRef::as_ref).chain(layout);
     may_write(&[output], inputs)?;
-    if args.sound_start.abs() > 1e6 || args.sound_start.is_nan() {
-        bail!(
-            "--sound-start: found {}, expected seconds up to 1000000",
-            args.sound_start
-        );
-    }
     let options = import::ImportOptions {
         layout: args.layout.as_deref(),
         sound_start_s: args.sound_start,
