@@ -11,6 +11,7 @@ use kuva::plot::{ColorMap, Heatmap, LinePlot, ScatterPlot};
 use kuva::render::layout::{Layout, TickFormat};
 use kuva::render::plots::Plot as Mark;
 use kuva::render::render::{Scene, render_multiple};
+use recording::text::plain;
 
 use super::html::escaped;
 use super::plots::{COLOURS, Image, Panel, Plot};
@@ -73,6 +74,8 @@ pub fn figures(plots: &[Plot], folder: &Path) -> Result<Vec<PathBuf>, FigureErro
         let named = format!(" role=\"img\"><title>{}</title>", escaped(title));
         let svg = SvgBackend::default().render_scene(&scene);
         let svg = svg.replacen('>', &named, 1);
+        // Names out of files stand in legends, labels and titles.
+        let svg = plain(&svg);
         for (extension, bytes) in [("svg", svg.as_bytes()), ("png", &png[..])] {
             let path = folder.join(format!("{stem}.{extension}"));
             recording::whole::write_whole(&path, |file| std::io::Write::write_all(file, bytes))
@@ -418,7 +421,7 @@ mod tests {
     #[test]
     fn figures_have_names_for_who_cannot_see_them() {
         let folder = tempfile::tempdir().expect("a folder");
-        let mut p = Panel::new("roll", "Roll < tilt", "time, s", "angle, deg");
+        let mut p = Panel::new("roll", "Roll < tilt", "time, s", "a\u{1}ngle\u{1b}, deg");
         p.series.push(Series {
             x: vec![0.0, 1.0],
             y: vec![0.0, 1.0],
@@ -431,5 +434,7 @@ mod tests {
             "{}",
             &svg[..300]
         );
+        // XML holds no others.
+        assert!(!svg.contains(|c: char| c.is_control() && !matches!(c, '\n' | '\t')));
     }
 }

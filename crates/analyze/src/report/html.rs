@@ -9,7 +9,7 @@ use super::table::{figures, thousands};
 use crate::envelope::outline_of;
 use crate::examine::Analysis;
 use crate::metrics::{self, Datum};
-use recording::text::counted;
+use recording::text::{counted, plain};
 
 /// Metrics shown large at the top, with what is said beside them: of those that have a value the first eight.
 const TILES: [(&str, &str); 9] = [
@@ -606,7 +606,8 @@ fn rounded(x: &[f64], digits: usize) -> Value {
 
 /// Text that is safe between tags and in attributes.
 pub(super) fn escaped(text: &str) -> String {
-    text.replace('&', "&amp;")
+    plain(text)
+        .replace('&', "&amp;")
         .replace('<', "&lt;")
         .replace('>', "&gt;")
         .replace('"', "&quot;")
@@ -680,6 +681,7 @@ mod tests {
     #[test]
     fn names_cannot_become_markup() {
         assert_eq!(escaped("<script>\"&"), "&lt;script&gt;&quot;&amp;");
+        assert_eq!(escaped("/a\u{1}\u{1b}[2J"), "/a\u{fffd}\u{fffd}[2J");
         assert!(!data(&[]).to_string().contains('<'));
     }
 

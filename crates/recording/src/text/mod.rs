@@ -16,9 +16,12 @@ macro_rules! note {
     }};
 }
 
-/// A text for a terminal: what a name in somebody's file could command it with (escape sequences, bells) stands as U+FFFD.
+/// A text for a terminal or a page: what a name in somebody's file could command it with (escape sequences, bells), or XML cannot hold, stands as
+/// U+FFFD.
 pub fn plain(text: &str) -> std::borrow::Cow<'_, str> {
-    let commands = |c: char| c.is_control() && !matches!(c, '\n' | '\t');
+    let commands = |c: char| {
+        c.is_control() && !matches!(c, '\n' | '\t') || matches!(c, '\u{fffe}' | '\u{ffff}')
+    };
     match text.contains(commands) {
         true => text.replace(commands, "\u{fffd}").into(),
         false => text.into(),
@@ -73,8 +76,8 @@ mod tests {
     fn a_name_cannot_command_the_terminal() {
         assert_eq!(plain("φ\t1\n"), "φ\t1\n");
         assert_eq!(
-            plain("a\u{1b}[2J\u{7}\u{9b}"),
-            "a\u{fffd}[2J\u{fffd}\u{fffd}"
+            plain("a\u{1b}[2J\u{7}\u{9b}\u{ffff}"),
+            "a\u{fffd}[2J\u{fffd}\u{fffd}\u{fffd}"
         );
     }
 
