@@ -10,7 +10,7 @@ use recording::{Finding, Kind, Signal};
 
 use crate::examine::with_angles;
 use crate::quaternion::{ANGLES, angles};
-use crate::report::quoted;
+use crate::report::{exact, quoted};
 use crate::request::Request;
 
 /// Why a table could not be written. Nothing is left under the final name.
@@ -374,7 +374,7 @@ fn csv(table: &Table, out: &mut impl Write) -> std::io::Result<()> {
             write!(out, "{time_ns},{}", table.seconds(*time_ns))?;
             for values in &columns {
                 match values[row] {
-                    Some(x) => write!(out, ",{x}")?,
+                    Some(x) => write!(out, ",{}", exact(x))?,
                     None => write!(out, ",")?,
                 }
             }

@@ -9,12 +9,12 @@ pub fn csv(analyses: &[Analysis]) -> String {
     for analysis in analyses {
         for (name, value) in analysis.metrics.iter() {
             let number = match &value.datum {
-                Datum::Number(x) => x.to_string(),
+                Datum::Number(x) => exact(*x),
                 Datum::Bool(x) => x.to_string(),
                 Datum::Word(x) => (*x).to_owned(),
                 Datum::Missing => String::new(),
             };
-            let spaced = |x: &[f64]| x.iter().map(f64::to_string).collect::<Vec<_>>().join(" ");
+            let spaced = |x: &[f64]| x.iter().map(|x| exact(*x)).collect::<Vec<_>>().join(" ");
             let ci95 = value.ci95.map_or(String::new(), |ends| spaced(&ends));
             let reason = value.reason.as_deref().unwrap_or("");
             let cells = [
@@ -35,6 +35,15 @@ pub fn csv(analyses: &[Analysis]) -> String {
     out
 }
 
+/// A number with all its digits and no more of its zeros: `1e-20`.
+pub fn exact(x: f64) -> String {
+    let text = format!("{x:?}");
+    match text.strip_suffix(".0") {
+        Some(whole) => whole.to_owned(),
+        None => text,
+    }
+}
+
 /// A cell by RFC 4180; one that a spreadsheet would run as a formula gets a leading apostrophe, unless it is of numbers.
 pub fn quoted(cell: &str) -> String {
     let numbers = cell.split(' ').all(|part| part.parse::<f64>().is_ok());
@@ -52,7 +61,21 @@ pub fn quoted(cell: &str) -> String {
 
 #[cfg(test)]
 mod tests {
-    use super::quoted;
+    use super::{exact, quoted};
+
+    #[test]
+    fn numbers_are_whole_and_short() {
+        for (x, expected) in [
+            (1.0, "1"),
+            (-0.1, "-0.1"),
+            (0.00027039, "0.00027039"),
+            (1e-20, "1e-20"),
+            (1e308, "1e308"),
+            (f64::NAN, "NaN"),
+        ] {
+            assert_eq!(exact(x), expected);
+        }
+    }
 
     #[test]
     fn cells_are_quoted_where_they_have_to_be() {

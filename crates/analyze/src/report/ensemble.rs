@@ -105,7 +105,9 @@ pub fn ensemble(analyses: &[Analysis]) -> String {
 
 fn eight(x: f64) -> String {
     let text = figures(x);
+    let scientific = format!("{x:.2e}");
     match text.contains('e') {
+        true if scientific.len() <= 8 => scientific,
         true => format!("{x:.1e}"),
         false if text.len() <= 7 => text,
         false => {

@@ -200,9 +200,12 @@ fn panel(p: &Panel) -> Scene {
     .with_x_axis_max(x1)
     .with_y_axis_min(range.0)
     .with_y_axis_max(range.1);
-    // The library writes three decimals.
+    // The library writes three decimals, and all digits of what is whole.
     let span = range.1 - range.0;
-    if span < 0.02 && y0.abs().max(y1.abs()) >= 0.01 {
+    let largest = y0.abs().max(y1.abs());
+    if !(1e-3..1e7).contains(&largest) {
+        layout.y_tick_format = TickFormat::Sci;
+    } else if span < 0.02 && largest >= 0.01 {
         layout.y_tick_format = TickFormat::Fixed((1.0 - span.log10()).ceil() as usize);
     }
     if several {
@@ -415,6 +418,20 @@ mod tests {
         let svg = SvgBackend::default().render_scene(&panel(&p));
         for tick in ["31.10020", "31.10030", "31.10040"] {
             assert!(svg.contains(tick), "{tick} in {svg}");
+        }
+    }
+
+    #[test]
+    fn ticks_of_very_large_and_small_values_are_short() {
+        for (high, tick) in [(1e300, "e299<"), (1e-20, "e-21<")] {
+            let mut p = Panel::new("signals", "", "time, s", "1");
+            p.series.push(Series {
+                x: vec![0.0, 1.0],
+                y: vec![0.0, high],
+                ..Series::default()
+            });
+            let svg = SvgBackend::default().render_scene(&panel(&p));
+            assert!(svg.contains(tick) && !svg.contains("000000000000"), "{svg}");
         }
     }
 

@@ -11,7 +11,7 @@ mod json;
 pub mod plots;
 mod table;
 
-pub use csv::{csv, quoted};
+pub use csv::{csv, exact, quoted};
 pub use ensemble::ensemble;
 pub use ensemble_plots::ensemble_plots;
 pub use html::html;

@@ -388,14 +388,14 @@ fn plain(x: f64, decimals: usize) -> String {
     }
 }
 
-/// Five significant figures for a metric.
+/// Five significant figures for a metric, in at most ten characters.
 pub(super) fn figures(x: f64) -> String {
     if x == 0.0 {
         return "0".into();
     }
     let size = x.abs().log10().floor() as i32;
     match size {
-        -4..=5 => plain(x, (4 - size).clamp(0, 6) as usize),
+        -3..=5 => plain(x, (4 - size).max(0) as usize),
         _ => format!("{x:.4e}"),
     }
 }
@@ -445,6 +445,12 @@ mod tests {
         assert_eq!(figures(19.368460680515074), "19.368");
         assert_eq!(figures(0.0315551), "0.031555");
         assert_eq!(figures(294.9194), "294.92");
+        assert_eq!(figures(-0.00503214), "-0.0050321");
+        assert_eq!(figures(0.00027039), "2.7039e-4");
+        assert_eq!(
+            [figures(1e-20), figures(1e308)],
+            ["1.0000e-20", "1.0000e308"]
+        );
         assert_eq!(short(-0.000123), "-1.2e-4");
         assert_eq!(short(1234567.0), "1.2e6");
         assert_eq!(plain(15.0, 3), "15");
