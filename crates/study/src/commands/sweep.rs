@@ -28,7 +28,7 @@ pub struct Args {
     #[arg(long, short, value_name = "DIR")]
     out: Option<PathBuf>,
     /// Compute only part K of N, and leave what is there already; `merge` puts all parts together.
-    /// Slurm, AWS Batch and PBS say K and N by themselves, Kubernetes says K.
+    /// Slurm and AWS Batch say K and N by themselves, Kubernetes says K. On PBS submit tasks 1 to N and give "$PBS_ARRAY_INDEX/N".
     #[arg(long, value_name = "K/N", value_parser = Shard::parse, allow_hyphen_values = true)]
     shard: Option<Shard>,
     /// N of `--shard`, where the scheduler says only K.

@@ -14,8 +14,8 @@ pub struct Shard {
 /// What a scheduler tells its tasks, by environment variable.
 struct Scheduler {
     index: &'static str,
-    /// Number of the first task: another variable's, or this number.
-    first: (&'static str, u64),
+    /// Number of the first task: another variable's, or this number; `None` where whoever submits chooses it and nobody tells.
+    first: Option<(&'static str, u64)>,
     /// How many there are; `None` where the scheduler does not say.
     count: Option<&'static str>,
 }
@@ -24,22 +24,22 @@ struct Scheduler {
 const SCHEDULERS: &[Scheduler] = &[
     Scheduler {
         index: "SLURM_ARRAY_TASK_ID",
-        first: ("SLURM_ARRAY_TASK_MIN", 0),
+        first: Some(("SLURM_ARRAY_TASK_MIN", 0)),
         count: Some("SLURM_ARRAY_TASK_COUNT"),
     },
     Scheduler {
         index: "AWS_BATCH_JOB_ARRAY_INDEX",
-        first: ("", 0),
+        first: Some(("", 0)),
         count: Some("AWS_BATCH_JOB_ARRAY_SIZE"),
     },
     Scheduler {
         index: "PBS_ARRAY_INDEX",
-        first: ("", 0),
-        count: Some("PBS_ARRAY_COUNT"),
+        first: None,
+        count: None,
     },
     Scheduler {
         index: "JOB_COMPLETION_INDEX",
-        first: ("", 0),
+        first: Some(("", 0)),
         count: None,
     },
 ];
@@ -86,9 +86,15 @@ impl Shard {
                     .map_err(|_| format!("{name} is `{text}`, expected a whole number"))
             };
             let index = number(s.index, &index)?;
-            let first = match get(s.first.0) {
-                Some(text) => number(s.first.0, &text)?,
-                None => s.first.1,
+            let Some((first, usual)) = s.first else {
+                return Err(format!(
+                    "{0} says which task this is, but neither of how many nor where they count from: submit tasks 1 to N and give --shard \"${0}/N\"",
+                    s.index
+                ));
+            };
+            let first = match get(first) {
+                Some(text) => number(first, &text)?,
+                None => usual,
             };
             let told = s.count.and_then(|name| Some((name, get(name)?)));
             let told = told
@@ -194,6 +200,12 @@ mod tests {
             Shard { index: 1, count: 3 }
         );
         assert!(Shard::of_environment(Some(1), kubernetes).is_err());
+        // An array of PBS may begin at 0 or at 1, and nothing says so: taken for 0, that of tasks 1 to 8 left the first part to nobody.
+        let pbs = |name: &str| (name == "PBS_ARRAY_INDEX").then(|| "1".into());
+        for shards in [None, Some(8)] {
+            let told = Shard::of_environment(shards, pbs).unwrap_err();
+            assert!(told.contains("--shard \"$PBS_ARRAY_INDEX/N\""), "{told}");
+        }
         assert_eq!(Shard::of_environment(None, |_| None), Ok(None));
         let nobody = Shard::of_environment(Some(4), |_| None).unwrap_err();
         assert!(nobody.contains("--shard K/4"), "{nobody}");
