@@ -204,6 +204,18 @@ mod tests {
     use super::*;
 
     #[test]
+    fn an_experiment_that_there_is_not_is_wrong_usage() {
+        let parsed = |name: &str| Args::try_parse_from(["study", "predictions", name]);
+        let said = parsed("lokking").err().unwrap();
+        assert_eq!(said.exit_code(), 2);
+        assert!(
+            said.to_string().contains("similar value exists: 'locking'"),
+            "{said}"
+        );
+        assert!(parsed("locking").is_ok());
+    }
+
+    #[test]
     fn seeds_that_cannot_be_counted_up_to_are_refused() {
         let parsed = |flag: &str, n: &str| Args::try_parse_from(["study", "paper", flag, n]);
         for absurd in ["0", "-1", "nan", "1000000000000", "18446744073709551615"] {

@@ -1,7 +1,8 @@
 //! `study predictions`: what the paper predicts, tried.
 
 use super::{Format, count, jobs, make_folder, print, watch_interrupts, write_whole};
-use anyhow::{Result, bail};
+use anyhow::Result;
+use clap::builder::PossibleValuesParser;
 use indicatif::{ProgressBar, ProgressStyle};
 use std::path::PathBuf;
 use std::time::{Duration, Instant};
@@ -11,7 +12,8 @@ use study::predictions::{EXPERIMENTS, Finding, Lab, SEEDS, page, to_json};
 #[derive(clap::Args)]
 #[command(after_help = EXAMPLES)]
 pub struct Args {
-    /// Only these experiments: locking, coherence, lever, harmonics, onsets, stability.
+    /// Only these experiments.
+    #[arg(value_parser = PossibleValuesParser::new(EXPERIMENTS.iter().map(|e| e.name)))]
     names: Vec<String>,
     /// Seeds of an ensemble, from 1001 on; onsets take four times as many, each cell of the map of locking two.
     #[arg(long, value_name = "N", default_value_t = SEEDS, allow_negative_numbers = true, value_parser = count(2..=100_000))]
@@ -35,16 +37,6 @@ const EXAMPLES: &str = "Examples:
 
 /// Runs the experiments.
 pub fn run(args: &Args) -> Result<()> {
-    let names = || EXPERIMENTS.iter().map(|e| e.name);
-    for name in &args.names {
-        if !names().any(|n| n == name) {
-            let hint = recording::text::meant::did_you_mean(name, names());
-            bail!(
-                "there is no experiment `{name}`.{hint} There are: {}",
-                names().collect::<Vec<_>>().join(", ")
-            );
-        }
-    }
     if let Some(folder) = &args.out {
         make_folder(&folder.join("predictions"))?;
     }
