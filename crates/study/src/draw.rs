@@ -5,9 +5,10 @@ use analyze::report::plots::COLOURS;
 use kuva::backend::raster::RasterBackend;
 use kuva::plot::legend::LegendPosition;
 use kuva::plot::{BandPlot, ColorMap, Heatmap, LinePlot, ScatterPlot};
-use kuva::render::layout::Layout;
+use kuva::render::layout::{Layout, TickFormat};
 use kuva::render::plots::Plot;
 use kuva::render::render::render_multiple;
+use kuva::render::render_utils::generate_ticks;
 use std::io::Write;
 use std::path::Path;
 use std::sync::Arc;
@@ -78,6 +79,9 @@ pub enum Layer {
 
 /// The colour of curves over maps.
 pub const WHITE: usize = usize::MAX;
+
+/// Most characters of a line of a title: more would be cut off beside a legend.
+const TITLE_WIDTH: usize = 90;
 
 fn colour(index: usize) -> &'static str {
     match index {
@@ -166,6 +170,15 @@ impl Figure {
         (self.x_range.unwrap_or(x), self.y_range.unwrap_or(y))
     }
 
+    /// Lowest and highest value of the map.
+    fn colours(&self) -> (f64, f64) {
+        let values = self.layers.iter().flat_map(|layer| match layer {
+            Layer::Map { values, .. } => &values[..],
+            _ => &[],
+        });
+        least_and_most(values.flatten())
+    }
+
     /// The title, and what the colours of a map mean.
     fn whole_title(&self) -> String {
         let mut title = self.title.clone();
@@ -198,12 +211,16 @@ impl Figure {
             .with_width(900.0)
             .with_height(460.0)
             .with_title_size(16)
+            .with_title_wrap(TITLE_WIDTH)
             .with_label_size(13)
             .with_tick_size(11)
             .with_x_axis_min(x.0)
             .with_x_axis_max(x.1)
             .with_y_axis_min(y.0)
-            .with_y_axis_max(y.1);
+            .with_y_axis_max(y.1)
+            .with_x_tick_format(tick_format(x))
+            .with_y_tick_format(tick_format(y))
+            .with_colorbar_tick_format(tick_format(self.colours()));
         layout.log_x = self.x_log;
         layout.log_y = self.y_log;
         layout.show_legend = named > 0 && !is_map;
@@ -270,6 +287,29 @@ fn clipped(points: &[(f64, f64)], x: (f64, f64), y: (f64, f64)) -> Vec<Vec<(f64,
     pieces
 }
 
+fn least_and_most<'a>(values: impl Iterator<Item = &'a f64>) -> (f64, f64) {
+    values.fold((f64::INFINITY, f64::NEG_INFINITY), |(a, b), x| {
+        (a.min(*x), b.max(*x))
+    })
+}
+
+/// The library's own labels where they tell ticks of this range apart, else as many digits as that takes: its three make 0.5137 and 0.5139 both 0.514.
+fn tick_format((from, to): (f64, f64)) -> TickFormat {
+    // As many as the library asks for along a bar of colours and along an axis.
+    let ticks: Vec<f64> = [5, 10]
+        .into_iter()
+        .flat_map(|n| generate_ticks(from, to, n))
+        .collect();
+    let says = |format: &TickFormat| {
+        let off = |x: &f64| (format.format(*x).parse().unwrap_or(f64::NAN) - x).abs();
+        // A hundredth of the distance of ten ticks.
+        ticks.iter().all(|x| off(x) <= 1e-3 * (to - from))
+    };
+    let formats = [TickFormat::Auto].into_iter();
+    let mut formats = formats.chain((4..=15).map(TickFormat::Fixed));
+    formats.find(says).unwrap_or(TickFormat::Sci)
+}
+
 /// The colours of a map; a cell without a value stays white.
 fn map_colours() -> ColorMap {
     ColorMap::Custom(Arc::new(|share: f64| match share.is_nan() {
@@ -308,9 +348,7 @@ fn cells(values: &[Vec<f64>], x: &[f64], y: &[f64]) -> Vec<Plot> {
     if is_even(x) && is_even(y) {
         return vec![whole.into()];
     }
-    let all = || values.iter().flatten().copied();
-    let least = all().fold(f64::INFINITY, f64::min);
-    let most = all().fold(f64::NEG_INFINITY, f64::max);
+    let (least, most) = least_and_most(values.iter().flatten());
     // `with_cell_size` gives no less than a half.
     let bar = Heatmap {
         cell_size: 0.0,
@@ -382,6 +420,7 @@ fn marks(layer: &Layer, x: (f64, f64), y: (f64, f64)) -> Vec<Plot> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use kuva::render::render::Primitive;
 
     #[test]
     fn a_curve_is_cut_off_where_it_leaves_the_frame() {
@@ -400,6 +439,51 @@ mod tests {
         let whole = [(0.0, 0.0), (1.0, 0.5), (4.0, 0.3)];
         assert_eq!(frame(&whole), [whole]);
         assert!(frame(&[(0.0, f64::NAN), (1.0, 0.0)]).is_empty());
+    }
+
+    /// Each was labelled with three digits, so that neighbours were called the same or by what they are not.
+    #[test]
+    fn neighbouring_ticks_have_labels_of_their_own() {
+        for range in [
+            (0.51362, 0.51401),
+            (0.334, 0.347),
+            (0.999, 1.003),
+            (60.0, 60.002),
+            (-2e-7, 3e-7),
+            (1e5, 1e5 + 0.1),
+        ] {
+            let ticks = generate_ticks(range.0, range.1, 5);
+            let labels: Vec<String> = ticks
+                .iter()
+                .map(|x| tick_format(range).format(*x))
+                .collect();
+            assert!(ticks.len() > 1, "{range:?}");
+            for (tick, label) in ticks.iter().zip(&labels) {
+                let off = label.parse::<f64>().unwrap() - tick;
+                assert!(off.abs() < 0.01 * (ticks[1] - ticks[0]), "{labels:?}");
+            }
+        }
+        assert_eq!(tick_format((0.0, 1.0)).format(0.5), "0.5");
+    }
+
+    #[test]
+    fn a_long_title_goes_on_in_a_second_line() {
+        let figure = Figure {
+            title: "contact loss, mean of handles: mean, median and the band of 90 % of the runs; where at least half of the runs have it".into(),
+            layers: vec![Layer::line("mean", vec![(0.0, 0.0), (1.0, 1.0)], 0)],
+            ..Figure::default()
+        };
+        let lines = figure.scene().elements.into_iter().filter_map(|e| match e {
+            Primitive::Text {
+                content, size: 16, ..
+            } => Some(content),
+            _ => None,
+        });
+        let lines: Vec<String> = lines.collect();
+        assert!(
+            lines.len() == 2 && lines.iter().all(|l| l.len() <= TITLE_WIDTH),
+            "{lines:?}"
+        );
     }
 
     #[test]
