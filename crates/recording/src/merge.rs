@@ -12,7 +12,7 @@ use std::{
 use crate::{
     Finding, Kind,
     read::{RawMessage, RawMessages, ReadError, ReadOptions, Recording, recordings_in},
-    text::counted,
+    text::{counted, word},
     write::{RawChannel, RecordingWriter, WriteError},
 };
 
@@ -51,7 +51,9 @@ pub enum MergeError {
     /// Two have messages on one topic at one time, which could not be told apart afterwards.
     #[error(
         "{name}: holds {topic} at a time when {other} does, too (for {overlap_s:.1} s); expected parts of one recording one after the other, or \
-         recordings of different topics (`--keep-first` takes what two hold from the one given first; `analyze {other} {name}` compares them)"
+         recordings of different topics (`--keep-first` takes what two hold from the one given first; `analyze {} {}` compares them)",
+        word(.other),
+        word(.name)
     )]
     Overlap {
         /// The later one.

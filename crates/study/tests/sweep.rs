@@ -503,3 +503,13 @@ fn a_study_that_grows_keeps_what_it_has() {
         assert!(said.contains(why), "{said}");
     }
 }
+
+#[test]
+fn a_command_that_is_suggested_can_be_copied() {
+    let plan = plan("metrics = [\"dz_pp_m\"]").unwrap();
+    let folder = tempfile::tempdir().unwrap();
+    let store = Store::new(&plan, &folder.path().join("my study"));
+    let _claim = store.create().unwrap();
+    let told = store.merge().unwrap_err();
+    assert!(told.contains("my study/study.toml' --resume"), "{told}");
+}

@@ -41,6 +41,7 @@ use std::{
 };
 
 use crate::foreign;
+use crate::text::word;
 use container::{Container, Damage, Definitions, Statistics};
 use descriptors::Pools;
 use early::Early;
@@ -532,7 +533,7 @@ fn folder(path: &Path) -> String {
         [one] => format!("it is a folder; give what is in it: {}", one.display()),
         several => format!(
             "it is a folder; `analyze merge {} --out FILE.mcap` makes one recording of the {} in it",
-            path.display(),
+            word(path),
             several.len()
         ),
     }

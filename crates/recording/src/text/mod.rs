@@ -43,6 +43,16 @@ pub fn print(text: &str) -> Result<()> {
     }
 }
 
+/// A path as a word of a command that somebody may copy into a shell, in quotes where it takes them.
+pub fn word(path: impl AsRef<Path>) -> String {
+    let path = path.as_ref().display().to_string();
+    match shlex::try_quote(&path) {
+        Ok(quoted) => quoted.into_owned(),
+        // No system's paths have a NUL.
+        Err(_) => path,
+    }
+}
+
 /// A count with its noun: `1 gap`, `2 gaps`.
 pub fn counted(count: u64, one: &str, several: &str) -> String {
     let what = if count == 1 { one } else { several };
@@ -79,6 +89,15 @@ mod tests {
             plain("a\u{1b}[2J\u{7}\u{9b}\u{ffff}"),
             "a\u{fffd}[2J\u{fffd}\u{fffd}\u{fffd}"
         );
+    }
+
+    #[test]
+    fn a_command_takes_a_path_with_a_space_as_one() {
+        for path in ["my studies/it's", "$HOME", ""] {
+            let back = shlex::split(&format!("study merge {}", word(path)));
+            assert_eq!(back.unwrap(), ["study", "merge", path]);
+        }
+        assert_eq!(word("/tmp/run-1.mcap"), "/tmp/run-1.mcap");
     }
 
     #[test]

@@ -4,6 +4,7 @@ use super::{Format, count, jobs, make_folder, print, watch_interrupts, write_who
 use anyhow::Result;
 use clap::builder::PossibleValuesParser;
 use indicatif::{ProgressBar, ProgressStyle};
+use recording::text::word;
 use std::path::PathBuf;
 use std::time::{Duration, Instant};
 use study::predictions::{EXPERIMENTS, Finding, Lab, SEEDS, page, to_json};
@@ -79,12 +80,7 @@ pub fn run(args: &Args) -> Result<()> {
             }
         }
         // Page and numbers are of the same experiments, be they all or some.
-        let text = page(
-            &findings,
-            &folder.display().to_string(),
-            "predictions",
-            args.seeds,
-        );
+        let text = page(&findings, &word(folder), "predictions", args.seeds);
         write_whole(&folder.join("predictions.md"), text.as_bytes())?;
         write_whole(&folder.join("predictions.json"), json.as_bytes())?;
     }

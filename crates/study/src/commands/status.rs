@@ -2,6 +2,7 @@
 
 use super::{Format, print, sweep};
 use anyhow::{Result, anyhow};
+use recording::text::word;
 use serde_json::json;
 use std::path::PathBuf;
 use study::sweep::parts::Store;
@@ -64,7 +65,7 @@ pub fn run(args: &Args) -> Result<()> {
             if gaps.is_empty() && !merged {
                 text += &format!(
                     "  complete; `study merge {}` makes the table\n",
-                    args.folder.display()
+                    word(&args.folder)
                 );
             } else if merged {
                 text += &format!("  merged: {}\n", store.table().display());

@@ -2,6 +2,7 @@
 
 use super::{count, print, sweep, write_whole};
 use anyhow::{Context, Result, bail};
+use recording::text::word;
 use std::path::{Path, PathBuf};
 use std::process::Command;
 use study::sweep::known::Known;
@@ -74,7 +75,7 @@ pub fn run(args: &Args) -> Result<()> {
     let reuse = match &args.reuse {
         Some(folder) => {
             Known::load(folder, &plan).map_err(anyhow::Error::msg)?;
-            format!(" --reuse {}", shell(&std::path::absolute(folder)?))
+            format!(" --reuse {}", word(&std::path::absolute(folder)?))
         }
         None => String::new(),
     };
@@ -100,10 +101,10 @@ pub fn run(args: &Args) -> Result<()> {
         tasks,
         args.cpus,
         directive(&out.join("task-%a.log"))?,
-        shell(&study),
-        shell(&out.join("study.toml")),
+        word(&study),
+        word(&out.join("study.toml")),
         tasks,
-        shell(&out),
+        word(&out),
         args.cpus
     );
     write_whole(&job, script.as_bytes())?;
@@ -111,7 +112,7 @@ pub fn run(args: &Args) -> Result<()> {
     command.arg("--parsable").args(&args.options).arg(&job);
     if args.dry_run {
         recording::note!("{} is written; nothing was submitted", job.display());
-        let options = args.options.iter().map(|o| word(Path::new(o)));
+        let options = args.options.iter().map(word);
         let line: Vec<String> = options.chain([word(&job)]).collect();
         return print(&format!("sbatch {}\n", line.join(" ")));
     }
@@ -122,8 +123,8 @@ pub fn run(args: &Args) -> Result<()> {
                 "{} runs in {} tasks submitted; `study status {}` says how far they are, `study merge {}` puts them together",
                 plan.runs(),
                 tasks,
-                out.display(),
-                out.display()
+                word(&out),
+                word(&out)
             );
             print(&format!("{}\n", id.trim()))
         }
@@ -137,21 +138,6 @@ pub fn run(args: &Args) -> Result<()> {
             job.display()
         ),
         Err(e) => Err(e).context("sbatch cannot be run"),
-    }
-}
-
-/// A path for the shell, quoted.
-fn shell(path: &Path) -> String {
-    format!("'{}'", path.display().to_string().replace('\'', "'\\''"))
-}
-
-/// The same, quoted only where it has to be.
-fn word(path: &Path) -> String {
-    let text = path.display().to_string();
-    let plain = |c: char| c.is_ascii_alphanumeric() || "_./-=:,%+".contains(c);
-    match !text.is_empty() && text.chars().all(plain) {
-        true => text,
-        false => shell(path),
     }
 }
 

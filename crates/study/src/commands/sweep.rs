@@ -2,6 +2,7 @@
 
 use super::{Format, count, jobs, print, progress, watch_interrupts};
 use anyhow::{Result, anyhow, bail};
+use recording::text::word;
 use serde_json::json;
 use std::path::{Path, PathBuf};
 use std::sync::atomic::Ordering;
@@ -88,11 +89,11 @@ pub fn run(args: &Args) -> Result<()> {
     let reuse = args
         .reuse
         .as_ref()
-        .map_or_else(String::new, |dir| format!(" --reuse {}", dir.display()));
+        .map_or_else(String::new, |dir| format!(" --reuse {}", word(dir)));
     let goes_on = format!(
         "`study {} --resume --out {}{shard}{reuse}` goes on",
-        out.join("study.toml").display(),
-        out.display()
+        word(out.join("study.toml")),
+        word(&out)
     );
     let stop = watch_interrupts(format!(
         "interrupted: parts that are whole are kept in {}; {goes_on}",
@@ -194,7 +195,7 @@ pub fn run(args: &Args) -> Result<()> {
     if shard.is_some() {
         recording::note!(
             "`study merge {}` puts the parts together when all are there",
-            out.display()
+            word(&out)
         );
         return Ok(());
     }

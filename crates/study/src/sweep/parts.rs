@@ -14,6 +14,7 @@ use super::table::{Cell, Notes, Reader, Writer};
 use crate::pool::{in_order, threads};
 use parquet::errors::ParquetError;
 use recording::read::ends_whole;
+use recording::text::word;
 use recording::whole::Sink;
 use sim::record::VERSION;
 use std::cell::Cell as Flag;
@@ -438,7 +439,7 @@ impl<'p> Store<'p> {
         };
         let again = format!(
             "`study {} --resume` computes",
-            self.folder.join("study.toml").display()
+            word(self.folder.join("study.toml"))
         );
         if let Some(damaged) = progress.damaged.first() {
             let further = match progress.damaged.len() - 1 {
