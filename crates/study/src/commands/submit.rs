@@ -75,7 +75,7 @@ pub fn run(args: &Args) -> Result<()> {
     let reuse = match &args.reuse {
         Some(folder) => {
             Known::load(folder, &plan).map_err(anyhow::Error::msg)?;
-            format!(" --reuse {}", word(&std::path::absolute(folder)?))
+            format!(" --reuse {}", word(std::path::absolute(folder)?))
         }
         None => String::new(),
     };
@@ -102,7 +102,7 @@ pub fn run(args: &Args) -> Result<()> {
         args.cpus,
         directive(&out.join("task-%a.log"))?,
         word(&study),
-        word(&out.join("study.toml")),
+        word(out.join("study.toml")),
         tasks,
         word(&out),
         args.cpus
