@@ -107,6 +107,8 @@ pub struct Inputs {
     /// N_tot / (M g) where it is measured as such (the vertical specific force of the centre of mass over g), on `t_s`.
     /// Used where `normal_n` is empty.
     pub support_ratio: Vec<f64>,
+    /// How old `support_ratio` is at `t_s` (s): angles are put where the stamps are, what an accelerometer felt is left where it came.
+    pub support_age_s: f64,
     /// Vertical motion of each carrier's shoulder about its slow course (m), on `t_s`; NaN where it is not known.
     pub heave_m: Vec<Vec<f64>>,
     /// Time of the phases (s); empty means `t_s`.
@@ -154,6 +156,7 @@ impl Default for Inputs {
             force_t_s: Vec::new(),
             normal_n: Vec::new(),
             support_ratio: Vec::new(),
+            support_age_s: 0.0,
             heave_m: Vec::new(),
             phase_t_s: Vec::new(),
             phase_rad: Vec::new(),

@@ -548,6 +548,33 @@ fn a_pendulum_hangs_on_the_support_as_on_the_forces() {
     }
 }
 
+/// A sensor's support is of some milliseconds before its stamps, where its roll is put.
+#[test]
+fn a_support_that_is_old_is_of_the_roll_of_its_time() {
+    let mut scene = scene_of("music");
+    scene.log_rate_hz = 100.0;
+    let mut field = field_of(&scene);
+    let window = analyze::Window::from(15.0);
+    let now = fit(&field, window);
+    let i = &mut field.inputs;
+    let weight_n = i.mass_kg.unwrap() * i.gravity_m_per_s2;
+    i.support_ratio = i.total_force_n().iter().map(|n| n / weight_n).collect();
+    i.normal_n.clear();
+    // One sample later, and after a hole.
+    i.support_ratio.insert(0, 1.0);
+    i.support_ratio.pop();
+    i.support_age_s = 0.01;
+    let lost = 3000..3200;
+    i.t_s.drain(lost.clone());
+    i.roll_rad.drain(lost.clone());
+    i.support_ratio.drain(lost);
+    let old = fit(&field, window);
+    for (name, within) in [("pendulum", 0.002), ("roll damping", 0.03)] {
+        let [a, b] = [&now, &old].map(|found| find(found, name).value);
+        assert!((b / a - 1.0).abs() < within, "{name}: {a} {b}");
+    }
+}
+
 /// Sixty pendulums of known a and b under a load that leaves and lands, each with a noise of its own: intervals are as wide as the errors. The whole
 /// change when every other sample is left out made them two and three times too wide.
 #[test]

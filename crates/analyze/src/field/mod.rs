@@ -116,6 +116,7 @@ impl Field {
             inputs.pitch_rad.clone_from(&seen.pitch_rad);
             if inputs.normal_n.is_empty() {
                 inputs.support_ratio.clone_from(&seen.support_ratio);
+                inputs.support_age_s = motion.settings.orientation.accel_latency_s;
                 inputs.sources.forces = "imu".into();
             }
             inputs.sources.attitude = "imu".into();

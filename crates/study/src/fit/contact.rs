@@ -391,31 +391,40 @@ pub(super) fn pendulum(field: &Field, window: Window) -> Result<Vec<Outcome>, St
 }
 
 /// Times (s), roll (rad) and the whole force (N) at them. Forces on a clock of their own keep it, for they have kinks; the roll, which has none, is drawn
-/// between its samples by a cubic spline. Where it begins late, ends early or has holes it is NaN within, and left out at the ends.
+/// between its samples by a cubic spline. So has a support that is older than the roll: 3 ms beside it made b of `field-imu` half as large again. Where it begins late, ends early or has holes it is NaN within, and left out at the ends.
 fn roll_and_load(i: &Inputs) -> Result<(Vec<f64>, Vec<f64>, Vec<f64>), String> {
     let mut total = i.total_force_n();
+    let mut at_s = i.force_times().to_vec();
     if let (true, Some(mass_kg)) = (total.is_empty(), i.mass_kg) {
         let weight_n = mass_kg * i.gravity_m_per_s2;
         total = i.support_ratio.iter().map(|s| s * weight_n).collect();
+        at_s = i.t_s.iter().map(|t| t - i.support_age_s).collect();
     }
     if total.is_empty() || i.roll_rad.len() != i.t_s.len() || i.roll_rad.is_empty() {
         return Err("it takes the roll, and the forces or the support".into());
     }
-    let at_s = i.force_times();
-    if at_s == i.t_s || i.normal_n.is_empty() {
-        return Ok((i.t_s.clone(), i.roll_rad.clone(), total));
+    if at_s == i.t_s {
+        return Ok((at_s, i.roll_rad.clone(), total));
     }
     let step_s = mean_step_s(&i.t_s).ok_or("the roll has too few samples")?;
-    let mut roll = between(&i.t_s, &i.roll_rad, at_s);
-    let smooth = drawn(&i.t_s, &i.roll_rad, at_s, step_s);
+    let mut roll = between(&i.t_s, &i.roll_rad, &at_s);
+    let smooth = drawn(&i.t_s, &i.roll_rad, &at_s, step_s);
     for (x, smooth) in roll.iter_mut().zip(smooth).filter(|(x, _)| !x.is_nan()) {
         *x = smooth;
     }
     let known = |x: &f64| !x.is_nan();
+    if i.normal_n.is_empty() {
+        // The first sample behind a hole was felt within it.
+        let known = |x: &[f64]| -> Vec<f64> {
+            let pairs = x.iter().zip(&roll).filter(|(_, r)| !r.is_nan());
+            pairs.map(|(x, _)| *x).collect()
+        };
+        return Ok((known(&at_s), known(&roll), known(&total)));
+    }
     let begin = roll.iter().position(known).unwrap_or(0);
     let end = roll.iter().rposition(known).map_or(begin, |last| last + 1);
     let part = |x: &[f64]| x[begin..end].to_vec();
-    Ok((part(at_s), part(&roll), part(&total)))
+    Ok((part(&at_s), part(&roll), part(&total)))
 }
 
 /// A swing of ω [rad/s] at sample `n` of a window of `long` steps that takes it in and out, and its derivatives.
