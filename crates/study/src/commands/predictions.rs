@@ -5,7 +5,7 @@ use anyhow::Result;
 use clap::builder::PossibleValuesParser;
 use indicatif::{ProgressBar, ProgressStyle};
 use recording::text::word;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant};
 use study::predictions::{EXPERIMENTS, Finding, Lab, SEEDS, page, to_json};
 
@@ -36,18 +36,29 @@ const EXAMPLES: &str = "Examples:
   study predictions locking stability --out results
   study predictions --seeds 5 --format json";
 
-/// Runs the experiments.
+/// Runs the experiments, writes what they found and prints it.
 pub fn run(args: &Args) -> Result<()> {
     if let Some(folder) = &args.out {
         make_folder(&folder.join("predictions"))?;
     }
+    let findings = find(args)?;
+    let json = format!("{:#}\n", to_json(&findings));
+    if let Some(folder) = &args.out {
+        write(&findings, &json, folder, args.seeds)?;
+    }
+    print(&match args.format {
+        Format::Json => json,
+        Format::Table => table(&findings),
+    })
+}
+
+/// What the experiments that were asked for find, in the paper's order.
+fn find(args: &Args) -> Result<Vec<(&'static str, Finding)>> {
     let stop = watch_interrupts("interrupted; nothing was written")?;
     let began = Instant::now();
-    let mut findings: Vec<(&str, Finding)> = Vec::new();
-    for e in EXPERIMENTS {
-        if !args.names.is_empty() && !args.names.iter().any(|n| n == e.name) {
-            continue;
-        }
+    let asked = |name: &str| args.names.is_empty() || args.names.iter().any(|n| n == name);
+    let mut findings = Vec::new();
+    for e in EXPERIMENTS.iter().filter(|e| asked(e.name)) {
         let bar = ProgressBar::new_spinner();
         bar.set_style(ProgressStyle::with_template(
             "{msg}: {pos} pieces of work, {elapsed}",
@@ -71,31 +82,29 @@ pub fn run(args: &Args) -> Result<()> {
         );
         findings.push((e.name, finding));
     }
-    let json = format!("{:#}\n", to_json(&findings));
-    if let Some(folder) = &args.out {
-        let pictures = folder.join("predictions");
-        for (_, finding) in &findings {
-            for (stem, _, figure) in &finding.pictures {
-                figure.write(&pictures, stem).map_err(anyhow::Error::msg)?;
-            }
-        }
-        // Page and numbers are of the same experiments, be they all or some.
-        let text = page(&findings, &word(folder), "predictions", args.seeds);
-        write_whole(&folder.join("predictions.md"), text.as_bytes())?;
-        write_whole(&folder.join("predictions.json"), json.as_bytes())?;
+    Ok(findings)
+}
+
+/// Page, numbers and pictures: all of the same experiments, be they all or some.
+fn write(findings: &[(&str, Finding)], json: &str, folder: &Path, seeds: u64) -> Result<()> {
+    let pictures = folder.join("predictions");
+    for (stem, _, figure) in findings.iter().flat_map(|(_, f)| &f.pictures) {
+        figure.write(&pictures, stem).map_err(anyhow::Error::msg)?;
     }
-    match args.format {
-        Format::Json => print(&json),
-        Format::Table => {
-            let mut text = String::new();
-            for (_, f) in &findings {
-                text += &format!("{}: {}\n", f.title, f.verdict.map_or("", |v| v.word()));
-                for n in &f.numbers {
-                    text += &format!("  {:<72}{:>10.*} {}\n", n.label, n.digits, n.value, n.unit);
-                }
-                text += &format!("  {}\n\n", f.because);
-            }
-            print(&text)
+    let text = page(findings, &word(folder), "predictions", seeds);
+    write_whole(&folder.join("predictions.md"), text.as_bytes())?;
+    write_whole(&folder.join("predictions.json"), json.as_bytes())
+}
+
+/// The findings for people.
+fn table(findings: &[(&str, Finding)]) -> String {
+    let mut text = String::new();
+    for (_, f) in findings {
+        text += &format!("{}: {}\n", f.title, f.verdict.map_or("", |v| v.word()));
+        for n in &f.numbers {
+            text += &format!("  {:<72}{:>10.*} {}\n", n.label, n.digits, n.value, n.unit);
         }
+        text += &format!("  {}\n\n", f.because);
     }
+    text
 }
