@@ -391,7 +391,8 @@ pub(super) fn pendulum(field: &Field, window: Window) -> Result<Vec<Outcome>, St
 }
 
 /// Times (s), roll (rad) and the whole force (N) at them. Forces on a clock of their own keep it, for they have kinks; the roll, which has none, is drawn
-/// between its samples by a cubic spline. So has a support that is older than the roll: 3 ms beside it made b of `field-imu` half as large again. Where it begins late, ends early or has holes it is NaN within, and left out at the ends.
+/// between its samples by a cubic spline. So has a support that is older than the roll: 5 ms beside it made b of `field-imu` 0.35 and not 0.18. Where
+/// the roll begins late, ends early or has holes it is NaN within, and left out at the ends.
 fn roll_and_load(i: &Inputs) -> Result<(Vec<f64>, Vec<f64>, Vec<f64>), String> {
     let mut total = i.total_force_n();
     let mut at_s = i.force_times().to_vec();
