@@ -372,7 +372,7 @@ impl Roles {
         channels: impl Iterator<Item = (&'a str, &'a str)>,
         user: Option<&RolesFile>,
     ) -> Self {
-        let mut channels: Vec<(&str, String)> = channels
+        let mut channels: Vec<Typed> = channels
             .filter(|(topic, _)| !stands_beside(topic))
             .map(|(topic, schema)| (topic, schema.replacen("/msg/", "/", 1)))
             .collect();

@@ -83,7 +83,7 @@ impl Field {
             .collect();
         let beats = roles.topic(Role::Beats).is_some() && !beat_is_known;
         let topics = topics(recording, roles);
-        if topics.is_empty() || !(!sensors.is_empty() || beats || request.truth) {
+        if topics.is_empty() || sensors.is_empty() && !beats && !request.truth {
             return Ok(field);
         }
         let Some(share) = field.share(recording, roles, request.asked())? else {

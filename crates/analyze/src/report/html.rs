@@ -245,7 +245,7 @@ fn figures_section(out: &mut String, plots: &[Plot]) {
 
 fn metrics_section(out: &mut String, a: &Analysis) {
     out.push_str("<h2 id=\"metrics\">Metrics</h2>\n");
-    let known = |missing: bool| {
+    let rows = |missing: bool| -> Vec<_> {
         let all = a.metrics.iter();
         all.filter(move |(_, value)| (value.datum == Datum::Missing) == missing)
             .map(|(name, value)| {
@@ -255,15 +255,17 @@ fn metrics_section(out: &mut String, a: &Analysis) {
                 let said = metric.map_or_else(String::new, |metric| definition(name, metric));
                 (label, value, said)
             })
+            .collect()
     };
-    if known(false).count() > 0 {
+    let [known, missing] = [false, true].map(rows);
+    if !known.is_empty() {
         let _ = writeln!(
             out,
             "<p class=\"faint\">Each opens to its definition, where W is the stretch that is analysed, from {:.3} to {:.3} s.</p>",
             a.window.start_s, a.window.end_s
         );
         out.push_str("<div class=\"scroll\"><table class=\"metrics\"><thead><tr><th>metric</th><th class=\"n\">value</th><th>unit</th><th>from</th></tr></thead><tbody>\n");
-        for (label, value, mut more) in known(false) {
+        for (label, value, mut more) in known {
             let unit = if matches!(value.unit, "1" | "bool" | "-") {
                 ""
             } else {
@@ -298,20 +300,19 @@ fn metrics_section(out: &mut String, a: &Analysis) {
         }
         out.push_str("</tbody></table></div>\n");
     }
-    let missing = known(true).count() as u64;
-    if missing == 0 {
+    if missing.is_empty() {
         return;
     }
     let _ = write!(
         out,
         "<details id=\"missing\"><summary>{}, and why</summary>\n<div class=\"scroll\"><table><tbody>\n",
         counted(
-            missing,
+            missing.len() as u64,
             "metric has no value here",
             "metrics have no value here"
         )
     );
-    for (label, value, said) in known(true) {
+    for (label, value, said) in missing {
         let _ = writeln!(
             out,
             "<tr><td><details><summary>{}</summary>{said}</details></td><td>{}</td></tr>",

@@ -192,11 +192,8 @@ impl Order {
             if count.count > 0 {
                 let t_s = Some(seconds(count.first, start_ns));
                 findings.push(Finding {
-                    topic: topic.to_owned(),
-                    kind,
-                    count: count.count,
                     t_s,
-                    text,
+                    ..Finding::new(topic, kind, count.count, text)
                 });
             }
         };
@@ -314,11 +311,8 @@ impl Clocks {
     pub fn report(&self, topic: &str, start_ns: i64, findings: &mut Vec<Finding>) {
         let mut say = |kind, count, t_s, text| {
             findings.push(Finding {
-                topic: topic.to_owned(),
-                kind,
-                count,
                 t_s,
-                text,
+                ..Finding::new(topic, kind, count, text)
             })
         };
         if self.zero.count > 0 {
